@@ -1,0 +1,73 @@
+// Cameras behind one interface, opened by URI.
+#pragma once
+
+#include <array>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "capture/colour.h"
+#include "capture/frame.h"
+
+namespace capture {
+
+struct CameraInfo {
+  int width = 0;
+  int height = 0;
+  Rational rate;           // 0/1 = unknown or not constant (stills)
+  std::int64_t frames = 0;  // 0 = unknown or endless
+  std::string description;  // for people: codec, format, colour tags and how they were read
+  int sound_channels = 0;   // 0 = silent
+  int sound_rate = 0;       // samples per second
+};
+
+// Sound that goes with a stretch of frames: interleaved floats, -1 to 1.
+struct Sound {
+  Time time{};  // of the first sample, on the frames' clock
+  int channels = 0;
+  int rate = 0;
+  std::vector<float> samples;
+};
+
+struct CameraStatistics {
+  std::int64_t delivered = 0;
+  std::int64_t lost = 0;
+  std::int64_t damaged = 0;
+};
+
+struct CameraOptions {
+  PlateColour colour;                     // how codes become scene-linear values
+  std::optional<std::int64_t> frame;       // start at this frame; for stills and sequences, which one
+  std::optional<std::array<int, 4>> crop;  // x, y, width, height in source pixels
+  bool loop = false;                       // files start again at their end, time going on
+  std::string base_dir;                    // relative paths start here
+  std::string response;                    // .rsp file of a camera that is not linear; "" = by colour
+};
+
+// A source of frames. Not thread-safe: one thread reads it.
+class Camera {
+ public:
+  virtual ~Camera() = default;
+  virtual const CameraInfo& info() const = 0;
+  // The next frame in order; nothing at the end. A frame that cannot be decoded comes with status
+  // `lost`, and the previous image. Never throws for damage inside a stream once it is open.
+  virtual std::optional<Frame> next() = 0;
+  // The sound up to and including the last frame's time that was not taken yet.
+  virtual std::optional<Sound> take_sound() { return std::nullopt; }
+  virtual CameraStatistics statistics() const = 0;
+};
+
+// Opens `file:PATH` (video, a still, a sequence with %0Nd), `replay:DIR`, or a scheme that a later
+// folder registered (`made:`). A bare path counts as `file:`. Throws std::runtime_error naming the
+// URI, the reason, and what to do.
+std::unique_ptr<Camera> open_camera(std::string_view uri, const CameraOptions& options = {});
+
+using CameraOpener =
+    std::function<std::unique_ptr<Camera>(std::string_view rest, const CameraOptions&)>;
+// Adds a scheme ("made"). Call at start-up, before threads.
+void register_camera(std::string scheme, CameraOpener opener);
+
+}  // namespace capture

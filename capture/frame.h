@@ -1,0 +1,43 @@
+// One picture of a camera, with when and how it was taken.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "capture/image.h"
+
+namespace capture {
+
+// Instants on the monotonic clock, or, for files, since the file's first frame.
+using Time = std::chrono::nanoseconds;
+
+// num / den, both > 0: 25/1, 30000/1001.
+struct Rational {
+  std::int64_t num = 0;
+  std::int64_t den = 1;
+  double value() const { return static_cast<double>(num) / static_cast<double>(den); }
+  friend bool operator==(const Rational&, const Rational&) = default;
+};
+
+// Time of frame n at a rate, without drift: n * den / num seconds, rounded down to nanoseconds.
+// Exact for |n| up to 2^40 and any broadcast rate.
+Time time_of_frame(std::int64_t n, Rational rate);
+
+enum class FrameStatus {
+  good,
+  damaged,  // decoded, but the source reported errors inside it
+  lost,     // did not arrive: the image is the previous one, or none
+};
+
+struct Frame {
+  std::shared_ptr<const Image> image;  // scene-linear; null only if nothing ever arrived
+  std::int64_t number = 0;             // counts the source's frames, lost ones included
+  Time time{};                         // middle of the exposure
+  double exposure_s = 0;               // 0 = unknown
+  FrameStatus status = FrameStatus::good;
+  std::string note;  // what happened, in words, if not good
+};
+
+}  // namespace capture

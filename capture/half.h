@@ -1,0 +1,28 @@
+// Half floats (IEEE binary16) as their bits.
+#pragma once
+
+#include <cstdint>
+
+#if defined(__F16C__)
+#include <immintrin.h>
+#endif
+
+namespace capture {
+
+using Half = std::uint16_t;
+
+// The largest finite half. Brighter radiance is clamped to it on output, and counted.
+inline constexpr float half_max = 65504.0F;
+
+#if defined(__F16C__)
+// Rounds to nearest, ties to even; values beyond 65,520 become infinity, NaN stays NaN.
+inline Half half_from_float(float value) {
+  return static_cast<Half>(_cvtss_sh(value, _MM_FROUND_TO_NEAREST_INT));
+}
+inline float float_from_half(Half bits) { return _cvtsh_ss(bits); }
+#else
+Half half_from_float(float value);
+float float_from_half(Half bits);
+#endif
+
+}  // namespace capture

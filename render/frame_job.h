@@ -1,0 +1,93 @@
+// What one frame is rendered from: a value without pointers, which can travel to another machine.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "calibrate/pose.h"
+#include "capture/frame.h"
+#include "capture/half.h"
+#include "render/light_table.h"
+
+namespace render {
+
+// All settings of speed against accuracy.
+struct Effort {
+  int aa_samples = 9;         // camera rays in pixels where an edge passes; 1 = no anti-aliasing
+  int light_samples = 64;     // lights in the table
+  int interleave = 1;         // 1, 2 or 4: each pixel of a block of this size tests its share of lights
+  bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
+  bool cull_lights = true;    // skip shadow rays that no object can block
+  float accuracy = 0.95F;     // rays whose share of the pixel falls below 1 - accuracy are cut
+  int max_depth = 8;          // safety net; counted when hit
+  int tile_size = 64;         // pixels, a multiple of 16
+  int progressive_sample = 0;  // samples accumulated so far (later issues)
+  friend bool operator==(const Effort&, const Effort&) = default;
+};
+
+struct TextureTime {
+  std::uint32_t stream = 0;
+  capture::Time time{};
+  friend bool operator==(const TextureTime&, const TextureTime&) = default;
+};
+
+struct FrameJob {
+  std::int64_t frame = 0;
+  capture::Time time{};
+  calibrate::Pose cam_from_set;
+  std::uint32_t lens = 0;
+  std::uint64_t scene_version = 0;
+  Effort effort;
+  std::vector<TextureTime> textures;  // [0] is the plate, [1] the environment
+  LightTable lights;
+  std::array<float, 3> match{1, 1, 1};  // probe radiance to plate units, already in `lights`
+  std::array<float, 2> tone{1, 0};      // parameters of the tone curve (later issues)
+  friend bool operator==(const FrameJob&, const FrameJob&) = default;
+};
+
+std::vector<std::byte> serialize(const FrameJob& job);
+// Throws std::runtime_error on bytes that no serialize() wrote.
+FrameJob parse_frame_job(std::span<const std::byte> bytes);
+
+struct Rect {
+  int x = 0, y = 0, width = 0, height = 0;
+  friend bool operator==(const Rect&, const Rect&) = default;
+};
+
+// A part of the frame: a union of 16x16 cells (clipped by the picture), with its background.
+struct TileJob {
+  Rect rect;
+  int margin = 0;                           // of background around rect, clipped by the picture
+  Rect background_rect;                     // rect grown by margin, clipped
+  std::vector<capture::Half> background;    // (background_rect.height, .width, 3)
+  friend bool operator==(const TileJob&, const TileJob&) = default;
+};
+
+std::vector<std::byte> serialize(const TileJob& tile);
+TileJob parse_tile_job(std::span<const std::byte> bytes);
+
+struct RenderStatistics {
+  std::uint64_t primary_rays = 0;
+  std::uint64_t shadow_rays = 0;
+  std::uint64_t secondary_rays = 0;
+  std::uint64_t depth_limit_hits = 0;   // rays that max_depth ended
+  std::uint64_t clamped_values = 0;     // outputs beyond half, or not finite, made finite
+  std::uint64_t clipped_plate = 0;      // stand-in pixels whose plate is clipped
+  std::uint64_t virtual_pixels = 0;     // with A > 0
+  std::uint64_t affected_pixels = 0;    // whose plate a stand-in changed, or with A > 0
+
+  RenderStatistics& operator+=(const RenderStatistics& other);
+  friend bool operator==(const RenderStatistics&, const RenderStatistics&) = default;
+};
+
+struct TileResult {
+  Rect rect;
+  std::vector<capture::Half> rgba;   // (rect.height, rect.width, 4): finished picture, coverage
+  std::vector<capture::Half> matte;  // (rect.height, rect.width)
+  RenderStatistics statistics;
+};
+
+}  // namespace render

@@ -1,0 +1,32 @@
+// One frame, tile by tile, on this machine's threads.
+#pragma once
+
+#include "calibrate/lens.h"
+#include "capture/image.h"
+#include "render/environment.h"
+#include "render/frame_job.h"
+#include "render/scene.h"
+
+namespace render {
+
+// What a FrameJob's numbers stand for on this machine. All of it must outlive the call.
+struct FrameInputs {
+  const Scene* scene = nullptr;
+  const calibrate::DirectionTable* directions = nullptr;  // of the job's lens; its size is the picture's
+  const Environment* environment = nullptr;               // of the job's time, match applied, smoothed
+};
+
+struct FrameResult {
+  capture::HalfImage rgba;   // (height, width, 4)
+  capture::HalfImage matte;  // (height, width, 1)
+  RenderStatistics statistics;
+};
+
+// Renders a frame with oneTBB over tiles. `plate` is (height, width, 3) of the picture's size, linear.
+// `result` keeps its buffers from frame to frame. Throws std::invalid_argument if sizes disagree.
+void render_frame(const FrameInputs& inputs,
+                  const FrameJob& job,
+                  const capture::HalfImage& plate,
+                  FrameResult& result);
+
+}  // namespace render

@@ -1,0 +1,95 @@
+// The scene: a description that can be serialised, and its compiled form with Embree's trees.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "render/mesh.h"
+
+struct RTCSceneTy;
+struct RTCDeviceTy;
+
+namespace render {
+
+enum class ObjectKind : std::uint8_t { virtual_object = 0, stand_in = 1 };
+
+// Embree ray masks.
+inline constexpr unsigned mask_virtual = 1;       // virtual objects
+inline constexpr unsigned mask_stand_in = 2;      // stand-ins, seen by camera and reflection rays
+inline constexpr unsigned mask_real_blocker = 4;  // stand-ins that block real light
+
+struct Instance {
+  std::string name;
+  std::uint32_t mesh = 0;
+  std::array<float, 12> set_from_object{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // rows of 3x4
+  ObjectKind kind = ObjectKind::virtual_object;
+  bool blocks_light = true;  // stand-ins only: shadows cast by the real thing it stands for
+  friend bool operator==(const Instance&, const Instance&) = default;
+};
+
+struct SceneDescription {
+  std::vector<std::shared_ptr<const Mesh>> meshes;
+  std::vector<std::shared_ptr<const Texture>> textures;
+  std::vector<Material> materials;
+  std::vector<Instance> instances;
+  std::uint64_t version = 0;
+};
+
+// As bytes and back (little-endian, versioned). parse throws std::runtime_error on anything that is
+// truncated, oversized or refers to what is not there.
+std::vector<std::byte> serialize(const SceneDescription& scene);
+SceneDescription parse_scene(std::span<const std::byte> bytes);
+
+// Number of triangles over all instances.
+std::size_t triangle_count(const SceneDescription& scene);
+
+// A point on a surface, in the set's frame.
+struct HitPoint {
+  Vec3f position;
+  Vec3f geometric_normal;  // unit, on the side that `incoming` came from
+  Vec3f normal;            // interpolated vertex normal, unit, flipped to the same side
+  Vec3f tangent;           // unit, with handedness; zero if the mesh has none
+  float handedness = 1;
+  float u = 0, v = 0;      // texture coordinates
+  float uv_per_metre = 0;  // texture coordinate units per metre of surface, for mip levels
+  std::uint32_t material = 0;
+  std::uint32_t instance = 0;
+};
+
+// The compiled scene. Immutable once built; safe from any thread. Meshes that are used once are
+// placed directly, those used more often through Embree instances.
+class Scene {
+ public:
+  // Throws std::invalid_argument for indices out of range, std::runtime_error if Embree fails.
+  // Triangles that are not finite are left out and counted.
+  explicit Scene(SceneDescription description);
+  ~Scene();
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+
+  const SceneDescription& description() const;
+  RTCSceneTy* embree() const;
+  // The point that Embree's ids and barycentric u, v name. `incoming` is the ray's direction.
+  HitPoint hit_point(unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v,
+                     Vec3f incoming) const;
+  // Instance that Embree's ids name, without the rest.
+  std::uint32_t instance_of(unsigned geom_id, unsigned inst_id) const;
+  // Bounds in the set: of all virtual objects; of everything. Empty: lower > upper.
+  struct Bounds {
+    Vec3f lower, upper;
+  };
+  Bounds virtual_bounds() const;
+  Bounds bounds() const;
+  std::size_t skipped_triangles() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace render

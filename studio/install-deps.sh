@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Every Debian 12 package that Platelight builds, runs and tests with. Quick when all are there.
+set -euo pipefail
+packages=(
+  # build
+  build-essential clang-format cmake ninja-build pkg-config git ca-certificates
+  # capture
+  libavcodec-dev libavformat-dev libavutil-dev libswresample-dev libswscale-dev
+  libexif-dev libimath-dev libopenexr-dev
+  # calibrate
+  libmrcal-dev libtomlplusplus-dev
+  # render
+  libassimp-dev libembree-dev libtbb-dev
+  # compositing
+  libopencolorio-dev
+  # studio
+  fonts-dejavu-core libcli11-dev libfmt-dev librsvg2-dev libspdlog-dev nlohmann-json3-dev
+  # tests
+  ffmpeg libbenchmark-dev libgmock-dev libgtest-dev openimageio-tools
+)
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+sudo=()
+[ "$(id -u)" -eq 0 ] || sudo=(sudo)
+export DEBIAN_FRONTEND=noninteractive
+"${sudo[@]}" apt-get update -q
+"${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
