@@ -17,7 +17,7 @@ namespace capture {
 struct CameraInfo {
   int width = 0;
   int height = 0;
-  Rational rate;           // 0/1 = unknown or not constant (stills)
+  Rational rate;            // 0/1 = unknown or not constant (stills)
   std::int64_t frames = 0;  // 0 = unknown or endless
   std::string description;  // for people: codec, format, colour tags and how they were read
   int sound_channels = 0;   // 0 = silent
@@ -39,12 +39,12 @@ struct CameraStatistics {
 };
 
 struct CameraOptions {
-  PlateColour colour;                     // how codes become scene-linear values
-  std::optional<std::int64_t> frame;       // start at this frame; for stills and sequences, which one
+  PlateColour colour;                 // how codes become scene-linear values
+  std::optional<std::int64_t> frame;  // start at this frame; for stills and sequences, which one
   std::optional<std::array<int, 4>> crop;  // x, y, width, height in source pixels
   bool loop = false;                       // files start again at their end, time going on
   std::string base_dir;                    // relative paths start here
-  std::string response;                    // .rsp file of a camera that is not linear; "" = by colour
+  std::string response;  // .rsp file of a camera that is not linear; "" = by colour
 };
 
 // A source of frames. Not thread-safe: one thread reads it.

@@ -9,8 +9,8 @@ namespace capture {
 
 // How a non-linear value 0..1 and light relate. Values beyond 0..1 continue the curve: odd about 0.
 enum class Transfer {
-  rec1886,        // light = v^2.4: a Rec.1886 display, and so the inverse of its un-tone-mapped view
-  srgb,           // IEC 61966-2-1, piecewise
+  rec1886,  // light = v^2.4: a Rec.1886 display, and so the inverse of its un-tone-mapped view
+  srgb,     // IEC 61966-2-1, piecewise
   rec709_camera,  // inverse of the BT.709 camera curve
   linear,
 };

@@ -1,0 +1,30 @@
+// When frames are.
+#include "capture/frame.h"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace capture {
+namespace {
+
+TEST(TimeOfFrame, DoesNotDriftOverYears) {
+  const Rational rate{30000, 1001};
+  const std::int64_t whole = 30000LL * 1'000'000;  // frames that end on a whole second
+  EXPECT_EQ(time_of_frame(whole, rate), std::chrono::seconds(1'001'000'000));
+  EXPECT_EQ(time_of_frame(whole + 1, rate) - time_of_frame(whole, rate), time_of_frame(1, rate));
+}
+
+TEST(TimeOfFrame, RoundsDownOnBothSidesOfZero) {
+  EXPECT_EQ(time_of_frame(1, {3, 1}).count(), 333'333'333);
+  EXPECT_EQ(time_of_frame(-1, {3, 1}).count(), -333'333'334);
+  EXPECT_EQ(time_of_frame(-3, {3, 1}).count(), -1'000'000'000);
+}
+
+TEST(TimeOfFrame, RefusesARateOfZero) {
+  EXPECT_THROW(time_of_frame(1, {0, 1}), std::invalid_argument);
+  EXPECT_THROW(time_of_frame(1, {25, 0}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace capture
