@@ -15,7 +15,8 @@ namespace calibrate {
 //   "pinhole"          fx fy cx cy
 //   "equisolid"        f cx cy                       r = 2 f sin(theta/2)
 //   "kannala_brandt"   fx fy cx cy k1..k4 (0 to 4)   r = theta (1 + k1 theta^2 + k2 theta^4 + ...)
-//   mrcal's own names  LENSMODEL_OPENCV4, LENSMODEL_SPLINED_STEREOGRAPHIC_..., parameters as mrcal's
+//   mrcal's own names  LENSMODEL_OPENCV4, LENSMODEL_SPLINED_STEREOGRAPHIC_..., parameters as
+//   mrcal's
 // Pixels are mrcal's: (0, 0) is the centre of the top-left pixel.
 struct Lens {
   std::string model = "pinhole";

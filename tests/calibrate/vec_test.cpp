@@ -6,9 +6,7 @@
 namespace calibrate {
 namespace {
 
-TEST(Cross, IsRightHanded) {
-  EXPECT_EQ(cross(Vec3{1, 0, 0}, Vec3{0, 1, 0}), (Vec3{0, 0, 1}));
-}
+TEST(Cross, IsRightHanded) { EXPECT_EQ(cross(Vec3{1, 0, 0}, Vec3{0, 1, 0}), (Vec3{0, 0, 1})); }
 
 }  // namespace
 }  // namespace calibrate

@@ -1,0 +1,147 @@
+// Our own lens models: symmetric about the optical axis.
+#include "calibrate/axial_lens.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace calibrate {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+// Radii this far beyond the largest one are rounding errors of a pixel at the largest angle.
+constexpr double radius_slack = 1e-12;
+// Closer to the axis than this, sin(angle) / radius is 1 to double precision.
+constexpr double paraxial_radius = 1e-9;
+// A pinhole's picture plane has no end; beyond this angle its pixels are useless.
+constexpr double pinhole_max_angle_rad = pi / 2 - 1e-6;
+
+}  // namespace
+
+std::optional<AxialLens::Kind> AxialLens::kind_of(std::string_view model) {
+  if (model == "pinhole") return Kind::pinhole;
+  if (model == "equisolid") return Kind::equisolid;
+  if (model == "kannala_brandt") return Kind::kannala_brandt;
+  return std::nullopt;
+}
+
+AxialLens::AxialLens(const Lens& lens) : kind_(kind_of(lens.model).value()) {
+  const std::vector<double>& p = lens.parameters;
+  if (kind_ == Kind::equisolid) {
+    focal_px_ = {p[0], p[0]};
+    centre_ = {p[1], p[2]};
+  } else {
+    focal_px_ = {p[0], p[1]};
+    centre_ = {p[2], p[3]};
+    std::copy(p.begin() + 4, p.end(), k_.begin());
+  }
+  max_angle_rad_ = kind_ == Kind::pinhole ? std::min(lens.max_angle_rad, pinhole_max_angle_rad)
+                                          : fold_angle(lens.max_angle_rad);
+  max_radius_ = radius(max_angle_rad_);
+}
+
+double AxialLens::radius(double angle_rad) const {
+  switch (kind_) {
+    case Kind::pinhole:
+      return std::tan(angle_rad);
+    case Kind::equisolid:
+      return 2 * std::sin(angle_rad / 2);
+    case Kind::kannala_brandt:
+      break;
+  }
+  const double t2 = angle_rad * angle_rad;
+  return angle_rad * (1 + t2 * (k_[0] + t2 * (k_[1] + t2 * (k_[2] + t2 * k_[3]))));
+}
+
+// Of the Kannala-Brandt polynomial.
+double AxialLens::radius_slope(double angle_rad) const {
+  const double t2 = angle_rad * angle_rad;
+  return 1 + t2 * (3 * k_[0] + t2 * (5 * k_[1] + t2 * (7 * k_[2] + t2 * 9 * k_[3])));
+}
+
+// The angle at which the radius stops growing, or max_angle_rad if it grows up to there.
+double AxialLens::fold_angle(double max_angle_rad) const {
+  if (kind_ != Kind::kannala_brandt) return max_angle_rad;
+  if (std::ranges::all_of(k_, [](double k) { return k >= 0; })) return max_angle_rad;
+  constexpr int steps = 256;
+  double below = 0;
+  for (int i = 1; i <= steps; ++i) {
+    double above = max_angle_rad * i / steps;
+    if (radius_slope(above) <= 0) {
+      for (int bisection = 0; bisection < 52; ++bisection) {
+        const double middle = 0.5 * (below + above);
+        (radius_slope(middle) > 0 ? below : above) = middle;
+      }
+      return below;
+    }
+    below = above;
+  }
+  return max_angle_rad;
+}
+
+double AxialLens::angle(double radius_wanted) const {
+  switch (kind_) {
+    case Kind::pinhole:
+      return std::atan(radius_wanted);
+    case Kind::equisolid:
+      return 2 * std::asin(std::min(radius_wanted / 2, 1.0));
+    case Kind::kannala_brandt:
+      break;
+  }
+  // Newton's steps, and bisection where one would leave the bracket; the radius grows inside it.
+  double below = 0;
+  double above = max_angle_rad_;
+  double t = std::min(radius_wanted, above);
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    const double excess = radius(t) - radius_wanted;
+    (excess < 0 ? below : above) = t;
+    double next = t - excess / radius_slope(t);
+    if (!(next > below && next < above)) next = 0.5 * (below + above);
+    if (std::abs(next - t) <= 4 * std::numeric_limits<double>::epsilon() * t) return next;
+    t = next;
+  }
+  return t;
+}
+
+Vec2 AxialLens::ray_of_radius(double r) const {
+  if (r < paraxial_radius) return {1, 1};
+  if (kind_ == Kind::equisolid) {
+    const double s = std::min(r / 2, 1.0);
+    return {std::sqrt(1 - s * s), 1 - 2 * s * s};
+  }
+  if (kind_ == Kind::pinhole) {
+    const double cosine = 1 / std::sqrt(1 + r * r);
+    return {cosine, cosine};
+  }
+  const double t = angle(r);
+  return {std::sin(t) / r, std::cos(t)};
+}
+
+std::optional<Vec2> AxialLens::project(Vec3 v) const {
+  const double l = length(v);
+  if (!std::isfinite(l) || l == 0) return std::nullopt;
+  const double off_axis = std::hypot(v.x, v.y);
+  const double angle_rad = std::atan2(off_axis, v.z);
+  if (angle_rad > max_angle_rad_ * (1 + radius_slack)) return std::nullopt;
+  // Straight behind, every direction in the picture is as good as another.
+  if (off_axis == 0 && v.z < 0) return std::nullopt;
+  double scale = 1 / l;
+  if (kind_ == Kind::pinhole) {
+    scale = 1 / v.z;
+  } else if (angle_rad > paraxial_radius) {
+    scale = radius(angle_rad) / off_axis;
+  }
+  return Vec2{focal_px_.x * v.x * scale + centre_.x, focal_px_.y * v.y * scale + centre_.y};
+}
+
+std::optional<Vec3> AxialLens::unproject(Vec2 q) const {
+  const double x = (q.x - centre_.x) / focal_px_.x;
+  const double y = (q.y - centre_.y) / focal_px_.y;
+  const double r = std::hypot(x, y);
+  if (!(r <= max_radius_ * (1 + radius_slack))) return std::nullopt;
+  const Vec2 ray = ray_of_radius(std::min(r, max_radius_));
+  return normalize(Vec3{x * ray.x, y * ray.x, ray.y});
+}
+
+}  // namespace calibrate

@@ -1,0 +1,187 @@
+// mrcal's lens models, through libmrcal.
+#include "calibrate/mrcal_lens.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+extern "C" {  // mrcal's headers do not say so themselves
+#include <mrcal/mrcal.h>
+}
+
+namespace calibrate {
+namespace {
+
+constexpr std::string_view prefix = "LENSMODEL_";
+constexpr std::string_view splined = "LENSMODEL_SPLINED_STEREOGRAPHIC";
+
+struct FixedModel {
+  std::string_view name;
+  int parameters;
+};
+constexpr std::array fixed_models{
+    FixedModel{"LENSMODEL_PINHOLE", 4},   FixedModel{"LENSMODEL_STEREOGRAPHIC", 4},
+    FixedModel{"LENSMODEL_LONLAT", 4},    FixedModel{"LENSMODEL_OPENCV4", 8},
+    FixedModel{"LENSMODEL_OPENCV5", 9},   FixedModel{"LENSMODEL_OPENCV8", 12},
+    FixedModel{"LENSMODEL_OPENCV12", 16}, FixedModel{"LENSMODEL_CAHVOR", 9},
+};
+
+// Splines that libmrcal evaluates without harm: smaller grids abort it, or give NaN.
+constexpr int min_knots = 5;
+constexpr int max_knots = 1000;
+
+// A pixel must come back to itself this closely.
+constexpr double round_trip_px = 1e-3;
+// Newton's steps on libmrcal's answer, which it leaves up to about 1e-4 px off.
+constexpr int polish_steps = 4;
+
+[[noreturn]] void refuse(std::string_view model, const std::string& why) {
+  throw std::invalid_argument("lens model " + std::string(model) + ": " + why);
+}
+
+// Takes `key` and a whole number from the front of `text`.
+std::optional<int> take_number(std::string_view& text, std::string_view key) {
+  if (!text.starts_with(key)) return std::nullopt;
+  text.remove_prefix(key.size());
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc{}) return std::nullopt;
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return value;
+}
+
+int count_spline_parameters(std::string_view model) {
+  std::string_view rest = model.substr(splined.size());
+  const auto order = take_number(rest, "_order=");
+  const auto columns = take_number(rest, "_Nx=");
+  const auto rows = take_number(rest, "_Ny=");
+  const auto fov_deg = take_number(rest, "_fov_x_deg=");
+  if (!order || !columns || !rows || !fov_deg || !rest.empty()) {
+    refuse(model, "its name must end in _order=O_Nx=N_Ny=N_fov_x_deg=D");
+  }
+  if (*order != 2 && *order != 3) refuse(model, "order must be 2 or 3");
+  if (std::min(*columns, *rows) < min_knots || std::max(*columns, *rows) > max_knots) {
+    refuse(model, "Nx and Ny must be from 5 to 1000");
+  }
+  if (*fov_deg < 1 || *fov_deg >= 360) refuse(model, "fov_x_deg must be from 1 to 359");
+  return 4 + 2 * *columns * *rows;
+}
+
+mrcal_lensmodel_t parsed(const std::string& model) {
+  mrcal_lensmodel_t result{};
+  if (!mrcal_lensmodel_from_name(&result, model.c_str())) {
+    refuse(model, "libmrcal does not know it");
+  }
+  return result;
+}
+
+bool finite(const mrcal_point2_t& q) { return std::isfinite(q.x) && std::isfinite(q.y); }
+
+Vec3 from_mrcal(const mrcal_point3_t& v) { return {v.x, v.y, v.z}; }
+
+// A direction's pixel and its change with the direction.
+struct Projection {
+  Vec2 q;
+  Vec3 dqx, dqy;
+};
+
+class Projector {
+ public:
+  explicit Projector(const Lens& lens)
+      : model_(parsed(lens.model)),
+        parameters_(lens.parameters.data()),
+        max_angle_rad_(lens.max_angle_rad),
+        behind_(mrcal_lensmodel_metadata(&model_).can_project_behind_camera) {}
+
+  // Nothing where the lens sees nothing. Past the angle where distortion turns back, the picture is
+  // mirrored there: seen from the camera, a turn from x to y is no longer one in the picture.
+  std::optional<Projection> operator()(Vec3 direction) const {
+    const double l = length(direction);
+    if (!std::isfinite(l) || l == 0) return std::nullopt;
+    const Vec3 v = direction / l;
+    if (!behind_ && v.z <= 0) return std::nullopt;
+    if (std::atan2(std::hypot(v.x, v.y), v.z) > max_angle_rad_) return std::nullopt;
+    const mrcal_point3_t p{{v.x, v.y, v.z}};
+    mrcal_point2_t q{};
+    std::array<mrcal_point3_t, 2> gradient{};
+    if (!mrcal_project(&q, gradient.data(), nullptr, &p, 1, &model_, parameters_)) {
+      return std::nullopt;
+    }
+    const Projection result{{q.x, q.y}, from_mrcal(gradient[0]), from_mrcal(gradient[1])};
+    if (!finite(q) || !(dot(v, cross(result.dqx, result.dqy)) > 0)) return std::nullopt;
+    return result;
+  }
+
+  // The direction of a pixel near a first guess, by Newton's method on the sphere.
+  std::optional<Vec3> polish(Vec3 guess, Vec2 wanted) const {
+    Vec3 v = normalize(guess);
+    for (int step = 0; step <= polish_steps; ++step) {
+      const std::optional<Projection> at = (*this)(v);
+      if (!at) return std::nullopt;
+      const Vec2 miss{wanted.x - at->q.x, wanted.y - at->q.y};
+      const double miss_px = std::hypot(miss.x, miss.y);
+      if (step == polish_steps || miss_px < 1e-9) {
+        return miss_px <= round_trip_px ? std::optional(v) : std::nullopt;
+      }
+      // The change of v across itself that moves the pixel by `miss`.
+      const double determinant = dot(v, cross(at->dqx, at->dqy));
+      const Vec3 move = (cross(at->dqy, v) * miss.x + cross(v, at->dqx) * miss.y) / determinant;
+      v = normalize(v + move);
+    }
+    return std::nullopt;
+  }
+
+  const mrcal_lensmodel_t& model() const { return model_; }
+
+ private:
+  mrcal_lensmodel_t model_;
+  const double* parameters_;
+  double max_angle_rad_;
+  bool behind_;
+};
+
+}  // namespace
+
+bool is_mrcal_model(std::string_view model) { return model.starts_with(prefix); }
+
+int count_mrcal_parameters(std::string_view model) {
+  for (const FixedModel& fixed : fixed_models) {
+    if (model == fixed.name) return fixed.parameters;
+  }
+  if (model.starts_with(splined)) return count_spline_parameters(model);
+  std::string known;
+  for (const FixedModel& fixed : fixed_models) known += std::string(fixed.name) + ", ";
+  refuse(model, "not supported; known are " + known + std::string(splined) + "_...");
+}
+
+std::vector<std::optional<Vec2>> project_by_mrcal(const Lens& lens, std::span<const Vec3> v_cam) {
+  const Projector projector(lens);
+  std::vector<std::optional<Vec2>> result(v_cam.size());
+  for (std::size_t i = 0; i < v_cam.size(); ++i) {
+    if (const auto at = projector(v_cam[i])) result[i] = at->q;
+  }
+  return result;
+}
+
+std::vector<std::optional<Vec3>> unproject_by_mrcal(const Lens& lens, std::span<const Vec2> q) {
+  const Projector projector(lens);
+  std::vector<std::optional<Vec3>> result(q.size());
+  for (std::size_t i = 0; i < q.size(); ++i) {
+    const mrcal_point2_t pixel{{q[i].x, q[i].y}};
+    if (!finite(pixel)) continue;
+    // The pixel before it is mostly a neighbour, and a better first guess than libmrcal's own
+    // search.
+    if (i > 0 && result[i - 1]) result[i] = projector.polish(*result[i - 1], q[i]);
+    if (result[i]) continue;
+    mrcal_point3_t v{};
+    if (mrcal_unproject(&v, &pixel, 1, &projector.model(), lens.parameters.data())) {
+      result[i] = projector.polish(from_mrcal(v), q[i]);
+    }
+  }
+  return result;
+}
+
+}  // namespace calibrate

@@ -1,0 +1,207 @@
+// Laws of lenses, and what they refuse.
+#include "calibrate/lens.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+
+namespace calibrate {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double degree = pi / 180;
+
+// Lenses with the angle up to which each is defined.
+struct Sample {
+  Lens lens;
+  double good_to_rad;
+};
+
+std::vector<Sample> samples() {
+  const Lens pinhole{"pinhole", 1280, 720, {1100, 1105, 641.7, 357.2}};
+  const Lens narrow{"pinhole", 1280, 720, {1100, 1105, 641.7, 357.2}, 30 * degree};
+  const Lens fisheye{"equisolid", 2808, 1872, {622.4, 1412.5, 932.0}, 93 * degree};
+  const Lens whole_sphere{"equisolid", 1024, 1024, {250, 511.5, 511.5}};
+  const Lens kb2{"kannala_brandt", 1024, 1024, {331, 331, 513.3, 509.1, -.02, .003}, pi / 2};
+  const Lens kb4{
+      "kannala_brandt", 1024, 1024, {331, 330, 513.3, 509.1, -.0417, 5.2e-4, 1e-5, -1e-6}, 1.7};
+  const Lens equidistant{"kannala_brandt", 640, 640, {200, 200, 319.5, 319.5}, pi};
+  const Lens street{
+      "LENSMODEL_OPENCV4", 768, 576, {1184.97, 1194.57, 324.222, 282.566, -.15662, .06178, 0, 0}};
+  const Lens stereographic{"LENSMODEL_STEREOGRAPHIC", 1024, 1024, {300, 300, 511, 511}, 2.5};
+  const Lens lonlat{"LENSMODEL_LONLAT", 1024, 512, {163, 163, 511.5, 255.5}};
+  return {{pinhole, 80 * degree},       {narrow, 30 * degree}, {fisheye, 93 * degree},
+          {whole_sphere, 179 * degree}, {kb2, pi / 2},         {kb4, 1.7},
+          {equidistant, 3.1},           {street, 40 * degree}, {stereographic, 2.5},
+          {lonlat, 85 * degree}};
+}
+
+Vec3 at_angle(double off_axis_rad, double around_rad) {
+  return {std::sin(off_axis_rad) * std::cos(around_rad),
+          std::sin(off_axis_rad) * std::sin(around_rad), std::cos(off_axis_rad)};
+}
+
+TEST(Project, IsUndoneByUnprojectAtEveryAngleThatTheLensSees) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform;
+  for (const auto& [lens, good_to_rad] : samples()) {
+    SCOPED_TRACE(lens.model);
+    for (int i = 0; i < 300; ++i) {
+      const Vec3 v_cam = at_angle(uniform(random) * good_to_rad, uniform(random) * 2 * pi);
+      const auto q = project(lens, v_cam * (0.1 + uniform(random)));
+      ASSERT_TRUE(q) << v_cam.x << " " << v_cam.y << " " << v_cam.z;
+      const auto back = unproject(lens, *q);
+      ASSERT_TRUE(back) << q->x << " " << q->y;
+      EXPECT_LE(length(*back - v_cam), 1e-9);
+      EXPECT_NEAR(length(*back), 1, 1e-12);
+    }
+  }
+}
+
+TEST(Unproject, IsUndoneByProjectAtEveryPixelOfThePictureThatTheLensSees) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> uniform;
+  for (const auto& [lens, good_to_rad] : samples()) {
+    SCOPED_TRACE(lens.model);
+    for (int i = 0; i < 300; ++i) {
+      const Vec2 q{uniform(random) * lens.width - 0.5, uniform(random) * lens.height - 0.5};
+      const auto v_cam = unproject(lens, q);
+      if (!v_cam) continue;
+      const auto back = project(lens, *v_cam);
+      ASSERT_TRUE(back) << q.x << " " << q.y;
+      EXPECT_LE(std::hypot(back->x - q.x, back->y - q.y), 1e-7);
+    }
+  }
+}
+
+TEST(Project, PutsTheAxisOnTheCentreForEveryModel) {
+  for (const auto& [lens, good_to_rad] : samples()) {
+    const std::size_t centre = lens.model == "equisolid" ? 1 : 2;
+    const auto q = project(lens, {0, 0, 5});
+    ASSERT_TRUE(q) << lens.model;
+    EXPECT_NEAR(q->x, lens.parameters[centre], 1e-9) << lens.model;
+    EXPECT_NEAR(q->y, lens.parameters[centre + 1], 1e-9) << lens.model;
+  }
+}
+
+TEST(Project, FollowsTheFormulaOfEachOfOurModels) {
+  const double t = 1.1;
+  const Vec3 v_cam = at_angle(t, 0);
+  const Lens equisolid{"equisolid", 640, 480, {200, 320, 240}};
+  EXPECT_NEAR(project(equisolid, v_cam)->x, 320 + 2 * 200 * std::sin(t / 2), 1e-10);
+  const Lens pinhole{"pinhole", 640, 480, {200, 210, 320, 240}};
+  EXPECT_NEAR(project(pinhole, v_cam)->x, 320 + 200 * std::tan(t), 1e-10);
+  const Lens kb{"kannala_brandt", 640, 480, {200, 200, 320, 240, -.03, .002}};
+  EXPECT_NEAR(project(kb, v_cam)->x, 320 + 200 * t * (1 - .03 * t * t + .002 * t * t * t * t),
+              1e-10);
+}
+
+TEST(Project, SeesNothingBehindAPinholeNorBeyondTheLargestAngle) {
+  const Lens pinhole{"pinhole", 640, 480, {500, 500, 319.5, 239.5}};
+  EXPECT_FALSE(project(pinhole, {0, 0, -1}));
+  EXPECT_FALSE(project(pinhole, {1, 0, 0}));
+  EXPECT_FALSE(project(pinhole, {}));
+  EXPECT_FALSE(project(pinhole, {0, 0, std::numeric_limits<double>::infinity()}));
+  const Lens fisheye{"equisolid", 2808, 1872, {622.4, 1412.5, 932.0}, 93 * degree};
+  EXPECT_TRUE(project(fisheye, at_angle(92.9 * degree, 1)));
+  EXPECT_FALSE(project(fisheye, at_angle(93.1 * degree, 1)));
+  EXPECT_FALSE(unproject(fisheye, {1412.5 + 904, 932}));
+  EXPECT_TRUE(unproject(fisheye, {1412.5 + 902, 932}));
+}
+
+TEST(Project, SeesNothingWhereTheDistortionTurnsBack) {
+  // r = t (1 - .2 t^2) turns back at t = 1.291, at r = .8607.
+  const Lens kb{"kannala_brandt", 640, 640, {300, 300, 319.5, 319.5, -.2}};
+  EXPECT_TRUE(project(kb, at_angle(1.29, 0)));
+  EXPECT_FALSE(project(kb, at_angle(1.30, 0)));
+  EXPECT_FALSE(unproject(kb, {319.5 + 300 * .87, 319.5}));
+  // r = x (1 - .3 x^2) turns back at x = 1.054, 46.5 degrees.
+  const Lens opencv{"LENSMODEL_OPENCV4", 640, 640, {300, 300, 319.5, 319.5, -.3, 0, 0, 0}};
+  EXPECT_TRUE(project(opencv, at_angle(46 * degree, 0)));
+  EXPECT_FALSE(project(opencv, at_angle(48 * degree, 0)));
+  EXPECT_FALSE(unproject(opencv, {319.5 + 300 * .8, 319.5}));
+}
+
+TEST(Unproject, GivesNothingWhereMrcalGivesNotANumber) {
+  const Lens lens{"LENSMODEL_OPENCV8",
+                  4000,
+                  2200,
+                  {1761.181055, 1761.250444, 1965.706996, 1087.518797, -0.01266096516,
+                   0.03590794372, -0.0002547045941, 0.0005275929652, 0.01968883397, 0.01482863541,
+                   -0.0562239888, 0.0500223357}};
+  for (const double far_px : {1e5, 1e7, 1e12}) {
+    const auto v = unproject(lens, {far_px, -far_px});
+    if (v) {
+      EXPECT_NEAR(length(*v), 1, 1e-9);
+      EXPECT_GT(v->z, 0);
+    }
+  }
+  EXPECT_FALSE(unproject(lens, {std::numeric_limits<double>::quiet_NaN(), 0}));
+}
+
+TEST(Cropped, SeesTheSameDirectionsAtShiftedPixels) {
+  for (const auto& [lens, good_to_rad] : samples()) {
+    const Lens part = cropped(lens, 100, 50, 200, 100);
+    const Vec3 v_cam = at_angle(0.2, 0.7);
+    const auto q = project(lens, v_cam);
+    const auto q_part = project(part, v_cam);
+    ASSERT_TRUE(q && q_part) << lens.model;
+    EXPECT_NEAR(q_part->x, q->x - 100, 1e-9) << lens.model;
+    EXPECT_NEAR(q_part->y, q->y - 50, 1e-9) << lens.model;
+    EXPECT_EQ(part.width, 200);
+  }
+}
+
+TEST(Resized, KeepsPixelEdgesOnPixelEdges) {
+  for (const auto& [lens, good_to_rad] : samples()) {
+    const Lens half = resized(lens, lens.width / 2, lens.height / 2);
+    const Vec3 v_cam = at_angle(0.2, 0.7);
+    const auto q = project(lens, v_cam);
+    const auto q_half = project(half, v_cam);
+    ASSERT_TRUE(q && q_half) << lens.model;
+    EXPECT_NEAR(q_half->x + 0.5, (q->x + 0.5) / 2, 1e-9) << lens.model;
+    EXPECT_NEAR(q_half->y + 0.5, (q->y + 0.5) / 2, 1e-9) << lens.model;
+  }
+}
+
+TEST(Resized, RefusesToSqueezeALensOfOneFocalLength) {
+  const Lens lens{"equisolid", 2808, 1872, {622.4, 1412.5, 932.0}};
+  EXPECT_THROW(resized(lens, 1404, 1872), std::invalid_argument);
+}
+
+TEST(Check, RefusesWhatIsNoLens) {
+  const Lens good{"pinhole", 640, 480, {500, 500, 319.5, 239.5}};
+  EXPECT_NO_THROW(check(good));
+  const auto refuses = [&](auto change) {
+    Lens bad = good;
+    change(bad);
+    EXPECT_THROW(check(bad), std::invalid_argument);
+    EXPECT_THROW(project(bad, {0, 0, 1}), std::invalid_argument);
+    EXPECT_THROW(make_direction_table(bad), std::invalid_argument);
+  };
+  refuses([](Lens& lens) { lens.model = "wide"; });
+  refuses([](Lens& lens) { lens.parameters.pop_back(); });
+  refuses([](Lens& lens) { lens.parameters[2] = std::numeric_limits<double>::quiet_NaN(); });
+  refuses([](Lens& lens) { lens.parameters[0] = 0; });
+  refuses([](Lens& lens) { lens.width = 0; });
+  refuses([](Lens& lens) { lens.height = 100000; });
+  refuses([](Lens& lens) { lens.max_angle_rad = 0; });
+  refuses([](Lens& lens) { lens.max_angle_rad = 4; });
+  // What would abort the program inside libmrcal, or make it read beyond the parameters.
+  for (const char* model :
+       {"LENSMODEL_CAHVORE_linearity=0.37", "LENSMODEL_CAHVORE", "LENSMODEL_OPENCV7",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC", "LENSMODEL_OPENCV8",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=3_Ny=3_fov_x_deg=120",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=4_Ny=4_fov_x_deg=120",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=1_Nx=8_Ny=8_fov_x_deg=120",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=65535_Ny=65535_fov_x_deg=120",
+        "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=8_Ny=8_fov_x_deg=120_more"}) {
+    refuses([model](Lens& lens) { lens.model = model; });
+  }
+}
+
+}  // namespace
+}  // namespace calibrate
