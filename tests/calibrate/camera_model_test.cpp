@@ -5,7 +5,7 @@
 
 #include <clocale>
 
-#include "tests/calibrate/made_files.h"
+#include "tests/made_files.h"
 
 extern "C" {
 #include <mrcal/mrcal.h>
@@ -30,7 +30,7 @@ void expect_near(const Pose& a, const Pose& b, double tolerance) {
 }
 
 TEST(CameraModel, ComesBackFromItsFileWithEveryDigit) {
-  const std::string path = make_temporary_directory() / "made.cameramodel";
+  const std::string path = made::make_temporary_directory() / "made.cameramodel";
   const CameraModel written = made_model();
   write_camera_model(path, written);
   const CameraModel read = read_camera_model(path);
@@ -40,7 +40,7 @@ TEST(CameraModel, ComesBackFromItsFileWithEveryDigit) {
 }
 
 TEST(CameraModel, ComesBackAfterEveryTurnUpToHalfAround) {
-  const std::string path = make_temporary_directory() / "made.cameramodel";
+  const std::string path = made::make_temporary_directory() / "made.cameramodel";
   CameraModel model = made_model();
   for (const Vec3 axis : {Vec3{0, 0, -1}, Vec3{0, 0, 1}, Vec3{0, -1, 0}, Vec3{1e-7, 0, 1},
                           Vec3{1, 1, 1}, Vec3{-1, 0, 1e-9}}) {
@@ -51,7 +51,7 @@ TEST(CameraModel, ComesBackAfterEveryTurnUpToHalfAround) {
 }
 
 TEST(CameraModel, IsReadByMrcalAsItWasMeant) {
-  const std::string path = make_temporary_directory() / "made.cameramodel";
+  const std::string path = made::make_temporary_directory() / "made.cameramodel";
   const CameraModel written = made_model();
   write_camera_model(path, written);
   mrcal_cameramodel_t* theirs = mrcal_read_cameramodel_file(path.c_str());
@@ -67,7 +67,7 @@ TEST(CameraModel, IsReadByMrcalAsItWasMeant) {
 }
 
 TEST(CameraModel, IsReadAlikeUnderALocaleOfCommas) {
-  const std::string path = make_temporary_directory() / "made.cameramodel";
+  const std::string path = made::make_temporary_directory() / "made.cameramodel";
   const std::string before = std::setlocale(LC_NUMERIC, nullptr);
   const bool commas = std::setlocale(LC_NUMERIC, "de_DE.UTF-8") != nullptr;
   write_camera_model(path, made_model());
@@ -78,7 +78,7 @@ TEST(CameraModel, IsReadAlikeUnderALocaleOfCommas) {
 }
 
 TEST(CameraModel, AgreesWithMrcalOnItsOwnFiles) {
-  const auto directory = real_data() / "calib" / "mrcal";
+  const auto directory = made::real_data() / "calib" / "mrcal";
   if (!std::filesystem::exists(directory)) GTEST_SKIP() << "no real data at " << directory;
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(directory)) {
@@ -110,7 +110,7 @@ TEST(CameraModel, AgreesWithMrcalOnItsOwnFiles) {
 }
 
 TEST(WriteCameraModel, RefusesLensesThatMrcalDoesNotKnow) {
-  const std::string path = make_temporary_directory() / "made.cameramodel";
+  const std::string path = made::make_temporary_directory() / "made.cameramodel";
   CameraModel model = made_model();
   model.lens = {"equisolid", 640, 480, {200, 320, 240}};
   EXPECT_THROW(write_camera_model(path, model), std::invalid_argument);
@@ -120,32 +120,33 @@ TEST(WriteCameraModel, RefusesLensesThatMrcalDoesNotKnow) {
 }
 
 TEST(ReadCameraModel, RefusesEveryBadFileWithLineAndReason) {
-  expect_refusals("", ".cameramodel",
-                  {{"empty.cameramodel", ":1: expected '{'"},
-                   {"truncated.cameramodel", ":3: intrinsics must be a list of numbers"},
-                   {"no_lensmodel.cameramodel", ": 'lensmodel' is missing"},
-                   {"no_imagersize.cameramodel", ": 'imagersize' is missing"},
-                   {"no_intrinsics.cameramodel", ": 'intrinsics' is missing"},
-                   {"unknown_model.cameramodel", ":2: lens model LENSMODEL_OPENCV7: not supported"},
-                   {"cahvore_would_abort.cameramodel", ":2: lens model LENSMODEL_CAHVORE"},
-                   {"spline_of_three_knots.cameramodel", "Nx and Ny must be from 5 to 1000"},
-                   {"spline_without_configuration.cameramodel", "its name must end in"},
-                   {"spline_of_order_one.cameramodel", "order must be 2 or 3"},
-                   {"too_few_intrinsics.cameramodel", ":3: lens model LENSMODEL_OPENCV8 takes 12"},
-                   {"nan_intrinsics.cameramodel", ":3: intrinsics holds \"nan\""},
-                   {"focal_length_of_zero.cameramodel", ":3: a focal length must be above 0"},
-                   {"negative_size.cameramodel", ":5: 'imagersize' must be"},
-                   {"size_of_three.cameramodel", ":5: 'imagersize' must be"},
-                   {"five_extrinsics.cameramodel", ":4: 'extrinsics' must be 6 numbers"},
-                   {"open_quote.cameramodel", ":2: a string has no closing quote"},
-                   {"key_twice.cameramodel", ":4: 'intrinsics' stands here for the second time"},
-                   {"text_after_the_end.cameramodel", ":7: something follows"},
-                   {"word_among_numbers.cameramodel", ":3: intrinsics holds \"wide\""}},
-                  read_camera_model);
+  made::expect_refusals(
+      "", ".cameramodel",
+      {{"empty.cameramodel", ":1: expected '{'"},
+       {"truncated.cameramodel", ":3: intrinsics must be a list of numbers"},
+       {"no_lensmodel.cameramodel", ": 'lensmodel' is missing"},
+       {"no_imagersize.cameramodel", ": 'imagersize' is missing"},
+       {"no_intrinsics.cameramodel", ": 'intrinsics' is missing"},
+       {"unknown_model.cameramodel", ":2: lens model LENSMODEL_OPENCV7: not supported"},
+       {"cahvore_would_abort.cameramodel", ":2: lens model LENSMODEL_CAHVORE"},
+       {"spline_of_three_knots.cameramodel", "Nx and Ny must be from 5 to 1000"},
+       {"spline_without_configuration.cameramodel", "its name must end in"},
+       {"spline_of_order_one.cameramodel", "order must be 2 or 3"},
+       {"too_few_intrinsics.cameramodel", ":3: lens model LENSMODEL_OPENCV8 takes 12"},
+       {"nan_intrinsics.cameramodel", ":3: intrinsics holds \"nan\""},
+       {"focal_length_of_zero.cameramodel", ":3: a focal length must be above 0"},
+       {"negative_size.cameramodel", ":5: 'imagersize' must be"},
+       {"size_of_three.cameramodel", ":5: 'imagersize' must be"},
+       {"five_extrinsics.cameramodel", ":4: 'extrinsics' must be 6 numbers"},
+       {"open_quote.cameramodel", ":2: a string has no closing quote"},
+       {"key_twice.cameramodel", ":4: 'intrinsics' stands here for the second time"},
+       {"text_after_the_end.cameramodel", ":7: something follows"},
+       {"word_among_numbers.cameramodel", ":3: intrinsics holds \"wide\""}},
+      read_camera_model);
 }
 
 TEST(ReadCameraModel, EndsAtEveryTruncationAndEveryFlippedByte) {
-  const auto directory = make_temporary_directory();
+  const auto directory = made::make_temporary_directory();
   const std::string whole = directory / "whole.cameramodel";
   write_camera_model(whole, made_model());
   std::ifstream file(whole, std::ios::binary);

@@ -4,13 +4,13 @@
 #include <numbers>
 
 #include "calibrate/lens.h"
-#include "tests/calibrate/made_files.h"
+#include "tests/made_files.h"
 
 namespace calibrate {
 namespace {
 
 TEST(WriteLens, IsUndoneByReadLens) {
-  const auto directory = make_temporary_directory();
+  const auto directory = made::make_temporary_directory();
   const std::vector<Lens> lenses{
       {"pinhole", 640, 480, {500.5, 501.25, 319.5, 1.0 / 3}},
       {"equisolid", 2808, 1872, {622.4, 1412.5, 932.0}, 1.62},
@@ -29,7 +29,7 @@ TEST(WriteLens, IsUndoneByReadLens) {
 }
 
 TEST(WriteLens, WritesAPinholeThatAlsoMrcalReads) {
-  const std::string path = make_temporary_directory() / "pinhole.cameramodel";
+  const std::string path = made::make_temporary_directory() / "pinhole.cameramodel";
   const Lens lens{"pinhole", 640, 480, {500, 501, 319.5, 239.5}};
   write_lens(path, lens);
   const Lens read = read_lens(path);
@@ -38,7 +38,7 @@ TEST(WriteLens, WritesAPinholeThatAlsoMrcalReads) {
 }
 
 TEST(ReadLens, TakesAnglesInDegreesUpToHalfTheSphere) {
-  const std::string path = make_temporary_directory() / "lens.toml";
+  const std::string path = made::make_temporary_directory() / "lens.toml";
   std::ofstream(path) << "model = \"equisolid\"\nwidth = 640\nheight = 480\nf = 100\ncx = 320\n"
                          "cy = 240\nmax_angle = 180\n";
   EXPECT_NEAR(read_lens(path).max_angle_rad, std::numbers::pi, 1e-15);
@@ -51,7 +51,7 @@ TEST(ReadLens, RefusesFilesOfOtherKindsAndMissingOnes) {
 }
 
 TEST(ReadLens, RefusesEveryBadTomlFileWithLineColumnAndReason) {
-  expect_refusals(
+  made::expect_refusals(
       "lens_", ".toml",
       {{"lens_syntax.toml", ":2:14: "},
        {"lens_unknown_key.toml", ":8:1: unknown key \"focal\""},

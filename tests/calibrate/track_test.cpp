@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "tests/calibrate/made_files.h"
+#include "tests/made_files.h"
 
 namespace calibrate {
 namespace {
@@ -90,7 +90,7 @@ TEST(WriteTrack, IsUndoneByReadTrack) {
   for (int i = 0; i < 20; ++i) {
     track.keys.push_back({i / 3.0, {i * 0.1, 1.0 / 7, -2}, random_quaternion(random)});
   }
-  const std::string path = make_temporary_directory() / "track.csv";
+  const std::string path = made::make_temporary_directory() / "track.csv";
   write_track(path, track);
   const Track read = read_track(path);
   ASSERT_EQ(read.keys.size(), track.keys.size());
@@ -102,7 +102,7 @@ TEST(WriteTrack, IsUndoneByReadTrack) {
 }
 
 TEST(ReadTrack, PassesOverCommentsSpacesAndCarriageReturns) {
-  const std::string path = make_temporary_directory() / "track.csv";
+  const std::string path = made::make_temporary_directory() / "track.csv";
   std::ofstream(path) << "# from the tracker\r\ntime_s,px,py,pz,qw,qx,qy,qz\r\n\r\n"
                          "0, 1, 2, 3, 2, 0, 0, 0\r\n1,1,2,3,+1,0,0,0";
   const Track track = read_track(path);
@@ -112,17 +112,17 @@ TEST(ReadTrack, PassesOverCommentsSpacesAndCarriageReturns) {
 }
 
 TEST(ReadTrack, RefusesEveryBadFileWithLineAndReason) {
-  expect_refusals("track_", ".csv",
-                  {{"track_empty.csv", ": holds no key"},
-                   {"track_header_only.csv", ": holds no key"},
-                   {"track_no_header.csv", ":1: the first line must be time_s,px"},
-                   {"track_missing_column.csv", ":2: a key has 8 columns"},
-                   {"track_extra_column.csv", ":2: a key has 8 columns"},
-                   {"track_word.csv", ":2: high is no finite number"},
-                   {"track_nan.csv", ":2: nan is no finite number"},
-                   {"track_zero_quaternion.csv", ":2: a quaternion of zeros"},
-                   {"track_time_stands_still.csv", ":3: time 0 does not come after 0"}},
-                  read_track);
+  made::expect_refusals("track_", ".csv",
+                        {{"track_empty.csv", ": holds no key"},
+                         {"track_header_only.csv", ": holds no key"},
+                         {"track_no_header.csv", ":1: the first line must be time_s,px"},
+                         {"track_missing_column.csv", ":2: a key has 8 columns"},
+                         {"track_extra_column.csv", ":2: a key has 8 columns"},
+                         {"track_word.csv", ":2: high is no finite number"},
+                         {"track_nan.csv", ":2: nan is no finite number"},
+                         {"track_zero_quaternion.csv", ":2: a quaternion of zeros"},
+                         {"track_time_stands_still.csv", ":3: time 0 does not come after 0"}},
+                        read_track);
 }
 
 }  // namespace

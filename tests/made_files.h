@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace calibrate {
+namespace made {
 
 inline std::filesystem::path bad_files() { return PLATELIGHT_SOURCE_DIR "/tests/data/bad"; }
 
@@ -56,4 +56,4 @@ void expect_refusals(const std::string& begin,
   for (const auto& [name, text] : words) EXPECT_TRUE(met.contains(name)) << name << " is missing";
 }
 
-}  // namespace calibrate
+}  // namespace made

@@ -1,0 +1,74 @@
+// OpenEXR files: takes written, pictures and maps read.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "capture/frame.h"
+#include "capture/image.h"
+
+namespace capture {
+
+// SMPTE ST 12-1 hours:minutes:seconds:frames. The file has room for frames 0 to 39.
+struct ExrTimecode {
+  int hours = 0;
+  int minutes = 0;
+  int seconds = 0;
+  int frames = 0;
+  bool drop_frame = false;
+  friend bool operator==(const ExrTimecode&, const ExrTimecode&) = default;
+};
+
+enum class ExrCompression {
+  none,  // fastest
+  rle,   // quick; good for mattes and empty ground
+  zip,   // slow to write, small
+  piz,   // slow, smallest for noisy pictures
+};
+
+struct ExrOptions {
+  ExrCompression compression = ExrCompression::none;
+  std::optional<ExrTimecode> timecode{};
+  std::optional<Rational> frames_per_second{};
+};
+
+// An image's channels under these names, in its order.
+struct ExrPlanes {
+  const HalfImage& image;
+  std::vector<std::string> names;
+};
+
+// Writes one scan-line file with the channels of all images, bits as they are, and Rec.709
+// chromaticities. It is written beside `path` first and takes its name once complete, so that no
+// reader ever sees half a file. Throws std::invalid_argument if there are no images, sizes differ,
+// names do not match channels or come twice, or the time code is out of range; std::runtime_error
+// with path and reason if it cannot be written.
+void write_exr(const std::string& path,
+               std::span<const ExrPlanes> planes,
+               const ExrOptions& options = {});
+
+// The same for one float image of 1 (Y), 3 (RGB) or 4 (RGBA) channels, as 32-bit floats.
+void write_exr(const std::string& path, const Image& image, const ExrOptions& options = {});
+
+struct ExrLimits {
+  std::size_t image_bytes = std::size_t{2} << 30;  // 16,384 x 8,192 RGBA
+  std::chrono::milliseconds time{60'000};
+};
+
+// Reads the picture of a file that anyone may have made: (height, width, channels), channels 1 (Y),
+// 3 or 4 (RGB, A), floats, linear Rec.709 (other chromaticities, XYZ too, are converted, see
+// primaries.h). The display window is the picture: data outside are cut off, and what the data
+// window leaves out is 0. Of a multi-part file the first part is read, of a tiled one the finest
+// level; luminance-chroma files become RGB. NaN and infinity come as they are: whoever makes light
+// of the image counts and removes them.
+//
+// OpenEXR decodes in a confined child process (sandbox.h), since hostile files are known to crash
+// it. Throws std::runtime_error with path and reason: missing, damaged, too large (a side over
+// 16,384 pixels, or the limits), deep data, other channels than these.
+Image read_exr(const std::string& path, const ExrLimits& limits = {});
+
+}  // namespace capture

@@ -1,0 +1,57 @@
+// Our own helper programs, run on untrusted input under limits.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <span>
+#include <string>
+
+namespace capture {
+
+struct SandboxLimits {
+  std::size_t memory_bytes = std::size_t{1} << 30;  // address space
+  std::chrono::seconds processor_time{30};
+};
+
+// Takes from the calling process, for good, what decoding does not need: memory and processor time
+// beyond the limits, core files, privileges, and every system call but memory and the input and
+// output that are open already. For the first line of a helper's main, before it looks at input.
+// Throws std::runtime_error if the system refuses a limit; a kernel without seccomp is accepted.
+void confine_this_process(const SandboxLimits& limits);
+
+// Where a helper program is: the path in the environment's PLATELIGHT_DECODER, beside this
+// executable, in ../libexec/platelight, or in the build tree. Throws std::runtime_error naming the
+// places if it is in none.
+std::string helper_path(const std::string& name);
+
+// A helper at work. Its standard input is a file of ours, its standard output a pipe to us; it
+// inherits nothing else. Safe in a threaded process: the child runs no code of ours before exec.
+class SandboxedChild {
+ public:
+  // Starts `program` on `input_fd` (which stays the caller's). Throws std::runtime_error if it does
+  // not start.
+  SandboxedChild(const std::string& program, int input_fd, std::chrono::milliseconds time_limit);
+  ~SandboxedChild();  // kills it if it still runs
+  SandboxedChild(const SandboxedChild&) = delete;
+  SandboxedChild& operator=(const SandboxedChild&) = delete;
+
+  // Fills `bytes` from the child's output; false if that ends first. Throws std::runtime_error when
+  // the time limit has passed.
+  bool read(std::span<std::byte> bytes);
+
+  // Waits for its end, and says in words how it came: empty if it exited with status 0. The peak
+  // memory is known afterwards.
+  std::string ending();
+  std::size_t peak_memory_bytes() const { return peak_memory_bytes_; }
+
+ private:
+  void reap();
+
+  std::chrono::steady_clock::time_point deadline_;
+  int child_ = -1;  // process id; -1 once reaped
+  int output_fd_ = -1;
+  int status_ = 0;
+  std::size_t peak_memory_bytes_ = 0;
+};
+
+}  // namespace capture
