@@ -1,18 +1,22 @@
 // The standard surface: glTF 2.0 metallic-roughness with clear coat, thin transmission, emission.
 //
-// With unit view direction v, normal n, F0 = lerp(.04, base, metallic), Fc = coat * Schlick(.04, n.v),
-// F = Schlick(F0, n.v):
+// With unit view direction v, normal n, F0 = lerp(.04, base, metallic), Fd = Schlick(.04, n.v),
+// Fc = coat * Fd, F = Schlick(F0, n.v):
 //   coat         reflects Fc, in a lobe of coat_roughness
 //   specular     reflects (1 - Fc) F, in a lobe of roughness
-//   diffuse      (1 - Fc)(1 - F)(1 - metallic)(1 - transmission) base / pi
-//   transmission (1 - Fc)(1 - F)(1 - metallic) transmission * base, straight through (thin wall)
+//   diffuse      (1 - Fc)(1 - metallic)(1 - Fd)(1 - transmission) base / pi
+//   transmission (1 - Fc)(1 - metallic)(1 - Fd) transmission * base, straight through (thin wall)
 //   emission     added
 // The lobes are GGX's distribution of visible normals (Heitz, "Sampling the GGX Distribution of
 // Visible Normals", JCGT 2018), mirrored once more where they would go below the surface, and not
 // weakened by masking: each keeps all its energy, so that a white furnace stays white.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
+#include <string>
 
 #include "render/mesh.h"
 
@@ -34,22 +38,90 @@ struct StandardParameters {
   std::int32_t base_color_texture = -1;
   std::int32_t metallic_roughness_texture = -1;  // green roughness, blue metallic
   std::int32_t normal_texture = -1;
-  std::int32_t clearcoat_texture = -1;  // red
+  std::int32_t clearcoat_texture = -1;     // red
   std::int32_t transmission_texture = -1;  // red
   std::int32_t emission_texture = -1;
   float base_color_alpha = 1;
   std::uint32_t two_sided = 1;
 };
 
+// The block in a material of the shader "standard", and back. Throws std::invalid_argument, naming
+// the material, if the block is not one, holds numbers that are not finite, or names textures that
+// are not among `texture_count`.
+StandardParameters standard_parameters(const Material& material, std::size_t texture_count);
+Material make_standard_material(std::string name, const StandardParameters& parameters);
+
 // What a point of a standard surface does with light, textures looked up.
 struct StandardSurface {
   Vec3f base;
   float metallic, roughness, clearcoat, clearcoat_roughness, transmission;
   Vec3f emission;
-  Vec3f normal;  // shading normal, unit, on the viewer's side of the surface
-  float alpha;   // < cutoff = hole
+  Vec3f normal;       // with the normal map, unit, on the viewer's side of the surface
+  Vec3f coat_normal;  // without it: the coat is smooth over a rough ground
+  float alpha;        // below alpha_cutoff = hole
 };
 
-struct HitPoint;  // scene.h
+struct HitPoint;          // scene.h
+struct SceneDescription;  // scene.h
+
+// The surface at `hit`, textures filtered over `footprint_m` metres of it. The parameters' texture
+// indices must be those of `scene` (see standard_parameters). Safe from any thread; does not throw.
+StandardSurface standard_surface(const StandardParameters& parameters,
+                                 const SceneDescription& scene,
+                                 const HitPoint& hit,
+                                 float footprint_m);
+// Its alpha alone, for rays that only ask whether there is a hole.
+float standard_alpha(const StandardParameters& parameters,
+                     const SceneDescription& scene,
+                     const HitPoint& hit,
+                     float footprint_m);
+
+// Lobes smoother than this are mirrors: followed along the mirrored direction alone. At alpha =
+// roughness^2 = 4e-4 a lobe is narrower than any light that a table or a map resolves.
+inline constexpr float mirror_roughness = 0.02F;
+
+// Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", Eurographics 1994.
+inline float schlick(float f0, float cosine) {
+  const float m = std::clamp(1 - cosine, 0.0F, 1.0F);
+  const float m2 = m * m;
+  return f0 + (1 - f0) * (m2 * m2 * m);
+}
+
+// The share of light that each part of a surface passes on, seen from the unit direction `view`.
+// Per colour they sum to 1 where the base is white, and to less elsewhere.
+struct StandardWeights {
+  float coat = 0;
+  Vec3f specular{};
+  Vec3f diffuse{};  // albedo: divide by pi for the BRDF
+  Vec3f transmission{};
+};
+inline StandardWeights standard_weights(const StandardSurface& surface, Vec3f view) {
+  StandardWeights weights;
+  const float cosine = std::abs(dot(surface.normal, view));
+  weights.coat = surface.clearcoat * schlick(0.04F, std::abs(dot(surface.coat_normal, view)));
+  const float under = 1 - weights.coat;
+  const float dielectric = 1 - surface.metallic;
+  const float below = under * dielectric * (1 - schlick(0.04F, cosine));
+  const auto channel = [&](float base, float& specular, float& diffuse, float& transmission) {
+    specular = under * schlick(0.04F * dielectric + base * surface.metallic, cosine);
+    diffuse = below * (1 - surface.transmission) * base;
+    transmission = below * surface.transmission * base;
+  };
+  channel(surface.base.x, weights.specular.x, weights.diffuse.x, weights.transmission.x);
+  channel(surface.base.y, weights.specular.y, weights.diffuse.y, weights.transmission.y);
+  channel(surface.base.z, weights.specular.z, weights.diffuse.z, weights.transmission.z);
+  return weights;
+}
+
+// `view` mirrored at a surface of unit normal `normal`.
+inline Vec3f mirrored(Vec3f view, Vec3f normal) { return normal * (2 * dot(normal, view)) - view; }
+
+// A direction of the lobe about `normal` seen from `view` (both unit), from two numbers in 0..1,
+// and the density, per steradian, with which it is chosen. A lobe of weight W sends W *
+// lobe_density of the radiance from each direction to the viewer (the cosine is inside).
+// `roughness` must be at least mirror_roughness; directions below the surface have density 0. A
+// view from below the shading normal counts as grazing.
+Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random);
+float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction);
 
 }  // namespace render

@@ -1,0 +1,204 @@
+#include "render/model_material.h"
+
+#include <assimp/GltfMaterial.h>
+#include <assimp/material.h>
+#include <assimp/scene.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <stdexcept>
+
+#include "capture/still.h"
+#include "render/texture.h"
+
+namespace render {
+namespace {
+
+constexpr std::size_t max_texel_bytes = std::size_t{4} << 30;
+
+float number(
+    const aiMaterial& material, const char* key, unsigned type, unsigned slot, float otherwise) {
+  ai_real value = otherwise;
+  if (material.Get(key, type, slot, value) != aiReturn_SUCCESS || !std::isfinite(value))
+    return otherwise;
+  return value;
+}
+
+bool colour(const aiMaterial& material, const char* key, unsigned type, unsigned slot, float* rgb) {
+  aiColor3D value;
+  if (material.Get(key, type, slot, value) != aiReturn_SUCCESS) return false;
+  if (!std::isfinite(value.r) || !std::isfinite(value.g) || !std::isfinite(value.b)) return false;
+  rgb[0] = std::max(0.0F, value.r);
+  rgb[1] = std::max(0.0F, value.g);
+  rgb[2] = std::max(0.0F, value.b);
+  return true;
+}
+
+std::string name_of(const aiMaterial& material) {
+  aiString name;
+  return material.Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS ? name.C_Str() : "";
+}
+
+}  // namespace
+
+void MaterialImport::note(const std::string& text) {
+  if (std::find(notes_.begin(), notes_.end(), text) == notes_.end()) notes_.push_back(text);
+}
+
+std::int32_t MaterialImport::texture(const aiMaterial& material,
+                                     unsigned type,
+                                     unsigned slot,
+                                     bool srgb,
+                                     ImportedMaterial& result,
+                                     bool& uv_known) {
+  const auto ai_type = static_cast<aiTextureType>(type);
+  aiString path;
+  unsigned channel = 0;
+  if (material.GetTexture(ai_type, slot, &path, nullptr, &channel) != aiReturn_SUCCESS) return -1;
+  UvTransform uv{.channel = channel};
+  aiUVTransform transform;
+  if (material.Get(AI_MATKEY_UVTRANSFORM(ai_type, slot), transform) == aiReturn_SUCCESS) {
+    uv.scale = {transform.mScaling.x, transform.mScaling.y};
+    // assimp counts v upwards: v_up' = s v_up + t, so v' = s v + 1 - s - t.
+    uv.offset = {transform.mTranslation.x, 1 - transform.mScaling.y - transform.mTranslation.y};
+    if (transform.mRotation != 0)
+      note("material '" + name_of(material) + "': the rotation of a texture is left out");
+  }
+  if (!uv_known) {
+    result.uv = uv;
+    uv_known = true;
+  } else if (result.uv != uv) {
+    note("material '" + name_of(material) +
+         "': its textures have coordinates of their own; all take those of the first");
+  }
+  std::string name = path.C_Str();
+  if (const auto [embedded, index] = scene_.GetEmbeddedTextureAndIndex(name.c_str());
+      embedded != nullptr)
+    name = std::string(1, '*').append(std::to_string(index));
+  else
+    name = folder_.resolve(name).string();
+  const auto [found, added] =
+      indices_.emplace(Source{name, srgb}, static_cast<std::int32_t>(sources_.size()));
+  if (added) sources_.push_back(found->first);
+  return found->second;
+}
+
+void MaterialImport::note_unhandled(const aiMaterial& material, const std::string& name) {
+  const auto has = [&](aiTextureType type, unsigned slot) {
+    aiString path;
+    return material.GetTexture(type, slot, &path) == aiReturn_SUCCESS;
+  };
+  const auto leave_out = [&](const std::string& what) {
+    note("material '" + name + "': " + what + " left out");
+  };
+  float sheen[3];
+  if (colour(material, AI_MATKEY_SHEEN_COLOR_FACTOR, sheen) && sheen[0] + sheen[1] + sheen[2] > 0)
+    leave_out("sheen is");
+  if (number(material, AI_MATKEY_VOLUME_THICKNESS_FACTOR, 0) > 0)
+    leave_out("the volume (thickness, attenuation) is");
+  if (has(AI_MATKEY_CLEARCOAT_ROUGHNESS_TEXTURE)) leave_out("the coat's roughness map is");
+  if (has(AI_MATKEY_CLEARCOAT_NORMAL_TEXTURE)) leave_out("the coat's normal map is");
+  if (has(aiTextureType_HEIGHT, 0)) leave_out("the height map is");
+}
+
+ImportedMaterial MaterialImport::import(const aiMaterial& material) {
+  ImportedMaterial result;
+  StandardParameters& p = result.parameters;
+  const std::string name = name_of(material);
+  bool uv_known = false;
+  const auto textured = [&](unsigned type, unsigned slot, bool srgb) {
+    return texture(material, type, slot, srgb, result, uv_known);
+  };
+  aiColor4D base;
+  const bool metallic_roughness = material.Get(AI_MATKEY_BASE_COLOR, base) == aiReturn_SUCCESS;
+  if (metallic_roughness || material.Get(AI_MATKEY_COLOR_DIFFUSE, base) == aiReturn_SUCCESS) {
+    const float rgba[4] = {base.r, base.g, base.b, base.a};
+    for (int c = 0; c < 3; ++c)
+      p.base_color[c] = std::isfinite(rgba[c]) ? std::clamp(rgba[c], 0.0F, 1.0F) : 1;
+    p.base_color_alpha = std::isfinite(rgba[3]) ? std::clamp(rgba[3], 0.0F, 1.0F) : 1;
+  }
+  p.base_color_texture = textured(aiTextureType_BASE_COLOR, 0, true);
+  if (p.base_color_texture < 0) p.base_color_texture = textured(aiTextureType_DIFFUSE, 0, true);
+  p.metallic_roughness_texture =
+      textured(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE, false);
+  p.normal_texture = textured(aiTextureType_NORMALS, 0, false);
+  p.emission_texture = textured(aiTextureType_EMISSIVE, 0, true);
+  p.clearcoat_texture = textured(AI_MATKEY_CLEARCOAT_TEXTURE, false);
+  p.transmission_texture = textured(AI_MATKEY_TRANSMISSION_TEXTURE, false);
+
+  const float unit_roughness = metallic_roughness ? 1.0F : 0.5F;
+  const float shininess = number(material, AI_MATKEY_SHININESS, 0);
+  // Blinn-Phong exponent to GGX: alpha^2 = 2 / (n + 2), roughness = sqrt(alpha).
+  const float shiny_roughness = std::pow(2 / (std::max(0.0F, shininess) + 2), 0.25F);
+  const float plain_roughness =
+      !metallic_roughness && shininess > 0 ? shiny_roughness : unit_roughness;
+  p.roughness =
+      std::clamp(number(material, AI_MATKEY_ROUGHNESS_FACTOR, plain_roughness), 0.0F, 1.0F);
+  p.metallic = std::clamp(
+      number(material, AI_MATKEY_METALLIC_FACTOR, metallic_roughness ? 1.0F : 0.0F), 0.0F, 1.0F);
+  p.clearcoat = std::clamp(number(material, AI_MATKEY_CLEARCOAT_FACTOR, 0), 0.0F, 1.0F);
+  p.clearcoat_roughness =
+      std::clamp(number(material, AI_MATKEY_CLEARCOAT_ROUGHNESS_FACTOR, 0), 0.0F, 1.0F);
+  p.transmission = std::clamp(number(material, AI_MATKEY_TRANSMISSION_FACTOR, 0), 0.0F, 1.0F);
+  if (!metallic_roughness)
+    p.transmission = 1 - std::clamp(number(material, AI_MATKEY_OPACITY, 1), 0.0F, 1.0F);
+  colour(material, AI_MATKEY_COLOR_EMISSIVE, p.emission);
+  p.emission_gain = std::max(0.0F, number(material, AI_MATKEY_EMISSIVE_INTENSITY, 1));
+  p.normal_scale = number(material, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1);
+
+  aiString alpha_mode;
+  if (material.Get(AI_MATKEY_GLTF_ALPHAMODE, alpha_mode) == aiReturn_SUCCESS) {
+    const std::string mode = alpha_mode.C_Str();
+    if (mode == "MASK")
+      p.alpha_cutoff = std::clamp(number(material, AI_MATKEY_GLTF_ALPHACUTOFF, 0.5F), 0.0F, 1.0F);
+    if (mode == "BLEND") {
+      p.alpha_cutoff = 0.5F;
+      note("material '" + name + "': blended alpha is cut at a half");
+    }
+  }
+  int two_sided = 1;
+  if (material.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS)
+    p.two_sided = two_sided != 0 ? 1 : 0;
+  note_unhandled(material, name);
+  return result;
+}
+
+Texture MaterialImport::decode(const Source& source) const {
+  if (source.name.starts_with('*')) {
+    const aiTexture& embedded = *scene_.mTextures[std::stoul(source.name.substr(1))];
+    const std::string name =
+        folder_.model().string() + " (its embedded texture " + source.name.substr(1) + ")";
+    if (embedded.mHeight != 0) {
+      std::vector<std::uint8_t> texels;
+      const std::size_t count =
+          static_cast<std::size_t>(embedded.mWidth) * static_cast<std::size_t>(embedded.mHeight);
+      for (std::size_t i = 0; i < count; ++i) {
+        const aiTexel& t = embedded.pcData[i];
+        texels.insert(texels.end(), {t.r, t.g, t.b, t.a});
+      }
+      return make_texture(static_cast<int>(embedded.mWidth), static_cast<int>(embedded.mHeight), 4,
+                          source.srgb, texels);
+    }
+    const auto* bytes = reinterpret_cast<const std::byte*>(embedded.pcData);
+    const capture::Still8 still = capture::decode_still8({bytes, embedded.mWidth}, name);
+    return make_texture(still.width, still.height, still.channels, source.srgb, still.texels);
+  }
+  const capture::Still8 still = capture::decode_still8(folder_.read(source.name), source.name);
+  return make_texture(still.width, still.height, still.channels, source.srgb, still.texels);
+}
+
+std::vector<std::shared_ptr<const Texture>> MaterialImport::decode() const {
+  std::vector<std::shared_ptr<const Texture>> textures(sources_.size());
+  std::atomic<std::size_t> bytes{0};
+  tbb::parallel_for(std::size_t{0}, sources_.size(), [&](std::size_t i) {
+    textures[i] = std::make_shared<const Texture>(decode(sources_[i]));
+    bytes += textures[i]->texels.size();
+    if (bytes > max_texel_bytes)
+      throw std::runtime_error(folder_.model().string() + ": its textures take more than 4 GB");
+  });
+  return textures;
+}
+
+}  // namespace render

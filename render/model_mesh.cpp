@@ -1,0 +1,140 @@
+#include "render/model_mesh.h"
+
+#include <assimp/mesh.h>
+
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace render {
+namespace {
+
+bool finite(const aiVector3D& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+Vec3f vec(const aiVector3D& v) { return {v.x, v.y, v.z}; }
+
+// Normals that are zero or not finite are taken from the faces around them.
+void copy_normals(const aiMesh& source, Mesh& mesh) {
+  const std::size_t count = mesh.positions.size();
+  mesh.normals.resize(count);
+  std::vector<std::size_t> missing;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec3f normal = finite(source.mNormals[i]) ? normalize(vec(source.mNormals[i])) : Vec3f{};
+    mesh.normals[i] = normal;
+    if (!(dot(normal, normal) > 0.5F)) missing.push_back(i);
+  }
+  if (missing.empty()) return;
+  std::vector<Vec3f> sums(count);
+  for (const auto& triangle : mesh.triangles) {
+    const Vec3f a = mesh.positions[triangle[0]];
+    const Vec3f face = cross(mesh.positions[triangle[1]] - a, mesh.positions[triangle[2]] - a);
+    for (const std::uint32_t corner : triangle) sums[corner] += face;
+  }
+  for (const std::size_t i : missing) {
+    const Vec3f normal = normalize(sums[i]);
+    mesh.normals[i] = dot(normal, normal) > 0.5F ? normal : Vec3f{0, 0, 1};
+  }
+}
+
+// Tangents along u, with the sign that makes cross(normal, tangent) * sign point up the texture.
+void compute_tangents(Mesh& mesh) {
+  std::vector<Vec3f> along_u(mesh.positions.size());
+  std::vector<Vec3f> along_v(mesh.positions.size());
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3f e1 = mesh.positions[b] - mesh.positions[a];
+    const Vec3f e2 = mesh.positions[c] - mesh.positions[a];
+    const float u1 = mesh.uvs[b][0] - mesh.uvs[a][0];
+    const float v1 = mesh.uvs[b][1] - mesh.uvs[a][1];
+    const float u2 = mesh.uvs[c][0] - mesh.uvs[a][0];
+    const float v2 = mesh.uvs[c][1] - mesh.uvs[a][1];
+    const float determinant = u1 * v2 - u2 * v1;
+    if (!std::isfinite(determinant) || determinant == 0) continue;
+    const float sign = determinant > 0 ? 1.0F : -1.0F;
+    const Vec3f u = normalize((e1 * v2 - e2 * v1) * sign);
+    const Vec3f v = normalize((e2 * u1 - e1 * u2) * sign);
+    const float area = length(cross(e1, e2));
+    for (const std::uint32_t corner : {a, b, c}) {
+      along_u[corner] += u * area;
+      along_v[corner] += v * area;
+    }
+  }
+  mesh.tangents.resize(mesh.positions.size());
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3f n = mesh.normals[i];
+    Vec3f t = normalize(along_u[i] - n * dot(n, along_u[i]));
+    if (!(dot(t, t) > 0.5F))
+      t = normalize(cross(n, std::abs(n.x) < 0.9F ? Vec3f{1, 0, 0} : Vec3f{0, 1, 0}));
+    const float sign = dot(cross(n, t), along_v[i]) > 0 ? -1.0F : 1.0F;
+    mesh.tangents[i] = {t.x, t.y, t.z, sign};
+  }
+}
+
+void copy_tangents(const aiMesh& source, Mesh& mesh) {
+  mesh.tangents.resize(mesh.positions.size());
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    if (!finite(source.mTangents[i]) || !finite(source.mBitangents[i])) {
+      mesh.tangents[i] = {1, 0, 0, 1};
+      continue;
+    }
+    const Vec3f t = normalize(vec(source.mTangents[i]));
+    const float sign =
+        dot(cross(mesh.normals[i], t), vec(source.mBitangents[i])) < 0 ? -1.0F : 1.0F;
+    mesh.tangents[i] = {t.x, t.y, t.z, sign};
+  }
+}
+
+}  // namespace
+
+Mesh convert_mesh(const aiMesh& source, const ImportedMaterial& material, std::size_t& left_out) {
+  Mesh mesh;
+  mesh.positions.reserve(source.mNumVertices);
+  for (unsigned i = 0; i < source.mNumVertices; ++i)
+    mesh.positions.push_back(vec(source.mVertices[i]));
+  mesh.triangles.reserve(source.mNumFaces);
+  for (unsigned i = 0; i < source.mNumFaces; ++i) {
+    const aiFace& face = source.mFaces[i];
+    if (face.mNumIndices != 3) continue;
+    const std::array<std::uint32_t, 3> triangle{face.mIndices[0], face.mIndices[1],
+                                                face.mIndices[2]};
+    bool whole = true;
+    for (const std::uint32_t corner : triangle) {
+      if (corner >= source.mNumVertices)
+        throw std::runtime_error("a triangle names vertex " + std::to_string(corner) + " of " +
+                                 std::to_string(source.mNumVertices));
+      whole = whole && finite(source.mVertices[corner]);
+    }
+    if (whole)
+      mesh.triangles.push_back(triangle);
+    else
+      ++left_out;
+  }
+  for (Vec3f& p : mesh.positions)
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) p = {};
+  if (source.HasNormals()) copy_normals(source, mesh);
+  const unsigned channel = material.uv.channel < AI_MAX_NUMBER_OF_TEXTURECOORDS &&
+                                   source.HasTextureCoords(material.uv.channel)
+                               ? material.uv.channel
+                               : 0;
+  if (source.HasTextureCoords(channel)) {
+    const UvTransform& uv = material.uv;
+    mesh.uvs.reserve(source.mNumVertices);
+    for (unsigned i = 0; i < source.mNumVertices; ++i) {
+      const aiVector3D& t = source.mTextureCoords[channel][i];
+      mesh.uvs.push_back(finite(t) ? std::array<float, 2>{uv.scale[0] * t.x + uv.offset[0],
+                                                          uv.scale[1] * (1 - t.y) + uv.offset[1]}
+                                   : std::array<float, 2>{});
+    }
+  }
+  if (material.parameters.normal_texture >= 0 && !mesh.normals.empty()) {
+    if (source.HasTangentsAndBitangents())
+      copy_tangents(source, mesh);
+    else if (!mesh.uvs.empty())
+      compute_tangents(mesh);
+  }
+  return mesh;
+}
+
+}  // namespace render

@@ -1,0 +1,189 @@
+#include "render/standard.h"
+
+#include <cstddef>
+#include <cstring>
+#include <numbers>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+#include "render/scene.h"
+#include "render/texture.h"
+
+namespace render {
+namespace {
+
+static_assert(std::is_trivially_copyable_v<StandardParameters>);
+static_assert(sizeof(StandardParameters) == 88, "blocks travel: no padding, no surprise");
+
+const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
+  return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
+}
+
+float unit(float value) { return std::clamp(value, 0.0F, 1.0F); }
+
+// Unit vectors x and y that make a right-handed frame with unit z.
+// Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017.
+std::pair<Vec3f, Vec3f> frame_about(Vec3f z) {
+  const float sign = std::copysign(1.0F, z.z);
+  const float a = -1 / (sign + z.z);
+  const float b = z.x * z.y * a;
+  return {{1 + sign * z.x * z.x * a, sign * b, -sign * z.x}, {b, sign + z.y * z.y * a, -z.y}};
+}
+
+// The view above the surface: from below the shading normal it counts as grazing.
+constexpr float grazing_cosine = 1e-3F;
+Vec3f above(Vec3f view, Vec3f normal) {
+  const float cosine = dot(view, normal);
+  return cosine >= grazing_cosine ? view : normalize(view + normal * (grazing_cosine - cosine));
+}
+
+// Density of the visible normals' reflections at l, before directions below are folded up.
+// v and l are in the frame of the normal; alpha is the GGX width.
+float unfolded_density(Vec3f v, Vec3f l, float alpha) {
+  const Vec3f half = normalize(v + l);
+  const float v_half = dot(v, half);
+  if (half.z <= 0 || v_half <= 0) return 0;
+  const float a2 = alpha * alpha;
+  // 1 - h_z^2 (1 - a2), without cancellation near the peak.
+  const float width = half.x * half.x + half.y * half.y + a2 * half.z * half.z;
+  const float d = a2 / (std::numbers::pi_v<float> * width * width);
+  const float masking = 2 / (1 + std::sqrt(1 + a2 * (v.x * v.x + v.y * v.y) / (v.z * v.z)));
+  return masking * d / (4 * v.z);
+}
+
+Vec3f mapped_normal(const StandardParameters& parameters,
+                    const SceneDescription& scene,
+                    const HitPoint& hit,
+                    float footprint_uv) {
+  const Texture* map = texture_at(scene, parameters.normal_texture);
+  if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return hit.normal;
+  const auto texel = sample(*map, hit.u, hit.v, footprint_uv);
+  const Vec3f tangent = normalize(hit.tangent - hit.normal * dot(hit.normal, hit.tangent));
+  const Vec3f bitangent = cross(hit.normal, tangent) * hit.handedness;
+  const Vec3f normal = tangent * ((2 * texel[0] - 1) * parameters.normal_scale) +
+                       bitangent * ((2 * texel[1] - 1) * parameters.normal_scale) +
+                       hit.normal * (2 * texel[2] - 1);
+  const float l = length(normal);
+  return l > 1e-6F && dot(normal, hit.normal) > 0 ? normal / l : hit.normal;
+}
+
+}  // namespace
+
+StandardParameters standard_parameters(const Material& material, std::size_t texture_count) {
+  const auto refuse = [&](const std::string& why) {
+    throw std::invalid_argument("material '" + material.name + "': " + why);
+  };
+  if (material.shader != "standard")
+    refuse("its shader is '" + material.shader + "', not standard");
+  StandardParameters parameters;
+  if (material.parameters.size() != sizeof parameters)
+    refuse("its block has " + std::to_string(material.parameters.size()) + " bytes, not " +
+           std::to_string(sizeof parameters));
+  std::memcpy(&parameters, material.parameters.data(), sizeof parameters);
+  for (const float value :
+       {parameters.base_color[0], parameters.base_color[1], parameters.base_color[2],
+        parameters.metallic, parameters.roughness, parameters.clearcoat,
+        parameters.clearcoat_roughness, parameters.transmission, parameters.emission[0],
+        parameters.emission[1], parameters.emission[2], parameters.emission_gain,
+        parameters.normal_scale, parameters.alpha_cutoff, parameters.base_color_alpha})
+    if (!std::isfinite(value)) refuse("a number of its block is not finite");
+  for (const std::int32_t index :
+       {parameters.base_color_texture, parameters.metallic_roughness_texture,
+        parameters.normal_texture, parameters.clearcoat_texture, parameters.transmission_texture,
+        parameters.emission_texture})
+    if (index < -1 || (index >= 0 && static_cast<std::size_t>(index) >= texture_count))
+      refuse("it names texture " + std::to_string(index) + " of " + std::to_string(texture_count));
+  return parameters;
+}
+
+Material make_standard_material(std::string name, const StandardParameters& parameters) {
+  Material material{std::move(name), "standard", {}};
+  material.parameters.resize(sizeof parameters);
+  std::memcpy(material.parameters.data(), &parameters, sizeof parameters);
+  return material;
+}
+
+StandardSurface standard_surface(const StandardParameters& parameters,
+                                 const SceneDescription& scene,
+                                 const HitPoint& hit,
+                                 float footprint_m) {
+  const float footprint_uv = footprint_m * hit.uv_per_metre;
+  const auto look_up = [&](std::int32_t index) -> std::array<float, 4> {
+    const Texture* texture = texture_at(scene, index);
+    return texture == nullptr ? std::array<float, 4>{1, 1, 1, 1}
+                              : sample(*texture, hit.u, hit.v, footprint_uv);
+  };
+  StandardSurface surface;
+  const auto base = look_up(parameters.base_color_texture);
+  surface.base = {unit(parameters.base_color[0] * base[0]),
+                  unit(parameters.base_color[1] * base[1]),
+                  unit(parameters.base_color[2] * base[2])};
+  surface.alpha = parameters.base_color_alpha * base[3];
+  const auto metallic_roughness = look_up(parameters.metallic_roughness_texture);
+  surface.metallic = unit(parameters.metallic * metallic_roughness[2]);
+  surface.roughness = unit(parameters.roughness * metallic_roughness[1]);
+  surface.clearcoat = unit(parameters.clearcoat);
+  if (surface.clearcoat > 0) surface.clearcoat *= look_up(parameters.clearcoat_texture)[0];
+  surface.clearcoat_roughness = unit(parameters.clearcoat_roughness);
+  surface.transmission = unit(parameters.transmission);
+  if (surface.transmission > 0) surface.transmission *= look_up(parameters.transmission_texture)[0];
+  surface.emission = Vec3f{parameters.emission[0], parameters.emission[1], parameters.emission[2]} *
+                     parameters.emission_gain;
+  if (surface.emission != Vec3f{}) {
+    const auto emission = look_up(parameters.emission_texture);
+    surface.emission = {surface.emission.x * emission[0], surface.emission.y * emission[1],
+                        surface.emission.z * emission[2]};
+  }
+  surface.normal = mapped_normal(parameters, scene, hit, footprint_uv);
+  surface.coat_normal = hit.normal;
+  return surface;
+}
+
+float standard_alpha(const StandardParameters& parameters,
+                     const SceneDescription& scene,
+                     const HitPoint& hit,
+                     float footprint_m) {
+  const Texture* texture = texture_at(scene, parameters.base_color_texture);
+  if (texture == nullptr) return parameters.base_color_alpha;
+  return parameters.base_color_alpha *
+         sample(*texture, hit.u, hit.v, footprint_m * hit.uv_per_metre)[3];
+}
+
+Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random) {
+  const float alpha = roughness * roughness;
+  const auto [x, y] = frame_about(normal);
+  view = above(view, normal);
+  const Vec3f v{dot(x, view), dot(y, view), dot(normal, view)};
+  // Heitz 2018: stretch, sample the visible half disc, unstretch.
+  const Vec3f stretched = normalize(Vec3f{alpha * v.x, alpha * v.y, v.z});
+  const auto [t1, t2] = frame_about(stretched);
+  const float radius = std::sqrt(random[0]);
+  const float phi = 2 * std::numbers::pi_v<float> * random[1];
+  const float p1 = radius * std::cos(phi);
+  // The half disc is squeezed towards the side that the view sees.
+  const Vec3f up = normalize(Vec3f{0, 0, 1} - stretched * stretched.z);
+  const bool upright = stretched.z < 0.99999F;
+  const Vec3f a = upright ? cross(up, stretched) : t1;
+  const Vec3f b = upright ? up : t2;
+  const float s = 0.5F * (1 + stretched.z);
+  const float p2 = (1 - s) * std::sqrt(std::max(0.0F, 1 - p1 * p1)) + s * radius * std::sin(phi);
+  const float p3 = std::sqrt(std::max(0.0F, 1 - p1 * p1 - p2 * p2));
+  const Vec3f h_stretched = a * p1 + b * p2 + stretched * p3;
+  const Vec3f h = normalize(
+      Vec3f{alpha * h_stretched.x, alpha * h_stretched.y, std::max(1e-7F, h_stretched.z)});
+  const Vec3f l = mirrored(v, h);
+  return normalize(x * l.x + y * l.y + normal * std::abs(l.z));
+}
+
+float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction) {
+  const float alpha = roughness * roughness;
+  const auto [x, y] = frame_about(normal);
+  view = above(view, normal);
+  const Vec3f v{dot(x, view), dot(y, view), dot(normal, view)};
+  const Vec3f l{dot(x, direction), dot(y, direction), dot(normal, direction)};
+  if (l.z <= 0) return 0;
+  return unfolded_density(v, l, alpha) + unfolded_density(v, {l.x, l.y, -l.z}, alpha);
+}
+
+}  // namespace render

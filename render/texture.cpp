@@ -1,0 +1,248 @@
+#include "render/texture.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "capture/colour.h"
+
+namespace render {
+namespace {
+
+struct LightTables {
+  std::array<float, 256> light_of_code;
+  std::array<float, 256> unit_of_code;
+  std::array<std::uint8_t, 16384> code_of_light;  // fine enough for sRGB's steepest part
+
+  LightTables() {
+    for (std::size_t i = 0; i < 256; ++i) {
+      const double value = static_cast<double>(i) / 255;
+      unit_of_code[i] = static_cast<float>(value);
+      light_of_code[i] = static_cast<float>(capture::decode(capture::Transfer::srgb, value));
+    }
+    for (std::size_t i = 0; i < code_of_light.size(); ++i) {
+      const double light = static_cast<double>(i) / static_cast<double>(code_of_light.size() - 1);
+      const double value = capture::encode(capture::Transfer::srgb, light);
+      code_of_light[i] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
+    }
+  }
+};
+const LightTables& light_tables() {
+  static const LightTables tables;
+  return tables;
+}
+
+// The part of a source row (or column) that one target texel covers.
+struct Cover {
+  int first = 0;
+  int count = 0;
+  std::array<float, 3> weights{};
+};
+
+// Target texel i of n_target = max(1, n_source / 2) covers 2 or, of odd sizes, 3 source texels.
+Cover cover(int i, int n_source, int n_target) {
+  const double scale = static_cast<double>(n_source) / n_target;
+  const double from = i * scale;
+  const double to = (i + 1) * scale;
+  Cover result;
+  result.first = static_cast<int>(from);
+  for (int k = result.first; k < n_source && k < to && result.count < 3; ++k) {
+    const double share = (std::min(to, k + 1.0) - std::max(from, static_cast<double>(k))) / scale;
+    result.weights[static_cast<std::size_t>(result.count++)] = static_cast<float>(share);
+  }
+  return result;
+}
+
+void halve(const std::uint8_t* source,
+           int width,
+           int height,
+           int channels,
+           bool srgb,
+           std::uint8_t* target,
+           int target_width,
+           int target_height) {
+  const LightTables& tables = light_tables();
+  const int colour_channels = !srgb ? 0 : channels >= 3 ? 3 : 1;
+  std::vector<Cover> columns;
+  for (int x = 0; x < target_width; ++x) columns.push_back(cover(x, width, target_width));
+  for (int y = 0; y < target_height; ++y) {
+    const Cover rows = cover(y, height, target_height);
+    for (int x = 0; x < target_width; ++x) {
+      const Cover& column = columns[static_cast<std::size_t>(x)];
+      std::array<float, 4> sum{};
+      for (int j = 0; j < rows.count; ++j) {
+        const auto row = static_cast<std::size_t>(rows.first + j) * static_cast<std::size_t>(width);
+        for (int i = 0; i < column.count; ++i) {
+          const float weight = rows.weights[static_cast<std::size_t>(j)] *
+                               column.weights[static_cast<std::size_t>(i)];
+          const std::uint8_t* texel = source + (row + static_cast<std::size_t>(column.first + i)) *
+                                                   static_cast<std::size_t>(channels);
+          for (int c = 0; c < channels; ++c) {
+            const auto& table = c < colour_channels ? tables.light_of_code : tables.unit_of_code;
+            sum[static_cast<std::size_t>(c)] += weight * table[texel[c]];
+          }
+        }
+      }
+      for (int c = 0; c < channels; ++c) {
+        const float value = std::clamp(sum[static_cast<std::size_t>(c)], 0.0F, 1.0F);
+        const auto top = static_cast<float>(tables.code_of_light.size() - 1);
+        *target++ = c < colour_channels
+                        ? tables.code_of_light[static_cast<std::size_t>(value * top + 0.5F)]
+                        : static_cast<std::uint8_t>(value * 255 + 0.5F);
+      }
+    }
+  }
+}
+
+struct Level {
+  const std::uint8_t* texels;
+  int width, height;
+};
+
+// Bilinear, repeated; u and v in 0..1.
+template <int channels>
+std::array<float, channels> sample_level(
+    const Level& level, float u, float v, const float* colour, const float* alpha) {
+  const float x = u * static_cast<float>(level.width) - 0.5F;
+  const float y = v * static_cast<float>(level.height) - 0.5F;
+  const float floor_x = std::floor(x);
+  const float floor_y = std::floor(y);
+  const float fx = x - floor_x;
+  const float fy = y - floor_y;
+  int x0 = static_cast<int>(floor_x);
+  int y0 = static_cast<int>(floor_y);
+  if (x0 < 0) x0 += level.width;
+  if (y0 < 0) y0 += level.height;
+  if (x0 >= level.width) x0 -= level.width;
+  if (y0 >= level.height) y0 -= level.height;
+  const int x1 = x0 + 1 == level.width ? 0 : x0 + 1;
+  const int y1 = y0 + 1 == level.height ? 0 : y0 + 1;
+  const auto texel = [&](int column, int row) {
+    return level.texels + (static_cast<std::size_t>(row) * static_cast<std::size_t>(level.width) +
+                           static_cast<std::size_t>(column)) *
+                              channels;
+  };
+  const std::uint8_t* t00 = texel(x0, y0);
+  const std::uint8_t* t10 = texel(x1, y0);
+  const std::uint8_t* t01 = texel(x0, y1);
+  const std::uint8_t* t11 = texel(x1, y1);
+  const float w00 = (1 - fx) * (1 - fy);
+  const float w10 = fx * (1 - fy);
+  const float w01 = (1 - fx) * fy;
+  const float w11 = fx * fy;
+  std::array<float, channels> result;
+  for (std::size_t c = 0; c < channels; ++c) {
+    const bool is_alpha = (channels == 2 || channels == 4) && c == channels - 1;
+    const float* table = is_alpha ? alpha : colour;
+    result[c] =
+        w00 * table[t00[c]] + w10 * table[t10[c]] + w01 * table[t01[c]] + w11 * table[t11[c]];
+  }
+  return result;
+}
+
+template <int channels>
+std::array<float, channels> sample_levels(const Texture& texture,
+                                          float u,
+                                          float v,
+                                          float footprint_uv) {
+  const LightTables& tables = light_tables();
+  const float* alpha = tables.unit_of_code.data();
+  const float* colour = texture.srgb ? tables.light_of_code.data() : alpha;
+  Level level{texture.texels.data(), texture.width, texture.height};
+  const int longer = std::max(texture.width, texture.height);
+  const float footprint_texels = footprint_uv * static_cast<float>(longer);
+  if (!(footprint_texels > 1)) return sample_level<channels>(level, u, v, colour, alpha);
+
+  // log2 by exponent and mantissa, linear between powers of two: within .09 of a level.
+  const int last = std::bit_width(static_cast<unsigned>(longer)) - 1;
+  const auto bits = std::bit_cast<std::uint32_t>(std::min(footprint_texels, 1e6F));
+  const int exponent = static_cast<int>(bits >> 23) - 127;
+  const float fraction = static_cast<float>(bits & 0x7FFFFFU) / static_cast<float>(0x800000U);
+  const int fine = std::min(exponent, last);
+  const auto coarser = [](const Level& from) {
+    return Level{from.texels + static_cast<std::size_t>(from.width) *
+                                   static_cast<std::size_t>(from.height) * channels,
+                 std::max(1, from.width / 2), std::max(1, from.height / 2)};
+  };
+  for (int k = 0; k < fine; ++k) level = coarser(level);
+  std::array<float, channels> result = sample_level<channels>(level, u, v, colour, alpha);
+  if (fine == last || fraction == 0) return result;
+  const std::array<float, channels> next =
+      sample_level<channels>(coarser(level), u, v, colour, alpha);
+  for (std::size_t c = 0; c < channels; ++c) result[c] += fraction * (next[c] - result[c]);
+  return result;
+}
+
+float wrapped(float coordinate) {
+  return std::abs(coordinate) <= 1e6F ? coordinate - std::floor(coordinate) : 0;
+}
+
+}  // namespace
+
+std::size_t texture_bytes(int width, int height, int channels) {
+  std::size_t bytes = 0;
+  for (;;) {
+    bytes += static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+             static_cast<std::size_t>(channels);
+    if (width == 1 && height == 1) return bytes;
+    width = std::max(1, width / 2);
+    height = std::max(1, height / 2);
+  }
+}
+
+Texture make_texture(
+    int width, int height, int channels, bool srgb, std::span<const std::uint8_t> texels) {
+  if (width < 1 || height < 1 || width > max_texture_size || height > max_texture_size ||
+      channels < 1 || channels > 4)
+    throw std::invalid_argument("a texture of " + std::to_string(width) + "x" +
+                                std::to_string(height) + " with " + std::to_string(channels) +
+                                " channels; sizes go from 1 to " +
+                                std::to_string(max_texture_size) + ", channels from 1 to 4");
+  const auto level_bytes = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+                           static_cast<std::size_t>(channels);
+  if (texels.size() != level_bytes)
+    throw std::invalid_argument("a texture needs " + std::to_string(level_bytes) +
+                                " bytes of texels, not " + std::to_string(texels.size()));
+  Texture texture{width, height, channels, srgb, {}};
+  texture.texels.resize(texture_bytes(width, height, channels));
+  std::copy(texels.begin(), texels.end(), texture.texels.begin());
+  std::uint8_t* source = texture.texels.data();
+  while (width > 1 || height > 1) {
+    std::uint8_t* target = source + static_cast<std::size_t>(width) *
+                                        static_cast<std::size_t>(height) *
+                                        static_cast<std::size_t>(channels);
+    const int target_width = std::max(1, width / 2);
+    const int target_height = std::max(1, height / 2);
+    halve(source, width, height, channels, srgb, target, target_width, target_height);
+    source = target;
+    width = target_width;
+    height = target_height;
+  }
+  return texture;
+}
+
+std::array<float, 4> sample(const Texture& texture, float u, float v, float footprint_uv) {
+  u = wrapped(u);
+  v = wrapped(v);
+  switch (texture.channels) {
+    case 1: {
+      const auto [grey] = sample_levels<1>(texture, u, v, footprint_uv);
+      return {grey, grey, grey, 1};
+    }
+    case 2: {
+      const auto [grey, alpha] = sample_levels<2>(texture, u, v, footprint_uv);
+      return {grey, grey, grey, alpha};
+    }
+    case 3: {
+      const auto [red, green, blue] = sample_levels<3>(texture, u, v, footprint_uv);
+      return {red, green, blue, 1};
+    }
+    default:
+      return sample_levels<4>(texture, u, v, footprint_uv);
+  }
+}
+
+}  // namespace render

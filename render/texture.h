@@ -1,0 +1,33 @@
+// Textures: mip levels made, texels filtered.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "render/mesh.h"
+
+namespace render {
+
+// Widest and highest texture that is accepted, texels.
+inline constexpr int max_texture_size = 16384;
+
+// Bytes of all mip levels: level k is max(1, width >> k) by max(1, height >> k), down to 1x1.
+std::size_t texture_bytes(int width, int height, int channels);
+
+// A texture with its mip levels, from the texels of level 0, (height, width, channels), row 0 on
+// top. Levels are area averages; colour (`srgb`) is averaged in linear light, alpha as it is.
+// Throws std::invalid_argument if sizes are not 1..max_texture_size, channels not 1..4, or the
+// number of texels does not fit.
+Texture make_texture(
+    int width, int height, int channels, bool srgb, std::span<const std::uint8_t> texels);
+
+// Red, green, blue, alpha at (u, v), 0..1, colour in linear light; u to the right, v down from the
+// texture's top edge, repeated in both directions. One channel is grey, two are grey and alpha;
+// alpha is 1 where there is none. `footprint_uv` is the width of the filter in units of u and v (of
+// the longer side): trilinear between the two nearest mip levels, bilinear at level 0 when it is
+// below a texel. Coordinates that are not finite, or beyond a million, count as 0.
+std::array<float, 4> sample(const Texture& texture, float u, float v, float footprint_uv);
+
+}  // namespace render

@@ -1,0 +1,206 @@
+// Models: what is read, what is refused.
+#include "render/load_mesh.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "render/standard.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using render::load_model;
+using render::LoadedModel;
+using testing::HasSubstr;
+
+std::string data_folder() {
+  const char* folder = std::getenv("PLATELIGHT_DATA");
+  return folder != nullptr ? folder : PLATELIGHT_SOURCE_DIR "/../shared/data";
+}
+std::string bad(const std::string& name) { return PLATELIGHT_SOURCE_DIR "/tests/data/bad/" + name; }
+std::string good(const std::string& name) { return PLATELIGHT_SOURCE_DIR "/tests/data/" + name; }
+
+#define SKIP_WITHOUT(path) \
+  if (!fs::exists(path)) GTEST_SKIP() << "needs real data: " << (path)
+
+render::LoadOptions hiding(const std::string& node) {
+  render::LoadOptions options;
+  options.hide = {node};
+  return options;
+}
+
+std::string refusal_of(const std::string& path) {
+  try {
+    load_model(path);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(LoadModel, TurnsYUpToZUpAndScales) {
+  render::LoadOptions twice;
+  twice.scale = 2;
+  const LoadedModel model = load_model(good("quad.gltf"), twice);
+  EXPECT_EQ(model.report.triangles, 2U);
+  // The file's quad spans x 0..1, y 0..3, at z = 5.
+  EXPECT_EQ(model.report.lower, (render::Vec3f{0, -10, 0}));
+  EXPECT_EQ(model.report.upper, (render::Vec3f{2, -10, 6}));
+  ASSERT_EQ(model.scene.instances.size(), 1U);
+  EXPECT_EQ(model.scene.instances[0].name, "Sign");
+  const auto p = render::standard_parameters(model.scene.materials.at(0), 0);
+  EXPECT_FLOAT_EQ(p.base_color[0], 0.25F);
+  EXPECT_FLOAT_EQ(p.metallic, 0);
+  EXPECT_FLOAT_EQ(p.roughness, 0.75F);
+  EXPECT_FLOAT_EQ(p.emission[1], 0.5F);
+}
+
+TEST(LoadModel, TakesThePlainFormatsToo) {
+  const LoadedModel obj = load_model(good("quad.obj"));
+  EXPECT_EQ(obj.report.triangles, 2U);
+  EXPECT_EQ(obj.report.upper.z, 3) << "OBJ is y up";
+  const LoadedModel ply = load_model(good("quad.ply"));
+  EXPECT_EQ(ply.report.triangles, 2U);
+  EXPECT_EQ(ply.report.upper.z, 5) << "PLY is z up";
+  render::LoadOptions z_up;
+  z_up.up = render::UpAxis::z;
+  EXPECT_EQ(load_model(good("quad.obj"), z_up).report.upper.z, 5);
+}
+
+TEST(LoadModel, ListsTheNodesWhenOneToHideIsNotThere) {
+  try {
+    load_model(good("quad.gltf"), hiding("Bonnet"));
+    FAIL() << "hid what is not there";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("Bonnet"));
+    EXPECT_THAT(error.what(), HasSubstr("Sign"));
+  }
+}
+
+TEST(LoadModel, RefusesEveryBadFileWithItsName) {
+  int count = 0;
+  for (const auto& entry : fs::directory_iterator(PLATELIGHT_SOURCE_DIR "/tests/data/bad")) {
+    const std::string extension = entry.path().extension().string();
+    if (extension != ".gltf" && extension != ".glb" && extension != ".obj" && extension != ".ply" &&
+        extension != ".stl" && extension != ".fbx" && extension != ".x3d")
+      continue;
+    ++count;
+    const std::string refusal = refusal_of(entry.path().string());
+    EXPECT_THAT(refusal, HasSubstr(entry.path().filename().string())) << entry.path();
+    EXPECT_GT(refusal.size(), entry.path().string().size() + 5) << "no reason: " << refusal;
+  }
+  EXPECT_GE(count, 12);
+}
+
+TEST(LoadModel, ReachesNothingOutsideItsFolder) {
+  EXPECT_THAT(refusal_of(bad("texture_outside.gltf")), HasSubstr("outside"));
+  EXPECT_THAT(refusal_of(bad("buffer_outside.gltf")), HasSubstr("outside"));
+  EXPECT_THAT(refusal_of(bad("texture_url.gltf")), HasSubstr("not a file"));
+  const fs::path folder = fs::path(testing::TempDir()) / "platelight_model_link";
+  fs::create_directories(folder);
+  fs::copy_file(good("quad.obj"), folder / "quad.obj", fs::copy_options::overwrite_existing);
+  fs::remove(folder / "quad.mtl");
+  fs::create_symlink("/etc/hostname", folder / "quad.mtl");
+  EXPECT_THAT(refusal_of((folder / "quad.obj").string()), HasSubstr("outside"));
+  fs::remove_all(folder);
+}
+
+TEST(LoadModel, SurvivesDamageAnywhere) {
+  const std::string path = data_folder() + "/models/ClearCoatCarPaint/ClearCoatCarPaint.glb";
+  SKIP_WITHOUT(path);
+  std::ifstream file(path, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(file)), {});
+  const fs::path folder = fs::path(testing::TempDir()) / "platelight_model_damage";
+  fs::create_directories(folder);
+  std::uint32_t state = 7;
+  const auto random = [&state] { return state = state * 1664525U + 1013904223U; };
+  int refused = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    std::string damaged = bytes;
+    if (trial % 3 == 0) damaged.resize(random() % bytes.size());
+    for (int k = 0; k < 8 && !damaged.empty(); ++k) {
+      const std::size_t reach =
+          trial % 2 == 0 ? std::min<std::size_t>(4096, damaged.size()) : damaged.size();
+      damaged[random() % reach] = static_cast<char>(random() >> 16);
+    }
+    const std::string target = (folder / "damaged.glb").string();
+    std::ofstream(target, std::ios::binary) << damaged;
+    try {
+      const LoadedModel model = load_model(target);
+      for (const auto& mesh : model.scene.meshes)
+        for (const auto& triangle : mesh->triangles)
+          for (const std::uint32_t corner : triangle) ASSERT_LT(corner, mesh->positions.size());
+    } catch (const std::runtime_error& error) {
+      ++refused;
+      EXPECT_THAT(error.what(), HasSubstr("damaged.glb"));
+    }
+  }
+  EXPECT_GT(refused, 10);
+  fs::remove_all(folder);
+}
+
+TEST(LoadModel, ReadsTheToyCar) {
+  const std::string path = data_folder() + "/models/ToyCar/ToyCar.gltf";
+  SKIP_WITHOUT(path);
+  EXPECT_EQ(load_model(path).report.triangles, 108936U);
+  render::LoadOptions options = hiding("Fabric");
+  options.emission_gain = 3;
+  const auto start = std::chrono::steady_clock::now();
+  const LoadedModel car = load_model(path, options);
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  RecordProperty("load_ms", static_cast<int>(seconds.count() * 1000));
+  EXPECT_THAT(car.report.nodes, testing::ElementsAre("ToyCar", "Fabric", "Glass"));
+  // 38.38 x 18.71 x 11.62 mm, the wheels at z = .99 mm.
+  EXPECT_NEAR(car.report.upper.y - car.report.lower.y, 0.03838, 2e-5);
+  EXPECT_NEAR(car.report.upper.x - car.report.lower.x, 0.01871, 2e-5);
+  EXPECT_NEAR(car.report.upper.z - car.report.lower.z, 0.01162, 2e-5);
+  EXPECT_NEAR(car.report.lower.z, 0.00099, 2e-5);
+  ASSERT_EQ(car.scene.materials.size(), 2U);
+  const auto paint = render::standard_parameters(car.scene.materials[0], car.report.textures);
+  EXPECT_EQ(paint.clearcoat, 1);
+  EXPECT_EQ(paint.metallic, 1);
+  EXPECT_EQ(paint.emission_gain, 3);
+  EXPECT_GE(paint.normal_texture, 0);
+  EXPECT_GE(paint.metallic_roughness_texture, 0);
+  EXPECT_GE(paint.clearcoat_texture, 0);
+  EXPECT_FALSE(car.scene.meshes[0]->tangents.empty());
+  const auto glass = render::standard_parameters(car.scene.materials[1], car.report.textures);
+  EXPECT_EQ(glass.transmission, 1);
+  EXPECT_NEAR(glass.base_color[1], 0.8, 1e-6);
+  for (const auto& n : car.scene.meshes[0]->normals) ASSERT_NEAR(length(n), 1, 1e-4);
+}
+
+TEST(LoadModel, ReadsDracoAndHidesParts) {
+  const std::string path = data_folder() + "/models/ferrari458/ferrari.glb";
+  SKIP_WITHOUT(path);
+  const LoadedModel whole = load_model(path);
+  EXPECT_NEAR(static_cast<double>(whole.report.triangles), 357909, 1000);
+  const LoadedModel bare = load_model(path, hiding("body"));
+  EXPECT_LT(bare.report.triangles, whole.report.triangles);
+  const std::string truck = data_folder() + "/models/CesiumMilkTruck/CesiumMilkTruck.gltf";
+  SKIP_WITHOUT(truck);
+  EXPECT_EQ(load_model(truck).scene.instances.size(), 5U) << "two axles of one mesh";
+}
+
+TEST(LoadModel, CutsMaskedAlphaAndLetsThinGlassThrough) {
+  const std::string path = data_folder() + "/models/TransmissionTest/TransmissionTest.glb";
+  SKIP_WITHOUT(path);
+  const LoadedModel model = load_model(path);
+  int masked = 0;
+  int clear = 0;
+  for (const auto& material : model.scene.materials) {
+    const auto p = render::standard_parameters(material, model.report.textures);
+    masked += p.alpha_cutoff > 0 ? 1 : 0;
+    clear += p.transmission > 0 ? 1 : 0;
+  }
+  EXPECT_EQ(masked, 6);
+  EXPECT_EQ(clear, 12);
+}
+
+}  // namespace

@@ -1,0 +1,147 @@
+// The standard surface: its energy and its lobes.
+#include "render/standard.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <numbers>
+#include <random>
+
+namespace {
+
+using calibrate::Vec3f;
+using render::StandardSurface;
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : engine_(seed) {}
+  float operator()() { return std::uniform_real_distribution<float>(0, 1)(engine_); }
+  Vec3f direction() {
+    const float z = 2 * (*this)() - 1;
+    const float phi = 2 * std::numbers::pi_v<float> * (*this)();
+    const float r = std::sqrt(1 - z * z);
+    return {r * std::cos(phi), r * std::sin(phi), z};
+  }
+
+ private:
+  std::mt19937 engine_;
+};
+
+StandardSurface white_surface(Vec3f normal) {
+  StandardSurface surface{};
+  surface.base = {1, 1, 1};
+  surface.normal = surface.coat_normal = normal;
+  surface.alpha = 1;
+  return surface;
+}
+
+TEST(StandardWeights, PassOnAllLightOfAWhiteSurface) {
+  Random random(1);
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Vec3f normal = random.direction();
+    StandardSurface surface = white_surface(normal);
+    surface.metallic = random();
+    surface.clearcoat = random();
+    surface.transmission = random();
+    Vec3f view = random.direction();
+    if (dot(view, normal) < 0) view = -view;
+    const auto w = render::standard_weights(surface, view);
+    EXPECT_NEAR(w.coat + w.specular.x + w.diffuse.x + w.transmission.x, 1, 1e-5);
+  }
+}
+
+TEST(StandardWeights, NeverPassOnMoreThanArrives) {
+  Random random(2);
+  for (int trial = 0; trial < 1000; ++trial) {
+    const Vec3f normal = random.direction();
+    StandardSurface surface = white_surface(normal);
+    surface.base = {random(), random(), random()};
+    surface.metallic = random();
+    surface.clearcoat = random();
+    surface.transmission = random();
+    const auto w = render::standard_weights(surface, random.direction());
+    const Vec3f sum = w.specular + w.diffuse + w.transmission;
+    for (const float channel : {sum.x, sum.y, sum.z}) {
+      EXPECT_LE(channel + w.coat, 1 + 1e-5);
+      EXPECT_GE(channel, 0);
+    }
+  }
+}
+
+TEST(SampleLobe, KeepsAllItsEnergyAboveTheSurface) {
+  Random random(3);
+  for (const float roughness : {render::mirror_roughness, 0.1F, 0.3F, 0.6F, 1.0F}) {
+    for (const float cosine : {1.0F, 0.7F, 0.2F, 0.03F}) {
+      const Vec3f normal{0, 0, 1};
+      const Vec3f view{std::sqrt(1 - cosine * cosine), 0, cosine};
+      // Importance-sampled: the mean of density / density is 1 where every direction is above; what
+      // is tested is that the density that is returned is the one that is sampled.
+      double inside = 0;
+      const int count = 20000;
+      for (int i = 0; i < count; ++i) {
+        const Vec3f l = render::sample_lobe(normal, view, roughness, {random(), random()});
+        ASSERT_NEAR(length(l), 1, 1e-4);
+        ASSERT_GE(l.z, 0);
+        const float density = render::lobe_density(normal, view, roughness, l);
+        ASSERT_TRUE(std::isfinite(density));
+        inside += l.x < 0 ? 1 : 0;
+      }
+      // The same share by integrating the density over the hemisphere.
+      if (roughness < 0.3F) continue;
+      double integral = 0;
+      double share = 0;
+      const int steps = 400;
+      for (int j = 0; j < steps; ++j) {
+        for (int i = 0; i < 4 * steps; ++i) {
+          const double z = (j + 0.5) / steps;
+          const double phi = 2 * std::numbers::pi * (i + 0.5) / (4 * steps);
+          const double r = std::sqrt(1 - z * z);
+          const Vec3f l{static_cast<float>(r * std::cos(phi)),
+                        static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
+          const double piece = render::lobe_density(normal, view, roughness, l) * 2 *
+                               std::numbers::pi / (4.0 * steps * steps);
+          integral += piece;
+          if (l.x < 0) share += piece;
+        }
+      }
+      EXPECT_NEAR(integral, 1, 5e-3) << "roughness " << roughness << ", cosine " << cosine;
+      EXPECT_NEAR(inside / count, share, 0.015)
+          << "roughness " << roughness << ", cosine " << cosine;
+    }
+  }
+}
+
+TEST(LobeDensity, IsZeroBelowTheSurfaceAndFiniteFromBelowTheShadingNormal) {
+  const Vec3f normal{0, 0, 1};
+  EXPECT_EQ(render::lobe_density(normal, {0, 0.6F, 0.8F}, 0.5F, {0, 0.6F, -0.8F}), 0);
+  const Vec3f below{0.8F, 0, -0.6F};
+  const Vec3f l = render::sample_lobe(normal, below, 0.3F, {0.3F, 0.6F});
+  EXPECT_GE(l.z, 0);
+  EXPECT_TRUE(std::isfinite(render::lobe_density(normal, below, 0.3F, l)));
+}
+
+TEST(StandardParameters, ComeBackFromTheirMaterial) {
+  render::StandardParameters p;
+  p.roughness = 0.125F;
+  p.normal_texture = 2;
+  const auto material = render::make_standard_material("paint", p);
+  const auto back = render::standard_parameters(material, 3);
+  EXPECT_EQ(std::memcmp(&p, &back, sizeof p), 0);
+  EXPECT_THROW(render::standard_parameters(material, 2), std::invalid_argument);
+}
+
+TEST(StandardParameters, RefuseAnotherShaderAWrongSizeAndNaN) {
+  render::StandardParameters p;
+  auto material = render::make_standard_material("paint", p);
+  material.parameters.pop_back();
+  EXPECT_THROW(render::standard_parameters(material, 0), std::invalid_argument);
+  material = render::make_standard_material("paint", p);
+  material.shader = "stand_in";
+  EXPECT_THROW(render::standard_parameters(material, 0), std::invalid_argument);
+  p.metallic = NAN;
+  EXPECT_THROW(render::standard_parameters(render::make_standard_material("paint", p), 0),
+               std::invalid_argument);
+}
+
+}  // namespace
