@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "calibrate/vec.h"
@@ -13,24 +14,46 @@ namespace render {
 
 using calibrate::Vec3f;
 
-// Latitude-longitude map in the set's frame: row 0 looks up (+z); column u = (x + .5) / width stands
-// for azimuth atan2(y, x) = (0.5 - u) * 2 pi. Radiance in the plate's units (match applied).
+// Latitude-longitude map in the set's frame: row 0 looks up (+z); column u = (x + .5) / width
+// stands for azimuth atan2(y, x) = (0.5 - u) * 2 pi. Radiance in the plate's units (match applied).
 struct Environment {
   capture::Image radiance;         // (height, 2 * height, 3)
   std::vector<std::uint8_t> seen;  // per texel, 1 = the probe saw it, 0 = filled
   // The map smoothed by GGX lobes of growing roughness, for reflections: level k is for roughness
-  // k / (levels - 1), each (level_height[k], 2 * level_height[k], 3). Level 0 is `radiance` itself.
+  // k / (levels - 1), each (level_height[k], 2 * level_height[k], 3). Level 0 is `radiance` itself,
+  // with not-a-number and negative values as 0.
   std::vector<capture::Image> smoothed;
+  float unseen_share = 0;  // of the irradiance on a surface that faces up: filled, not measured
 };
 
-// Direction of texel centre (x, y), continuous, and back. 0 <= x <= width.
+// The brightest radiance that counts; brighter ones, and infinity, are taken as this.
+inline constexpr float brightest_radiance = 1e9F;
+
+// What a stored radiance counts as: not-a-number and negative values are 0.
+inline float counted_radiance(float stored) {
+  return stored > 0 ? (stored < brightest_radiance ? stored : brightest_radiance) : 0.0F;
+}
+
+// Direction of a texel and back, both continuous: (0, 0) is the centre of the top-left texel,
+// -0.5 <= x <= width - 0.5, -0.5 <= y <= height - 0.5. Straight up and down, x is that of azimuth
+// 0.
 Vec3f direction_of_texel(float x, float y, int width, int height);
 std::array<float, 2> texel_of_direction(Vec3f direction, int width, int height);
 
-// Radiance in a direction (unit), bilinear; `roughness` 0..1 picks between smoothed levels.
+// Solid angle of each texel of a row, in steradians.
+double texel_solid_angle(int row, int width, int height);
+
+// Radiance in a direction (unit), bilinear; `roughness` 0..1 picks between smoothed levels, and
+// `radiance` where there are none. A direction that is not finite gives 0.
 Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness);
 
-// Fills `smoothed` with `levels` levels. About 2 ms for 512x256.
+// Irradiance on a surface that faces `normal` (unit), summed over all texels.
+Vec3f irradiance_of(const Environment& env, Vec3f normal);
+
+// Fills `smoothed` with `levels` (at least 2) levels. About 2 ms for 512x256. The lobe is that of a
+// surface seen head-on, the same all around, of alpha = roughness^2; what it would send below the
+// surface is mirrored up again, as in standard.h, so every level keeps a white map white.
+// Throws std::invalid_argument if `radiance` is not (height, 2 * height, 3) or levels is below 2.
 void smooth_for_reflections(Environment& env, int levels = 6);
 
 // How directions that the probe did not see are filled.

@@ -1,0 +1,233 @@
+// Laws of environments and of their smoothing for reflections.
+#include "render/environment.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+
+#include "render/lobe_filter.h"
+#include "tests/render/made_sky.h"
+
+namespace render {
+namespace {
+
+constexpr float pi = std::numbers::pi_v<float>;
+
+Vec3f random_direction(std::mt19937& random) {
+  std::normal_distribution<float> normal;
+  return normalize(Vec3f{normal(random), normal(random), normal(random)});
+}
+
+// The sum over all texels of radiance times solid angle, one channel.
+double power(const capture::Image& map, int channel) {
+  double sum = 0;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      sum += map.at(y, x, channel) * texel_solid_angle(y, map.width, map.height);
+    }
+  }
+  return sum;
+}
+
+TEST(TexelOfDirection, IsUndoneByDirectionOfTexel) {
+  std::mt19937 random(1);
+  for (int i = 0; i < 1000; ++i) {
+    const Vec3f d = random_direction(random);
+    const auto [x, y] = texel_of_direction(d, 512, 256);
+    EXPECT_GE(x, -0.5F);
+    EXPECT_LE(x, 511.5F);
+    EXPECT_LE(length(direction_of_texel(x, y, 512, 256) - d), 1e-5F);
+  }
+}
+
+TEST(TexelOfDirection, HasTheSetsAxesWhereTheHeaderSaysSo) {
+  const auto expect_at = [](Vec3f d, float x, float y) {
+    const auto at = texel_of_direction(d, 64, 32);
+    EXPECT_NEAR(at[0], x, 1e-4F);
+    EXPECT_NEAR(at[1], y, 1e-4F);
+  };
+  expect_at({1, 0, 0}, 31.5F, 15.5F);
+  expect_at({0, 1, 0}, 15.5F, 15.5F);
+  expect_at({0, -1, 0}, 47.5F, 15.5F);
+  expect_at({0, 0, 1}, 31.5F, -0.5F);
+  expect_at({0, 0, -1}, 31.5F, 31.5F);
+}
+
+TEST(TexelSolidAngle, AddsUpToTheSphere) {
+  double sum = 0;
+  for (int y = 0; y < 37; ++y) sum += 74 * texel_solid_angle(y, 74, 37);
+  EXPECT_NEAR(sum, 4 * std::numbers::pi, 1e-9);
+}
+
+TEST(IrradianceOf, IsPiUnderAnEvenSkyFromEverySide) {
+  const Environment env = make_even_environment(1, 64);
+  std::mt19937 random(2);
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_NEAR(irradiance_of(env, random_direction(random)).y, pi, 2e-3F);
+  }
+}
+
+TEST(RadianceOf, IsTheTexelAtItsCentreAndContinuousEverywhere) {
+  const Environment env = make_sky({}, 32);
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      const Vec3f d = direction_of_texel(static_cast<float>(x), static_cast<float>(y), 64, 32);
+      const float expected = env.radiance.at(y, x, 1);
+      EXPECT_NEAR(radiance_of(env, d, 0).y, expected, 1e-3F * (1 + expected));
+    }
+  }
+  // Across the seam and over both poles.
+  const Environment smooth = make_sky({.sun_radius_rad = 0.5F}, 64);
+  for (const Vec3f a : {Vec3f{-1, 1e-6F, 0.2F}, Vec3f{1e-6F, 0, 1}, Vec3f{1e-6F, 0, -1}}) {
+    const Vec3f b{a.x, -a.y, a.z};
+    const Vec3f c{-a.x, a.y, a.z};
+    const Vec3f here = radiance_of(smooth, normalize(a), 0);
+    EXPECT_NEAR(here.x, radiance_of(smooth, normalize(b), 0).x, 1e-3F);
+    if (a.x > 0) {
+      EXPECT_NEAR(here.x, radiance_of(smooth, normalize(c), 0).x, 1e-3F);
+    }
+  }
+}
+
+TEST(RadianceOf, NeverReadsBesideTheMap) {
+  Environment env = make_even_environment(2, 8);
+  smooth_for_reflections(env);
+  std::mt19937 random(3);
+  for (int i = 0; i < 10000; ++i) {
+    EXPECT_NEAR(radiance_of(env, random_direction(random), 0.1F).x, 2, 1e-5F);
+  }
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const Vec3f d : {Vec3f{nan, 0, 0}, Vec3f{0, infinity, 0}}) {
+    EXPECT_EQ(radiance_of(env, d, 0.5F), Vec3f{});
+  }
+  for (const Vec3f d : {Vec3f{0, 0, 0}, Vec3f{-1, 0, 0}, Vec3f{-1, -0.0F, 0}, Vec3f{0, 0, 1}}) {
+    for (const float roughness : {-1.0F, 0.0F, 1.0F, 7.0F, nan}) {
+      EXPECT_NEAR(radiance_of(env, d, roughness).z, 2, 1e-5F);
+    }
+  }
+}
+
+TEST(SmoothForReflections, KeepsAWhiteMapWhiteAtEveryRoughness) {
+  for (const int height : {256, 100, 16}) {
+    Environment env = make_even_environment(1, height);
+    smooth_for_reflections(env);
+    ASSERT_EQ(env.smoothed.size(), 6U);
+    for (const capture::Image& level : env.smoothed) {
+      ASSERT_EQ(level.width, 2 * level.height);
+      for (const float value : level.pixels) EXPECT_NEAR(value, 1, 2e-5F);
+    }
+  }
+}
+
+TEST(SmoothForReflections, AgreesWithTheLobeSummedDirectlyOverTheMap) {
+  Environment env = make_sky({.sun_radius_rad = 0.1F}, 128);
+  smooth_for_reflections(env);
+  std::mt19937 random(4);
+  for (const std::size_t level : {1U, 2U, 3U, 5U}) {
+    const double roughness = static_cast<double>(level) / 5;
+    const double a2 = std::pow(roughness, 4);
+    for (int i = 0; i < 20; ++i) {
+      const Vec3f r = random_direction(random);
+      double sum = 0;
+      double weights = 0;
+      for (int y = 0; y < 128; ++y) {
+        for (int x = 0; x < 256; ++x) {
+          const double c =
+              dot(direction_of_texel(static_cast<float>(x), static_cast<float>(y), 256, 128), r);
+          if (c <= 0) continue;
+          double d = 0;
+          for (const double side : {c, -c}) {
+            d += a2 / std::pow((1 + side) / 2 * (a2 - 1) + 1, 2);
+          }
+          const double w = d * texel_solid_angle(y, 256, 128);
+          weights += w;
+          sum += w * env.radiance.at(y, x, 1);
+        }
+      }
+      const double expected = sum / weights;
+      // The roughest lobe ends sharply at the horizon, but its map has texels of 5.6 degrees.
+      const double tolerance = level == 5 ? 0.06 : 0.03;
+      EXPECT_NEAR(radiance_of(env, r, static_cast<float>(roughness)).y, expected,
+                  tolerance * expected)
+          << "level " << level << " at " << r.x << " " << r.y << " " << r.z;
+    }
+  }
+}
+
+TEST(SmoothForReflections, KeepsTheEnergyOfASunAndNeitherRingsNorOverflows) {
+  for (const float sun : {1e5F, 1e8F}) {
+    Environment env = make_even_environment(0.1F, 256);
+    for (int c = 0; c < 3; ++c) env.radiance.at(80, 301, c) = sun;
+    smooth_for_reflections(env);
+    const double before = power(env.radiance, 0);
+    for (const capture::Image& level : env.smoothed) {
+      EXPECT_NEAR(power(level, 0), before, 0.03 * before);
+      const auto [least, most] = std::ranges::minmax(level.pixels);
+      EXPECT_GE(least, 0.0999F - 1e-9F * sun);
+      EXPECT_LE(most, sun);
+    }
+    // Farther from the sun, the light only falls.
+    const Vec3f to_sun = direction_of_texel(301, 80, 512, 256);
+    const Vec3f across = normalize(cross(to_sun, Vec3f{0, 0, 1}));
+    for (const float roughness : {0.2F, 0.6F}) {
+      float nearer = std::numeric_limits<float>::infinity();
+      for (float angle = 0.1F; angle < 1.4F; angle += 0.1F) {
+        const Vec3f d = to_sun * std::cos(angle) + across * std::sin(angle);
+        const float here = radiance_of(env, d, roughness).x;
+        EXPECT_LE(here, nearer);
+        nearer = here;
+      }
+    }
+  }
+}
+
+TEST(SmoothForReflections, CountsNotANumberAndNegativeRadianceAsZero) {
+  Environment env = make_even_environment(1, 64);
+  env.radiance.at(10, 20, 0) = std::numeric_limits<float>::quiet_NaN();
+  env.radiance.at(11, 20, 1) = -1e6F;
+  env.radiance.at(12, 20, 2) = std::numeric_limits<float>::infinity();
+  smooth_for_reflections(env);
+  for (const capture::Image& level : env.smoothed) {
+    for (const float value : level.pixels) {
+      ASSERT_TRUE(std::isfinite(value));
+      ASSERT_GE(value, 0);
+    }
+  }
+  EXPECT_EQ(env.smoothed[0].at(10, 20, 0), 0);
+  EXPECT_EQ(env.smoothed[0].at(11, 20, 1), 0);
+  EXPECT_EQ(env.smoothed[0].at(12, 20, 2), brightest_radiance);
+}
+
+TEST(SmoothForReflections, GivesTheSameBitsEachTime) {
+  Environment a = make_sky({}, 64);
+  Environment b = a;
+  smooth_for_reflections(a);
+  smooth_for_reflections(b);
+  EXPECT_EQ(a.smoothed[3].pixels, b.smoothed[3].pixels);
+}
+
+TEST(SmoothForReflections, RefusesMapsThatAreNotTwiceAsWideAsHigh) {
+  Environment env;
+  EXPECT_THROW(smooth_for_reflections(env), std::invalid_argument);
+  env.radiance = capture::make_image(10, 10);
+  EXPECT_THROW(smooth_for_reflections(env), std::invalid_argument);
+  env = make_even_environment(1, 8);
+  EXPECT_THROW(smooth_for_reflections(env, 1), std::invalid_argument);
+}
+
+TEST(AreaAveraged, KeepsThePowerOfAnyMapAtAnySize) {
+  const Environment env = make_sky({}, 90);
+  for (const int height : {64, 45, 30, 7, 1, 180}) {
+    const capture::Image small = area_averaged(env.radiance, height);
+    EXPECT_EQ(small.width, 2 * height);
+    EXPECT_NEAR(power(small, 2), power(env.radiance, 2), 1e-5 * power(env.radiance, 2));
+  }
+}
+
+}  // namespace
+}  // namespace render
