@@ -1,3 +1,4 @@
+// glTF files, checked before anything is built from them.
 #include "render/gltf_check.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// Models from files, through assimp: glTF (also Draco-compressed), OBJ, PLY, STL, FBX, X3D.
 #include "render/load_mesh.h"
 
 #include <assimp/config.h>

@@ -1,3 +1,4 @@
+// File access of a model, confined to the folder that the model lies in.
 #include "render/model_folder.h"
 
 #include <algorithm>

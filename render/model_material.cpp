@@ -1,3 +1,4 @@
+// Materials and textures of an imported model.
 #include "render/model_material.h"
 
 #include <assimp/GltfMaterial.h>

@@ -1,3 +1,4 @@
+// Meshes of an imported model.
 #include "render/model_mesh.h"
 
 #include <assimp/mesh.h>

@@ -1,3 +1,4 @@
+// The standard surface: glTF 2.0 metallic-roughness with clear coat, thin transmission, emission.
 #include "render/standard.h"
 
 #include <cstddef>

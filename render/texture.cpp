@@ -1,3 +1,4 @@
+// Textures: mip levels made, texels filtered.
 #include "render/texture.h"
 
 #include <algorithm>

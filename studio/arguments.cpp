@@ -1,0 +1,58 @@
+// Arguments through CLI11.
+#include "studio/arguments.h"
+
+#include <CLI/CLI.hpp>
+
+namespace studio {
+
+void Arguments::positional(const std::string& name, std::string& target, const std::string& help) {
+  app_->add_option(name, target, help)->required()->type_name("");
+}
+
+void Arguments::positionals(const std::string& name,
+                            std::vector<std::string>& target,
+                            const std::string& help) {
+  app_->add_option(name, target, help)->required()->type_name("");
+}
+
+void Arguments::option(const std::string& names, std::string& target, const std::string& help) {
+  app_->add_option(names, target, help)->type_name("TEXT")->check([](const std::string& given) {
+    return given.empty() ? std::string("must not be empty") : std::string();
+  });
+}
+
+void Arguments::option(const std::string& names,
+                       std::optional<std::int64_t>& target,
+                       std::int64_t low,
+                       std::int64_t high,
+                       const std::string& help) {
+  app_->add_option(names, target, help)->type_name("N")->check(CLI::Range(low, high));
+}
+
+void Arguments::option(const std::string& names,
+                       std::optional<double>& target,
+                       double low,
+                       double high,
+                       const std::string& help) {
+  app_->add_option(names, target, help)->type_name("X")->check(CLI::Range(low, high));
+}
+
+void Arguments::choices(const std::string& names,
+                        std::vector<std::string>& target,
+                        const std::vector<std::string>& choices,
+                        const std::string& help) {
+  std::string list;
+  for (const std::string& choice : choices) list += (list.empty() ? "" : ",") + choice;
+  app_->add_option(names, target, help)
+      ->delimiter(',')
+      ->type_name(list)
+      ->check(CLI::IsMember(choices));
+}
+
+void Arguments::flag(const std::string& names, bool& target, const std::string& help) {
+  app_->add_flag(names, target, help);
+}
+
+void Arguments::required(const std::string& name) { app_->get_option(name)->required(); }
+
+}  // namespace studio

@@ -1,0 +1,39 @@
+// What a command says: words, progress, figures.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+
+namespace studio {
+
+class Console {
+ public:
+  Console(bool quiet, std::string figures_file);
+  ~Console();
+  Console(const Console&) = delete;
+  Console& operator=(const Console&) = delete;
+
+  // A line on standard output, unless quiet.
+  void say(std::string_view line);
+  // A line on standard error, quiet or not: what went wrong without ending the command.
+  void warn(std::string_view line);
+  // A bar on a terminal, at most ten times a second; nothing otherwise. `share` is 0 to 1.
+  void progress(double share, std::string_view what);
+  // Writes the command's figures, a JSON text, to the file of --json, if one was asked for. Throws
+  // std::runtime_error if it cannot be written.
+  void figures(std::string_view json);
+  // Whether anybody wants figures: costly ones need not be made otherwise.
+  bool wants_figures() const { return !figures_file_.empty(); }
+
+ private:
+  void clear_bar();
+
+  bool quiet_;
+  bool terminal_;
+  bool bar_shown_ = false;
+  std::string figures_file_;
+  std::chrono::steady_clock::time_point bar_time_{};
+};
+
+}  // namespace studio

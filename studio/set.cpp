@@ -1,0 +1,172 @@
+// Set files: the root, and the sections that are a few plain values.
+#include "studio/set.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "studio/set_sections.h"
+
+namespace studio {
+namespace {
+
+constexpr std::int64_t most_frames = 100'000'000;  // 46 days at 25 frames a second
+
+std::string lines_of(const std::vector<Diagnostic>& diagnostics) {
+  std::string lines;
+  for (const Diagnostic& diagnostic : diagnostics) {
+    if (!lines.empty()) lines += '\n';
+    lines += to_string(diagnostic);
+  }
+  return lines;
+}
+
+// "30000/1001", both parts from 1.
+std::optional<capture::Rational> parse_rational(const std::string& text) {
+  const std::size_t slash = text.find('/');
+  const auto whole = [](const std::string& digits) -> std::int64_t {
+    const bool good = !digits.empty() && digits.size() <= 9 &&
+                      digits.find_first_not_of("0123456789") == std::string::npos;
+    return good ? std::stoll(digits) : 0;
+  };
+  if (slash == std::string::npos) return std::nullopt;
+  const std::int64_t num = whole(text.substr(0, slash));
+  const std::int64_t den = whole(text.substr(slash + 1));
+  if (num < 1 || den < 1) return std::nullopt;
+  const std::int64_t divisor = std::gcd(num, den);
+  return capture::Rational{num / divisor, den / divisor};
+}
+
+void read_fps(Section& section, std::optional<capture::Rational>& fps) {
+  const TomlValue* value = section.value("fps");
+  if (value == nullptr) return;
+  if (value->kind == TomlValue::Kind::integer) {
+    std::int64_t rate = 0;
+    if (section.integer("fps", rate, 1, 1000)) fps = capture::Rational{rate, 1};
+    return;
+  }
+  if (value->kind == TomlValue::Kind::text) {
+    fps = parse_rational(value->text);
+    if (fps && fps->value() >= 0.01 && fps->value() <= 1000) return;
+    fps.reset();
+  }
+  section.fault("fps",
+                "must be a whole number from 1 to 1000, or a fraction such as \"30000/1001\"");
+}
+
+ShowSettings read_show_section(Section section) {
+  ShowSettings show;
+  section.need("width", "the picture's width in pixels");
+  section.need("height", "the picture's height in pixels");
+  section.integer("width", show.width, 1, largest_picture_side);
+  section.integer("height", show.height, 1, largest_picture_side);
+  read_fps(section, show.fps);
+  std::int64_t frames = 0;
+  if (section.integer("frames", frames, std::int64_t{1}, most_frames)) show.frames = frames;
+  section.finish();
+  return show;
+}
+
+DisplayChoice read_display_section(Section section) {
+  DisplayChoice display;
+  display.place = section.place();
+  section.text("display", display.display);
+  section.text("view", display.view);
+  section.finish();
+  return display;
+}
+
+RecordSettings read_record_section(Section section, const std::filesystem::path& base) {
+  RecordSettings record;
+  record.place = section.place();
+  const auto read_path = [&](std::string_view key, std::string& path) {
+    if (section.text(key, path)) path = (base / path).lexically_normal().string();
+  };
+  read_path("file", record.file);
+  read_path("exr", record.exr);
+  section.text("codec", record.codec);
+  section.text("timecode", record.timecode);
+  section.finish();
+  return record;
+}
+
+}  // namespace
+
+SetError::SetError(std::vector<Diagnostic> diagnostics)
+    : std::runtime_error(lines_of(diagnostics)), diagnostics_(std::move(diagnostics)) {}
+
+render::Effort read_effort_section(Section section) {
+  render::Effort effort;
+  section.integer("aa_samples", effort.aa_samples, 1, 64);
+  section.integer("light_samples", effort.light_samples, 1, 4096);
+  section.integer("interleave", effort.interleave, 1, 4);
+  if (effort.interleave == 3) section.fault("interleave", "must be 1, 2 or 4");
+  section.boolean("adaptive_visibility", effort.adaptive_visibility);
+  section.boolean("cull_lights", effort.cull_lights);
+  section.number("accuracy", effort.accuracy, {0, 1});
+  section.integer("max_depth", effort.max_depth, 1, 64);
+  section.integer("tile_size", effort.tile_size, 16, 1024);
+  if (effort.tile_size % 16 != 0) section.fault("tile_size", "must be a multiple of 16");
+  section.finish();
+  return effort;
+}
+
+Set read_set(const std::string& path) {
+  Faults faults(path);
+  TomlValue file;
+  try {
+    file = read_toml(path);
+  } catch (const TomlError& error) {
+    faults.add(error.place(), error.what());
+    throw SetError(faults.sorted());
+  }
+
+  Set set;
+  set.path = path;
+  Section root(file, "", faults);
+  root.text("name", set.name);
+
+  SetContext context;
+  context.base = std::filesystem::absolute(path).parent_path();
+  root.need("show", "every set has [show] with width and height");
+  if (auto section = root.table("show")) set.show = read_show_section(*section);
+  context.show = set.show;
+
+  std::int64_t instances = 0;
+  for (const Section& section : root.tables("object")) {
+    set.objects.push_back(read_object_section(section, context));
+    const auto& copies = set.objects.back().copies;
+    instances += std::int64_t{copies[0]} * copies[1];
+    if (instances > most_instances) {
+      faults.add(section.place(),
+                 fmt::format("object: {} instances so far, but a set holds at most {}", instances,
+                             most_instances));
+      break;
+    }
+  }
+  for (const Section& section : root.tables("stand_in")) {
+    set.stand_ins.push_back(read_stand_in_section(section, context));
+  }
+  for (const Section& section : root.tables("lamp")) {
+    set.lamps.push_back(read_lamp_section(section));
+  }
+  context.has_scene = !set.objects.empty() || !set.stand_ins.empty();
+
+  root.need("camera", "every set has [camera] with a source");
+  if (auto section = root.table("camera")) set.camera = read_camera_section(*section, context);
+  if (auto section = root.table("probe")) set.probe = read_probe_section(*section, context);
+  if (auto section = root.table("effort")) set.effort = read_effort_section(*section);
+  if (auto section = root.table("display")) set.display = read_display_section(*section);
+  if (auto section = root.table("record")) {
+    set.record = read_record_section(*section, context.base);
+  }
+  root.finish();
+
+  std::vector<Diagnostic> diagnostics = faults.sorted();
+  if (!diagnostics.empty()) throw SetError(std::move(diagnostics));
+  return set;
+}
+
+}  // namespace studio

@@ -1,0 +1,168 @@
+// The set file: everything that a show is made from, as its author wrote it, every value checked.
+// studio/docs/set_file.md describes the keys.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "calibrate/lens.h"
+#include "calibrate/pose.h"
+#include "capture/colour.h"
+#include "capture/frame.h"
+#include "render/environment.h"
+#include "render/frame_job.h"
+#include "studio/section.h"
+#include "studio/toml.h"
+
+namespace studio {
+
+// All faults of a set at once. what() has one line for each.
+class SetError : public std::runtime_error {
+ public:
+  explicit SetError(std::vector<Diagnostic> diagnostics);
+  const std::vector<Diagnostic>& diagnostics() const { return diagnostics_; }
+
+ private:
+  std::vector<Diagnostic> diagnostics_;
+};
+
+struct ShowSettings {
+  int width = 0;  // of the picture
+  int height = 0;
+  std::optional<capture::Rational> fps;  // nothing = the plate's own, 25 for stills
+  std::optional<std::int64_t> frames;    // nothing = to the plate's end; endless for stills
+};
+
+// A moving camera or a fixed one.
+struct PoseSettings {
+  calibrate::Pose cam_from_set;
+  std::string track;  // a file of poses (calibrate/track.h) in its place; "" = fixed
+};
+
+struct CameraSettings {
+  std::string source;  // URI, paths made absolute
+  Place source_place;
+  calibrate::Lens lens;  // of the show's picture: cropped, and of its size
+  PoseSettings pose;
+  Place pose_place;
+  std::optional<std::int64_t> frame;
+  std::optional<std::array<int, 4>> crop;  // x, y, width, height in source pixels
+  capture::Transfer colour = capture::Transfer::rec1886;
+  std::string response;              // .rsp file; "" = none
+  std::optional<double> exposure_s;  // where the source does not tell it
+  bool loop = false;
+};
+
+// How probe radiance is brought to the plate's units.
+struct MatchSettings {
+  enum class Method { automatic, patch, gains };
+  Method method = Method::automatic;
+  std::array<float, 3> gains{1, 1, 1};  // of `gains`
+  std::array<int, 4> patch{};           // of `patch`: x, y, width, height in the show's picture
+  std::array<float, 3> albedo{};        // of `patch`: what it is painted
+};
+
+struct ProbeSettings {
+  enum class Kind { map, bracket, camera };
+
+  Kind kind = Kind::map;
+  std::string source;  // of a map or camera: URI; of a bracket: "" = `shots`
+  Place source_place;
+  std::vector<std::string> shots;       // of a bracket: its pictures
+  std::optional<calibrate::Lens> lens;  // nothing = latitude-longitude
+  calibrate::Pose probe_from_set;
+  double yaw_rad = 0;               // of a map: turned to the left, seen from above
+  std::vector<double> exposures_s;  // empty = as the source tells
+  render::Unseen unseen = render::Unseen::floor;
+  MatchSettings match;
+  std::vector<double> vignetting;  // 1 + v1 theta^2 + v2 theta^4 + ... divides the radiance
+  std::string response;            // .rsp file of the shots; "" = recovered where needed
+  capture::Transfer colour = capture::Transfer::linear;
+  double offset_s = 0;  // how much later than the plate its frames are stamped
+};
+
+// Where an object stands: scaled, tilted about its own x, turned about z, moved.
+struct PlacementSettings {
+  calibrate::Vec3 position;
+  double tilt_rad = 0;
+  double yaw_rad = 0;
+  double scale = 1;
+};
+
+struct ObjectSettings {
+  std::string name;
+  std::string mesh;  // file; "" = made
+  std::string made;  // "car"
+  Place place;       // of `mesh` or `made`
+  PlacementSettings pose;
+  std::vector<std::string> hide;  // parts left out, by node name
+  double emission_gain = 1;
+  // Copies in rows and columns along the object's own x and y, the first one at its pose.
+  std::array<int, 2> copies{1, 1};
+  std::array<double, 2> spacing_m{0, 0};
+};
+
+struct StandInSettings {
+  enum class Shape { plane, box, mesh };
+  std::string name;
+  Shape shape = Shape::plane;
+  calibrate::Vec3 size{1, 1, 0};  // metres; a plane has x and y
+  std::string mesh;               // file
+  Place place;
+  PlacementSettings pose;  // a plane's and a box's middle; a box stands on it
+  bool catches_shadow = true;
+  bool catches_reflection = false;
+  bool catches_light = true;
+  std::array<float, 3> albedo{0.2F, 0.2F, 0.2F};
+  float reflectance = 0.04F;
+  float roughness = 0.3F;
+  bool blocks_light = false;
+};
+
+// A virtual lamp: a point that shines to all sides.
+struct LampSettings {
+  calibrate::Vec3 position;
+  std::array<float, 3> intensity{};  // radiant intensity, in the plate's units
+};
+
+struct DisplayChoice {
+  std::string display;  // "" = compositing's default
+  std::string view;
+  Place place;
+};
+
+struct RecordSettings {
+  std::string file;      // "" = no video
+  std::string exr;       // directory; "" = no EXR
+  std::string codec;     // "" = compositing's default
+  std::string timecode;  // of the first frame; "" = 00:00:00:00
+  Place place;
+};
+
+struct Set {
+  std::string path;
+  std::string name;
+  ShowSettings show;
+  CameraSettings camera;
+  std::optional<ProbeSettings> probe;
+  std::vector<ObjectSettings> objects;
+  std::vector<StandInSettings> stand_ins;
+  std::vector<LampSettings> lamps;
+  render::Effort effort;
+  DisplayChoice display;
+  RecordSettings record;
+};
+
+// Limits that keep a set within what one machine can hold.
+inline constexpr int largest_picture_side = 16384;
+inline constexpr int most_instances = 100000;
+
+// Reads and checks a set file. Throws SetError with every fault: of syntax, keys, types, ranges,
+// files that are missing, lens and track files that cannot be read.
+Set read_set(const std::string& path);
+
+}  // namespace studio

@@ -1,0 +1,293 @@
+// Set files: the camera and the probe.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "calibrate/track.h"
+#include "studio/set_sections.h"
+
+namespace studio {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr Range metres{-farthest_m, farthest_m};
+constexpr Range exposure_range{1e-9, 3600};
+constexpr Range angle_range{-3600, 3600};
+
+// A rotation from a set's nine numbers; `position` is where the camera or probe stands.
+std::optional<calibrate::Pose> read_rotation(Section& table, calibrate::Vec3 position) {
+  std::vector<double> numbers;
+  if (!table.numbers("rotation", numbers, {9}, {-1.001, 1.001})) return std::nullopt;
+  calibrate::Mat3 rotation;
+  std::ranges::copy(numbers, rotation.m.begin());
+  try {
+    return calibrate::pose_from_rotation(rotation, position);
+  } catch (const std::invalid_argument& error) {
+    table.fault("rotation", fmt::format("cannot be used: {}", error.what()));
+    return std::nullopt;
+  }
+}
+
+void read_camera_pose(Section table, const fs::path& base, PoseSettings& pose) {
+  const int ways = int{table.has("look_at")} + int{table.has("rotation")} + int{table.has("track")};
+  if (ways != 1) {
+    table.fault("",
+                "must have exactly one of look_at = [x, y, z], rotation = [nine numbers], "
+                "track = \"poses.csv\"");
+  }
+  calibrate::Vec3 position;
+  table.vector("position", position, metres);
+  if (!table.has("track")) table.need("position", "where the camera stands, in metres");
+  double roll_deg = 0;
+  table.number("roll", roll_deg, angle_range);
+  calibrate::Vec3 target;
+  if (table.vector("look_at", target, metres)) {
+    try {
+      pose.cam_from_set = calibrate::look_at(position, target, roll_deg * degree);
+    } catch (const std::invalid_argument& error) {
+      table.fault("look_at", fmt::format("cannot be used: {}", error.what()));
+    }
+  }
+  if (const auto rotated = read_rotation(table, position)) pose.cam_from_set = *rotated;
+  if (table.file("track", base, pose.track)) {
+    try {
+      static_cast<void>(calibrate::read_track(pose.track));
+    } catch (const std::runtime_error& error) {
+      table.fault("track", fmt::format("cannot be used: {}", error.what()));
+    }
+  }
+  table.finish();
+}
+
+bool read_crop(Section& section, std::optional<std::array<int, 4>>& crop) {
+  std::array<int, 4> given{};
+  if (!section.integers("crop", given, 0, 65535)) return false;
+  if (given[2] < 1 || given[3] < 1) {
+    section.fault("crop", "must be [x, y, width, height] with width and height at least 1");
+    return false;
+  }
+  crop = given;
+  return true;
+}
+
+// The lens of the show's picture from the lens of the source's: cropped, then resized.
+void fit_lens(Section& section, const SetContext& context, CameraSettings& camera) {
+  const ShowSettings& show = context.show;
+  if (show.width < 1 || show.height < 1) return;  // a fault already
+  const std::string_view key = section.has("lens") ? "lens" : "model";
+  if (camera.crop) {
+    const auto [x, y, width, height] = *camera.crop;
+    if (x + width > camera.lens.width || y + height > camera.lens.height) {
+      section.fault("crop", fmt::format("reaches beyond the lens's picture of {}x{}",
+                                        camera.lens.width, camera.lens.height));
+      return;
+    }
+    camera.lens = calibrate::cropped(camera.lens, x, y, width, height);
+  }
+  if (camera.lens.width == show.width && camera.lens.height == show.height) return;
+  section.fault(key,
+                fmt::format("gives a picture of {}x{}, but the show is {}x{}: set camera.crop, or "
+                            "show.width and show.height",
+                            camera.lens.width, camera.lens.height, show.width, show.height));
+}
+
+void read_colour(Section& section, capture::Transfer& colour) {
+  std::string name;
+  if (!section.text("colour", name)) return;
+  try {
+    colour = capture::transfer_from_name(name);
+  } catch (const std::invalid_argument& error) {
+    section.fault("colour", fmt::format("\"{}\": {}", name, error.what()));
+  }
+}
+
+void read_match(Section& section, MatchSettings& match) {
+  const TomlValue* given = section.value("match");
+  if (given == nullptr) return;
+  if (given->kind == TomlValue::Kind::array) {
+    match.method = MatchSettings::Method::gains;
+    section.colour("match", match.gains, {1e-9, 1e9});
+  } else if (given->kind == TomlValue::Kind::table) {
+    match.method = MatchSettings::Method::patch;
+    auto table = section.table("match");
+    table->need("patch", "[x, y, width, height] of a painted spot in the picture");
+    table->need("albedo", "what the spot reflects, 0 to 1");
+    table->integers("patch", match.patch, 0, largest_picture_side);
+    if (table->has("patch") && (match.patch[2] < 1 || match.patch[3] < 1)) {
+      table->fault("patch", "must be [x, y, width, height] with width and height at least 1");
+    }
+    table->colour("albedo", match.albedo, {0.001, 1});
+    table->finish();
+  } else {
+    std::string word;
+    section.word("match", word, {"auto"});
+  }
+}
+
+void read_exposures(Section& section, std::vector<double>& exposures_s) {
+  const TomlValue* given = section.value("exposures");
+  if (given == nullptr) return;
+  if (given->kind == TomlValue::Kind::text) {
+    std::string word;
+    section.word("exposures", word, {"auto"});
+  } else {
+    section.numbers("exposures", exposures_s, {}, exposure_range);
+  }
+}
+
+void read_probe_pose(Section table, calibrate::Pose& probe_from_set) {
+  calibrate::Vec3 axis{0, 0, 1};
+  calibrate::Vec3 position;
+  double roll_deg = 0;
+  if (table.has("axis") == table.has("rotation")) {
+    table.fault("", "must have either axis = [x, y, z] or rotation = [nine numbers, set to probe]");
+  }
+  table.vector("position", position, metres);
+  table.number("roll", roll_deg, angle_range);
+  if (table.vector("axis", axis, metres)) {
+    try {
+      probe_from_set = calibrate::pose_from_axis(position, axis, roll_deg * degree);
+    } catch (const std::invalid_argument& error) {
+      table.fault("axis", fmt::format("cannot be used: {}", error.what()));
+    }
+  }
+  if (const auto rotated = read_rotation(table, position)) probe_from_set = *rotated;
+  table.finish();
+}
+
+// A list of pictures, a directory of pictures, a map, or a camera of brackets.
+void read_probe_source(Section& section, const fs::path& base, ProbeSettings& probe) {
+  section.need("source", "a map, a list or directory of shots, or a camera's URI");
+  const TomlValue* given = section.value("source");
+  if (given == nullptr) return;
+  probe.source_place = given->place;
+  if (given->kind == TomlValue::Kind::array) {
+    probe.kind = ProbeSettings::Kind::bracket;
+    if (section.texts("source", probe.shots)) {
+      for (std::string& shot : probe.shots) {
+        shot = (base / shot).lexically_normal().string();
+        if (std::error_code error; !fs::is_regular_file(shot, error)) {
+          section.fault("source", fmt::format("names {}, which is not a file", shot));
+        }
+      }
+      if (probe.shots.empty()) section.fault("source", "lists no shots");
+    }
+    return;
+  }
+  if (!read_source_key(section, "source", base, probe.source)) return;
+  const std::string path = probe.source.starts_with("file:") ? probe.source.substr(5) : "";
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    probe.kind = ProbeSettings::Kind::bracket;
+    for (const auto& entry : fs::directory_iterator(path, error)) {
+      if (entry.is_regular_file(error)) probe.shots.push_back(entry.path().string());
+    }
+    std::ranges::sort(probe.shots);
+    if (probe.shots.empty()) section.fault("source", fmt::format("{} holds no files", path));
+  } else if (path.empty()) {
+    probe.kind = ProbeSettings::Kind::camera;
+  }
+}
+
+}  // namespace
+
+bool read_source_key(Section& section,
+                     std::string_view key,
+                     const fs::path& base,
+                     std::string& uri) {
+  std::string given;
+  if (!section.text(key, given)) return false;
+  const std::size_t colon = given.find(':');
+  std::string scheme = colon == std::string::npos ? "file" : given.substr(0, colon);
+  const std::string rest = colon == std::string::npos ? given : given.substr(colon + 1);
+  if (scheme != "file" && scheme != "replay") {
+    uri = given;
+    return true;
+  }
+  const fs::path path = (base / rest).lexically_normal();
+  // A sequence is found when it is opened: here, only that its directory is there.
+  const bool sequence = path.filename().string().find('%') != std::string::npos;
+  std::error_code error;
+  if (!fs::exists(sequence ? path.parent_path() : path, error)) {
+    section.fault(key, fmt::format("names {}, which does not exist", path.string()));
+    return false;
+  }
+  uri = scheme + ":" + path.string();
+  return true;
+}
+
+CameraSettings read_camera_section(Section section, const SetContext& context) {
+  CameraSettings camera;
+  section.need("source", "the plate: a file or a camera's URI");
+  camera.source_place = section.place_of("source");
+  read_source_key(section, "source", context.base, camera.source);
+  const bool cropped = section.has("crop");
+  read_crop(section, camera.crop);
+  std::int64_t frame = 0;
+  if (section.integer("frame", frame, std::int64_t{0}, std::int64_t{1} << 40)) camera.frame = frame;
+  read_colour(section, camera.colour);
+  section.file("response", context.base, camera.response);
+  double exposure_s = 0;
+  if (section.number("exposure_s", exposure_s, exposure_range)) camera.exposure_s = exposure_s;
+  section.boolean("loop", camera.loop);
+
+  const ShowSettings& show = context.show;
+  const std::array<int, 2> size = cropped ? std::array{0, 0} : std::array{show.width, show.height};
+  if (auto lens = read_lens_key(section, size, context.base)) {
+    camera.lens = *lens;
+    fit_lens(section, context, camera);
+  } else if (context.has_scene && !section.has("lens") && !section.has("model")) {
+    section.need("lens", "objects are seen through it: a file, or model and focal_px");
+  }
+
+  camera.pose_place = section.place_of("pose");
+  if (context.has_scene) section.need("pose", "where the camera is in the set");
+  if (auto table = section.table("pose")) read_camera_pose(*table, context.base, camera.pose);
+  section.finish();
+  return camera;
+}
+
+ProbeSettings read_probe_section(Section section, const SetContext& context) {
+  ProbeSettings probe;
+  read_probe_source(section, context.base, probe);
+  const bool is_map = probe.kind == ProbeSettings::Kind::map;
+
+  const TomlValue* lens = section.value("lens");
+  const bool latlong =
+      lens != nullptr && lens->kind == TomlValue::Kind::text && lens->text == "latlong";
+  if (!latlong) probe.lens = read_lens_key(section, {0, 0}, context.base);
+  if (!is_map && lens == nullptr && !section.has("model")) {
+    section.need("lens", "how the probe sees: a file, a table, or \"latlong\"");
+  }
+  if (auto table = section.table("pose")) read_probe_pose(*table, probe.probe_from_set);
+  if (!is_map && !latlong) section.need("pose", "how the probe is turned");
+  if (double yaw_deg = 0; section.number("yaw", yaw_deg, angle_range)) {
+    probe.yaw_rad = yaw_deg * degree;
+  }
+
+  read_exposures(section, probe.exposures_s);
+  if (!probe.exposures_s.empty() && !probe.shots.empty() &&
+      probe.exposures_s.size() != probe.shots.size()) {
+    section.fault("exposures", fmt::format("has {} times for {} shots", probe.exposures_s.size(),
+                                           probe.shots.size()));
+  }
+  std::string unseen = "floor";
+  section.word("unseen", unseen, {"floor", "mirror", "mean"});
+  probe.unseen = unseen == "mirror" ? render::Unseen::mirror
+                 : unseen == "mean" ? render::Unseen::mean
+                                    : render::Unseen::floor;
+  read_match(section, probe.match);
+  section.numbers("vignetting", probe.vignetting, {1, 2, 3, 4}, {-1e3, 1e3});
+  section.file("response", context.base, probe.response);
+  read_colour(section, probe.colour);
+  section.number("offset_s", probe.offset_s, {-60, 60});
+  section.finish();
+  return probe;
+}
+
+}  // namespace studio

@@ -1,0 +1,118 @@
+// Set files: objects, stand-ins, lamps.
+#include <algorithm>
+#include <numbers>
+
+#include <fmt/format.h>
+
+#include "studio/set_sections.h"
+
+namespace studio {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr Range metres{-farthest_m, farthest_m};
+constexpr Range size_range{1e-6, farthest_m};
+constexpr Range share{0, 1};
+
+PlacementSettings read_placement(Section table) {
+  PlacementSettings placement;
+  table.vector("position", placement.position, metres);
+  double tilt_deg = 0;
+  double yaw_deg = 0;
+  table.number("tilt", tilt_deg, {-360, 360});
+  table.number("yaw", yaw_deg, {-3600, 3600});
+  placement.tilt_rad = tilt_deg * degree;
+  placement.yaw_rad = yaw_deg * degree;
+  table.number("scale", placement.scale, size_range);
+  table.finish();
+  return placement;
+}
+
+void read_copies(Section& section, ObjectSettings& object) {
+  std::array<int, 2> copies{};
+  if (section.integers("copies", copies, 1, most_instances)) {
+    const std::int64_t instances = std::int64_t{copies[0]} * copies[1];
+    if (instances > most_instances) {
+      section.fault("copies", fmt::format("asks for {} instances, but a set holds at most {}",
+                                          instances, most_instances));
+    } else {
+      object.copies = copies;
+    }
+    section.need("spacing", "metres between copies, along x and y");
+  }
+  std::vector<double> spacing;
+  if (section.numbers("spacing", spacing, {2}, metres)) {
+    object.spacing_m = {spacing[0], spacing[1]};
+  }
+}
+
+bool holds(const std::vector<std::string>& words, std::string_view word) {
+  return std::ranges::find(words, word) != words.end();
+}
+
+}  // namespace
+
+ObjectSettings read_object_section(Section section, const SetContext& context) {
+  ObjectSettings object;
+  section.text("name", object.name);
+  if (section.has("mesh") == section.has("made")) {
+    section.fault("", "must have either mesh = \"FILE\" or made = \"car\"");
+  }
+  object.place = section.place_of(section.has("mesh") ? "mesh" : "made");
+  section.file("mesh", context.base, object.mesh);
+  section.word("made", object.made, {"car"});
+  if (auto table = section.table("pose")) object.pose = read_placement(*table);
+  section.texts("hide", object.hide);
+  section.number("emission_gain", object.emission_gain, {0, 1e9});
+  read_copies(section, object);
+  section.finish();
+  return object;
+}
+
+StandInSettings read_stand_in_section(Section section, const SetContext& context) {
+  StandInSettings stand_in;
+  section.text("name", stand_in.name);
+  std::string shape = "plane";
+  section.word("shape", shape, {"plane", "box", "mesh"});
+  stand_in.place = section.place_of(section.has("mesh") ? "mesh" : "shape");
+  std::vector<double> size;
+  if (shape == "plane") {
+    stand_in.shape = StandInSettings::Shape::plane;
+    section.need("size", "[x, y] of the plane in metres");
+    section.numbers("size", size, {2}, size_range);
+  } else if (shape == "box") {
+    stand_in.shape = StandInSettings::Shape::box;
+    section.need("size", "[x, y, z] of the box in metres");
+    section.numbers("size", size, {3}, size_range);
+  } else {
+    stand_in.shape = StandInSettings::Shape::mesh;
+    section.need("mesh", "the file of the mesh");
+    section.file("mesh", context.base, stand_in.mesh);
+  }
+  if (size.size() >= 2) stand_in.size = {size[0], size[1], size.size() == 3 ? size[2] : 0};
+  if (auto table = section.table("pose")) stand_in.pose = read_placement(*table);
+
+  std::vector<std::string> catches{"shadow", "light"};
+  section.words("catches", catches, {"shadow", "reflection", "light"});
+  stand_in.catches_shadow = holds(catches, "shadow");
+  stand_in.catches_reflection = holds(catches, "reflection");
+  stand_in.catches_light = holds(catches, "light");
+  section.colour("albedo", stand_in.albedo, share);
+  section.number("reflectance", stand_in.reflectance, share);
+  section.number("roughness", stand_in.roughness, share);
+  section.boolean("blocks_light", stand_in.blocks_light);
+  section.finish();
+  return stand_in;
+}
+
+LampSettings read_lamp_section(Section section) {
+  LampSettings lamp;
+  section.need("position", "where the lamp is, in metres");
+  section.need("intensity", "what it shines: a number, or one for each colour");
+  section.vector("position", lamp.position, metres);
+  section.colour("intensity", lamp.intensity, {0, 1e9});
+  section.finish();
+  return lamp;
+}
+
+}  // namespace studio
