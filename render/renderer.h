@@ -9,11 +9,14 @@
 
 namespace render {
 
+class KeptVisibility;
+
 // What a FrameJob's numbers stand for on this machine. All of it must outlive the call.
 struct FrameInputs {
   const Scene* scene = nullptr;
   const calibrate::DirectionTable* directions = nullptr;  // of the job's lens; its size is the picture's
   const Environment* environment = nullptr;               // of the job's time, match applied, smoothed
+  KeptVisibility* kept_visibility = nullptr;              // a cache, or null: the same bits, slower
 };
 
 struct FrameResult {

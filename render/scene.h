@@ -16,6 +16,8 @@ struct RTCDeviceTy;
 
 namespace render {
 
+class Shader;
+
 enum class ObjectKind : std::uint8_t { virtual_object = 0, stand_in = 1 };
 
 // Embree ray masks.
@@ -37,6 +39,7 @@ struct SceneDescription {
   std::vector<std::shared_ptr<const Texture>> textures;
   std::vector<Material> materials;
   std::vector<Instance> instances;
+  std::string background = "environment";  // background shader: what camera rays see at the end
   std::uint64_t version = 0;
 };
 
@@ -73,18 +76,27 @@ class Scene {
   Scene& operator=(const Scene&) = delete;
 
   const SceneDescription& description() const;
+  // Differs between any two scenes of this process.
+  std::uint64_t id() const;
   RTCSceneTy* embree() const;
   // The point that Embree's ids and barycentric u, v name. `incoming` is the ray's direction.
   HitPoint hit_point(unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v,
                      Vec3f incoming) const;
   // Instance that Embree's ids name, without the rest.
   std::uint32_t instance_of(unsigned geom_id, unsigned inst_id) const;
+  const Shader& shader_of(std::uint32_t material) const;
+  // Whether any stand-in blocks light; whether any surface lets some through.
+  bool has_real_blockers() const;
+  bool has_filters() const;
   // Bounds in the set: of all virtual objects; of everything. Empty: lower > upper.
   struct Bounds {
     Vec3f lower, upper;
   };
   Bounds virtual_bounds() const;
   Bounds bounds() const;
+  // Of all that blocks light (virtual objects, real blockers), and a few tighter boxes that hold it.
+  Bounds blocker_bounds() const;
+  const std::vector<Bounds>& blocker_boxes() const;
   std::size_t skipped_triangles() const;
 
  private:

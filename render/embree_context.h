@@ -1,0 +1,25 @@
+// Embree's ray context with ours behind it. Private to render: includes Embree.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include "render/shader.h"
+
+namespace render {
+
+// `context` must be the first member: filters get a pointer to it.
+struct TraceContext {
+  RTCIntersectContext context;
+  RayKind kind = RayKind::camera;
+  // Shadow rays: per ray id, share of light so far. Null: any surface that is not a hole blocks.
+  float* transmittance_r = nullptr;
+  float* transmittance_g = nullptr;
+  float* transmittance_b = nullptr;
+
+  TraceContext(RayKind ray_kind, bool coherent) : kind(ray_kind) {
+    rtcInitIntersectContext(&context);
+    context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  }
+};
+
+}  // namespace render

@@ -1,0 +1,53 @@
+// The tile kernel: rays in wavefronts over 16x16 cells.
+#pragma once
+
+#include <memory>
+
+#include "render/light_gather.h"
+#include "render/ray_log.h"
+#include "render/renderer.h"
+#include "render/shader.h"
+
+namespace render {
+
+// What all tiles of one frame share, made once per frame.
+struct FrameContext {
+  FrameInputs inputs;
+  const FrameJob* job = nullptr;
+  LightContext light;
+  std::array<float, 9> set_from_cam{};  // rotation
+  Vec3f camera;                         // its position in the set
+  float pixel_angle = 0;                // radians across a pixel at the picture's centre
+  const BackgroundShader* background = nullptr;
+};
+// Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not finite).
+FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job);
+
+// All memory that rendering tiles takes on one thread. Nothing else is allocated in the tile loop.
+class TileWorkspace {
+ public:
+  TileWorkspace();
+  ~TileWorkspace();
+  TileWorkspace(TileWorkspace&&) noexcept;
+  TileWorkspace& operator=(TileWorkspace&&) noexcept;
+  // Keeps every ray from now on in `log`; null stops that.
+  void log_rays(RayLog* log);
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+// Makes a tile's job: its slice of the plate with a margin. `job`'s buffer is used again.
+void cut_tile(const capture::HalfImage& plate, Rect rect, int margin, TileJob& job);
+
+// Renders one tile. `result` must have been sized by size_result. Its bits depend on the frame and the
+// pixels only, not on how they are cut into tiles.
+void render_tile(const FrameContext& context,
+                 const TileJob& tile,
+                 TileWorkspace& workspace,
+                 TileResult& result);
+void size_result(const Rect& rect, TileResult& result);
+
+}  // namespace render

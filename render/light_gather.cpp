@@ -1,0 +1,539 @@
+// Who sees which light.
+#include "render/light_gather.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+#include "render/embree_context.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+constexpr std::uint64_t block4 = 0x000F000F000F000FULL;  // columns 0-3 of a word's four rows
+constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 of its first two rows
+
+int bit_of(int x, int y) { return (y & 3) * 16 + x; }
+int point_of(int word, int bit) { return word * 64 + bit; }
+
+float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+
+// Which of the four words' pixels face the light, in both their normals.
+CellMask facing(const Receivers& r, Vec3f l) {
+  CellMask mask{};
+#if defined(__AVX2__)
+  const __m256 lx = _mm256_set1_ps(l.x), ly = _mm256_set1_ps(l.y), lz = _mm256_set1_ps(l.z);
+  const __m256 zero = _mm256_setzero_ps();
+  const auto dot8 = [&](const auto& x, const auto& y, const auto& z, std::size_t k) {
+    return _mm256_add_ps(
+        _mm256_add_ps(_mm256_mul_ps(_mm256_load_ps(&x[k]), lx),
+                      _mm256_mul_ps(_mm256_load_ps(&y[k]), ly)),
+        _mm256_mul_ps(_mm256_load_ps(&z[k]), lz));
+  };
+  for (std::size_t k = 0; k < cell_pixels; k += 8) {
+    const __m256 n = _mm256_cmp_ps(dot8(r.nx, r.ny, r.nz, k), zero, _CMP_GT_OQ);
+    const __m256 g = _mm256_cmp_ps(dot8(r.gx, r.gy, r.gz, k), zero, _CMP_GT_OQ);
+    const auto bits = static_cast<std::uint64_t>(
+        static_cast<unsigned>(_mm256_movemask_ps(_mm256_and_ps(n, g))));
+    mask[k / 64] |= bits << (k % 64);
+  }
+#else
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const float n = r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
+    const float g = r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z;
+    if (n > 0 && g > 0) mask[k / 64] |= std::uint64_t{1} << (k % 64);
+  }
+#endif
+  for (std::size_t w = 0; w < 4; ++w) mask[w] &= r.active[w];
+  return mask;
+}
+
+// open += irradiance of one light at all pixels that it faces.
+void add_open(Receivers& r, const DirectionalLight& light) {
+  const Vec3f l = light.direction, e = light.irradiance;
+  alignas(64) std::array<float, cell_pixels> cosine;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const float n = r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
+    const float g = r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z;
+    cosine[k] = (n > 0 && g > 0) ? n : 0.0F;
+  }
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    r.open_r[k] += cosine[k] * e.x;
+    r.open_g[k] += cosine[k] * e.y;
+    r.open_b[k] += cosine[k] * e.z;
+  }
+}
+
+float cosine_at(const Receivers& r, std::size_t k, Vec3f l) {
+  return r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
+}
+
+void add_lost(Receivers& r, std::size_t k, const DirectionalLight& light, Vec3f share) {
+  const float cosine = cosine_at(r, k, light.direction);
+  r.lost_r[k] += cosine * light.irradiance.x * share.x;
+  r.lost_g[k] += cosine * light.irradiance.y * share.y;
+  r.lost_b[k] += cosine * light.irradiance.z * share.z;
+}
+
+void subtract_open(Receivers& r, std::size_t k, const DirectionalLight& light) {
+  const float cosine = cosine_at(r, k, light.direction);
+  r.open_r[k] -= cosine * light.irradiance.x;
+  r.open_g[k] -= cosine * light.irradiance.y;
+  r.open_b[k] -= cosine * light.irradiance.z;
+}
+
+void add_ray(GatherWorkspace& w,
+             const Receivers& r,
+             std::size_t point,
+             std::uint32_t light,
+             Vec3f direction,
+             unsigned mask) {
+  const auto i = static_cast<std::size_t>(w.rays++);
+  w.ox[i] = r.px[point], w.oy[i] = r.py[point], w.oz[i] = r.pz[point];
+  w.dx[i] = direction.x, w.dy[i] = direction.y, w.dz[i] = direction.z;
+  w.mask[i] = mask;
+  w.ray_light[i] = light;
+  w.ray_point[i] = static_cast<std::uint32_t>(point);
+}
+
+// Shoots the stream's rays. Afterwards far_m < 0 marks what is blocked; tr, tg, tb what glass let by.
+void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics) {
+  const auto n = static_cast<unsigned>(w.rays);
+  TraceContext context(RayKind::shadow, false);
+  for (unsigned i = 0; i < n; ++i) {
+    w.near_m[i] = 0, w.far_m[i] = ray_far, w.time[i] = 0, w.id[i] = i, w.flags[i] = 0;
+  }
+  if (scene.has_filters()) {
+    for (unsigned i = 0; i < n; ++i) w.tr[i] = w.tg[i] = w.tb[i] = 1;
+    context.transmittance_r = w.tr.data();
+    context.transmittance_g = w.tg.data();
+    context.transmittance_b = w.tb.data();
+  }
+  if (w.log) {
+    w.log->add(true, false,
+               {w.ox.data(), w.oy.data(), w.oz.data(), w.dx.data(), w.dy.data(), w.dz.data(),
+                w.near_m.data(), w.far_m.data()},
+               w.mask.data(), n);
+  }
+  RTCRayNp rays{w.ox.data(), w.oy.data(), w.oz.data(), w.near_m.data(), w.dx.data(), w.dy.data(),
+                w.dz.data(), w.time.data(), w.far_m.data(), w.mask.data(), w.id.data(),
+                w.flags.data()};
+  rtcOccludedNp(scene.embree(), &context.context, &rays, n);
+  statistics.shadow_rays += n;
+}
+
+// Calls visit(point, light, blocked, share that passes) for every ray of the stream, and empties it.
+template <class F>
+void flush(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics, F&& visit) {
+  if (w.rays == 0) return;
+  shoot(scene, w, statistics);
+  const bool tinted = scene.has_filters();
+  for (std::size_t i = 0; i < static_cast<std::size_t>(w.rays); ++i) {
+    const bool blocked = w.far_m[i] < 0;
+    const Vec3f share = tinted ? Vec3f{w.tr[i], w.tg[i], w.tb[i]} : Vec3f{1, 1, 1};
+    visit(w.ray_point[i], w.ray_light[i], blocked, share);
+  }
+  w.rays = 0;
+}
+
+// Marks the blocks of a cell that are one smooth surface.
+void find_smooth_blocks(const Receivers& r, GatherWorkspace& w) {
+  const auto alike = [&r](std::size_t a, std::size_t b) {
+    return r.surface[a] == r.surface[b] &&
+           r.nx[a] * r.nx[b] + r.ny[a] * r.ny[b] + r.nz[a] * r.nz[b] > 0.93F;
+  };
+  w.same4 = w.same2 = {};
+  for (int by = 0; by < cell_size; by += 2) {
+    for (int bx = 0; bx < cell_size; bx += 2) {
+      const auto k = static_cast<std::size_t>(by * cell_size + bx);
+      const std::uint64_t bits = block2 << bit_of(bx, by);
+      if ((r.active[k / 64] & bits) != bits) continue;
+      if (alike(k, k + 1) && alike(k, k + cell_size) && alike(k, k + cell_size + 1)) {
+        w.same2[k / 64] |= bits;
+      }
+    }
+  }
+  for (int by = 0; by < cell_size; by += 4) {
+    for (int bx = 0; bx < cell_size; bx += 4) {
+      const auto k = static_cast<std::size_t>(by * cell_size + bx);
+      const std::uint64_t bits = block4 << bx;
+      if ((w.same2[k / 64] & bits) != bits) continue;
+      if (alike(k, k + 3) && alike(k, k + 3 * cell_size) && alike(k, k + 3 * cell_size + 3) &&
+          alike(k, k + cell_size + 2)) {
+        w.same4[k / 64] |= bits;
+      }
+    }
+  }
+}
+
+struct Box {
+  Vec3f centre, half;
+};
+
+// Whether anything in `bounds` can lie between a point of `box` and a light in direction l.
+bool may_block(const Scene::Bounds& bounds, const Box& box, Vec3f l) {
+  float near_t = 0, far_t = ray_far;
+  const auto slab = [&](float lower, float upper, float centre, float half, float d) {
+    lower -= centre + half;
+    upper -= centre - half;
+    if (std::abs(d) < 1e-12F) return lower <= 0 && upper >= 0;
+    const float a = lower / d, b = upper / d;
+    near_t = std::max(near_t, std::min(a, b));
+    far_t = std::min(far_t, std::max(a, b));
+    return near_t <= far_t;
+  };
+  return slab(bounds.lower.x, bounds.upper.x, box.centre.x, box.half.x, l.x) &&
+         slab(bounds.lower.y, bounds.upper.y, box.centre.y, box.half.y, l.y) &&
+         slab(bounds.lower.z, bounds.upper.z, box.centre.z, box.half.z, l.z);
+}
+
+Box box_of(const Receivers& r) {
+  Vec3f lower{ray_far, ray_far, ray_far}, upper = -lower;
+  for (std::size_t word = 0; word < 4; ++word) {
+    for (std::uint64_t bits = r.active[word]; bits != 0; bits &= bits - 1) {
+      const std::size_t k = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
+      lower = {std::min(lower.x, r.px[k]), std::min(lower.y, r.py[k]), std::min(lower.z, r.pz[k])};
+      upper = {std::max(upper.x, r.px[k]), std::max(upper.y, r.py[k]), std::max(upper.z, r.pz[k])};
+    }
+  }
+  return {(lower + upper) * 0.5F, (upper - lower) * 0.5F};
+}
+
+bool can_be_blocked(const LightContext& context, const Box& box, Vec3f l) {
+  if (!context.effort->cull_lights) return true;
+  const auto& boxes = context.scene->blocker_boxes();
+  return may_block(context.scene->blocker_bounds(), box, l) &&
+         std::any_of(boxes.begin(), boxes.end(),
+                     [&](const Scene::Bounds& b) { return may_block(b, box, l); });
+}
+
+// Pixels of one light whose visibility must be tested: see gather_cell.
+class CellVisibility {
+ public:
+  CellVisibility(const LightContext& context,
+                 const Receivers& r,
+                 GatherWorkspace& w,
+                 RenderStatistics& statistics,
+                 unsigned ray_mask)
+      : context_(context), r_(r), w_(w), statistics_(statistics), ray_mask_(ray_mask) {}
+
+  // Fills w.seen for lights first .. first + count - 1 from w.lit; tints what glass weakens.
+  void find(std::uint32_t first, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      w_.seen[i] = w_.lit[i];
+      w_.tested[i] = {};
+      if (skip_[i]) continue;
+      test_first(first, i);
+    }
+    shoot_rest(first);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!skip_[i]) refine(first, i);
+    }
+    shoot_rest(first);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!skip_[i]) spread(i, block_[i]);
+    }
+  }
+
+  std::array<bool, GatherWorkspace::group> skip_{};  // lights that nothing can block here
+
+ private:
+  static std::uint64_t bit(int k) { return std::uint64_t{1} << k; }
+
+  void test(std::uint32_t first, std::size_t i, int word, int k) {
+    const auto wi = static_cast<std::size_t>(word);
+    if (w_.tested[i][wi] & bit(k)) return;
+    w_.tested[i][wi] |= bit(k);
+    const auto point = static_cast<std::size_t>(point_of(word, k));
+    const auto light = first + static_cast<std::uint32_t>(i);
+    const unsigned mask = ray_mask_ ? ray_mask_ : r_.mask[point];
+    add_ray(w_, r_, point, light, context_.table->lights[light].direction, mask);
+    if (w_.rays == stream_rays) shoot_rest(first);
+  }
+
+  void shoot_rest(std::uint32_t first) {
+    flush(*context_.scene, w_, statistics_,
+          [&](std::uint32_t point, std::uint32_t light, bool blocked, Vec3f share) {
+            const std::size_t i = light - first;
+            if (blocked) {
+              w_.seen[i][point / 64] &= ~bit(static_cast<int>(point % 64));
+            } else if (share != Vec3f{1, 1, 1} && w_.tints.size() < w_.tints.capacity()) {
+              w_.tints.push_back({light, point, Vec3f{1, 1, 1} - share});
+              tinted_[i][point / 64] |= bit(static_cast<int>(point % 64));
+            }
+          });
+  }
+
+  // The pixel that stands for a block: another one for each light.
+  static int offset4(std::uint32_t light) {
+    const std::uint32_t o = (light * 7 + light / 16) & 15;
+    return bit_of(static_cast<int>(o & 3), static_cast<int>(o >> 2));
+  }
+  static int offset2(std::uint32_t light) {
+    return bit_of(static_cast<int>(light & 1), static_cast<int>((light >> 1) & 1));
+  }
+
+  void test_first(std::uint32_t first, std::size_t i) {
+    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    block_[i] = context_.light_block[light];
+    const bool coarse = context_.effort->adaptive_visibility || block_[i] == 4;
+    for (int word = 0; word < 4; ++word) {
+      const auto wi = static_cast<std::size_t>(word);
+      const std::uint64_t lit = w_.lit[i][wi];
+      std::uint64_t rest = lit;
+      if (coarse) {
+        for (int bx = 0; bx < cell_size; bx += 4) {
+          const std::uint64_t bits = block4 << bx;
+          if ((lit & w_.same4[wi] & bits) != bits) continue;
+          test(first, i, word, offset4(light) + bx);
+          rest &= ~bits;
+        }
+      }
+      test_pixels(first, i, word, rest, block_[i]);
+    }
+  }
+
+  // Tests pixels one by one, or one of each smooth 2x2 block.
+  void test_pixels(std::uint32_t first, std::size_t i, int word, std::uint64_t pixels, int block) {
+    const auto wi = static_cast<std::size_t>(word);
+    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    if (block >= 2) {
+      const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
+      for (std::uint64_t left = pixels; left != 0;) {
+        const int k = std::countr_zero(left);
+        const int corner = (k / 32) * 32 + (k % 16) / 2 * 2;
+        const std::uint64_t bits = block2 << corner;
+        left &= ~bits;
+        if ((smooth & bits) != bits) continue;
+        test(first, i, word, corner + offset2(light));
+        pixels &= ~bits;
+      }
+    }
+    for (; pixels != 0; pixels &= pixels - 1) test(first, i, word, std::countr_zero(pixels));
+  }
+
+  // Where a block's pixel disagrees with those of the blocks around it, looks closer.
+  void refine(std::uint32_t first, std::size_t i) {
+    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    const bool coarse = context_.effort->adaptive_visibility || block_[i] == 4;
+    if (!coarse) return;
+    // 4 x 4 flags of blocks: bit by * 4 + bx.
+    unsigned whole = 0, sees = 0, tinted = 0;
+    for (int by = 0; by < 4; ++by) {
+      const auto wi = static_cast<std::size_t>(by);
+      for (int bx = 0; bx < 4; ++bx) {
+        const std::uint64_t bits = block4 << (4 * bx);
+        if ((w_.lit[i][wi] & w_.same4[wi] & bits) != bits) continue;
+        whole |= 1U << (by * 4 + bx);
+        const std::uint64_t tested = bit(offset4(light) + 4 * bx);
+        if (w_.seen[i][wi] & tested) sees |= 1U << (by * 4 + bx);
+        if (tinted_[i][wi] & tested) tinted |= 1U << (by * 4 + bx);
+      }
+    }
+    const auto grown = [](unsigned f) {
+      const unsigned rows = f | (f << 4) | (f >> 4);
+      return (rows | ((rows & 0x7777U) << 1) | ((rows & 0xEEEEU) >> 1)) & 0xFFFFU;
+    };
+    const unsigned hidden = whole & ~sees;
+    const unsigned differ = (grown(hidden) & sees) | (grown(sees) & hidden) | grown(tinted);
+    for (int by = 0; by < 4; ++by) {
+      const auto wi = static_cast<std::size_t>(by);
+      for (int bx = 0; bx < 4; ++bx) {
+        const unsigned flag = 1U << (by * 4 + bx);
+        if (!(whole & flag)) continue;
+        const std::uint64_t bits = block4 << (4 * bx);
+        if (!(differ & flag) || block_[i] == 4) {
+          if (!(sees & flag)) w_.seen[i][wi] &= ~bits;
+          continue;
+        }
+        test_pixels(first, i, by, bits, block_[i]);
+      }
+    }
+  }
+
+  // Gives a 2x2 block's answer to its four pixels.
+  void spread(std::size_t i, int block) {
+    if (block < 2) return;
+    for (std::size_t wi = 0; wi < 4; ++wi) {
+      const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
+      std::uint64_t left = smooth & w_.tested[i][wi] & ~w_.seen[i][wi];
+      for (; left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
+        const std::uint64_t bits = block2 << ((k / 32) * 32 + (k % 16) / 2 * 2);
+        if ((smooth & bits) == bits) w_.seen[i][wi] &= ~(bits & ~(w_.tested[i][wi]));
+      }
+    }
+  }
+
+  const LightContext& context_;
+  const Receivers& r_;
+  GatherWorkspace& w_;
+  RenderStatistics& statistics_;
+  unsigned ray_mask_;
+  std::array<int, GatherWorkspace::group> block_{};
+  std::array<CellMask, GatherWorkspace::group> tinted_{};
+};
+
+void clear_sums(Receivers& r) {
+  r.open_r.fill(0), r.open_g.fill(0), r.open_b.fill(0);
+  r.lost_r.fill(0), r.lost_g.fill(0), r.lost_b.fill(0);
+}
+
+}  // namespace
+
+LightContext make_light_context(const Scene& scene, const LightTable& table, const Effort& effort) {
+  LightContext context{&scene, &table, &effort, {}};
+  float total = 0;
+  for (const DirectionalLight& light : table.lights) total += largest(light.irradiance);
+  const auto n = static_cast<float>(table.lights.size());
+  for (const DirectionalLight& light : table.lights) {
+    // A light twice as heavy as the mean is looked at twice as closely, in steps of two.
+    const float weight = total > 0 ? largest(light.irradiance) / total * n : 0;
+    const int finer = weight <= 2 ? 1 : weight <= 8 ? 2 : 4;
+    context.light_block.push_back(static_cast<std::uint8_t>(std::max(1, effort.interleave / finer)));
+  }
+  return context;
+}
+
+bool gather_cell(const LightContext& context,
+                 Receivers& r,
+                 GatherWorkspace& w,
+                 const CellMemory& memory,
+                 RenderStatistics& statistics) {
+  clear_sums(r);
+  if (!memory.kept) find_smooth_blocks(r, w);
+  const auto& lights = context.table->lights;
+  const Box box = box_of(r);
+  const bool real = context.scene->has_real_blockers();
+  CellMask real_first{};
+  if (real) {
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      if (r.real_first[k]) real_first[k / 64] |= std::uint64_t{1} << (k % 64);
+    }
+    for (std::size_t word = 0; word < 4; ++word) real_first[word] &= r.active[word];
+  }
+  const bool any_real_first = real_first != CellMask{};
+  bool complete = memory.room != nullptr && !any_real_first;
+
+  for (std::size_t first = 0; first < lights.size(); first += GatherWorkspace::group) {
+    const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lights.size() - first);
+    const auto first32 = static_cast<std::uint32_t>(first);
+    w.tints.clear();
+    std::array<bool, GatherWorkspace::group> skip{};
+    for (std::size_t i = 0; i < count; ++i) {
+      const DirectionalLight& light = lights[first + i];
+      w.lit[i] = facing(r, light.direction);
+      add_open(r, light);
+      if (memory.kept) continue;
+      skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, light.direction);
+    }
+    if (any_real_first) {
+      // Light that real things block is not there to be lost.
+      CellVisibility behind(context, r, w, statistics, mask_real_blocker);
+      behind.skip_ = skip;
+      behind.find(first32, count);
+      w.tints.clear();
+      for (std::size_t i = 0; i < count; ++i) {
+        for (std::size_t word = 0; word < 4; ++word) {
+          const std::uint64_t hidden = w.lit[i][word] & ~w.seen[i][word] & real_first[word];
+          for (std::uint64_t bits = hidden; bits != 0; bits &= bits - 1) {
+            const auto k = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
+            subtract_open(r, k, lights[first + i]);
+          }
+          w.lit[i][word] &= ~hidden;
+        }
+      }
+    }
+    if (memory.kept) {
+      std::copy_n(memory.kept + first, count, w.seen.begin());
+    } else {
+      CellVisibility visibility(context, r, w, statistics, 0);
+      visibility.skip_ = skip;
+      visibility.find(first32, count);
+      complete &= w.tints.empty();
+      if (complete) std::copy_n(w.seen.begin(), count, memory.room + first);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t word = 0; word < 4; ++word) {
+        for (std::uint64_t bits = w.lit[i][word] & ~w.seen[i][word]; bits != 0; bits &= bits - 1) {
+          const auto k = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
+          add_lost(r, k, lights[first + i], {1, 1, 1});
+        }
+      }
+    }
+    for (const auto& tint : w.tints) add_lost(r, tint.point, lights[tint.light], tint.lost_share);
+  }
+  return complete;
+}
+
+void gather_points(const LightContext& context,
+                   Receivers& r,
+                   GatherWorkspace& w,
+                   RenderStatistics& statistics) {
+  clear_sums(r);
+  const auto& lights = context.table->lights;
+  const bool real = context.scene->has_real_blockers();
+  const auto stride_of = [&](std::size_t k) -> std::uint32_t {
+    if (context.effort->interleave == 1 || r.share[k] >= 0.5F) return 1;
+    return r.share[k] >= 0.2F ? 2 : r.share[k] >= 0.05F ? 4 : 8;
+  };
+  const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
+    if (!blocked && share == Vec3f{1, 1, 1}) return;
+    const Vec3f lost = blocked ? Vec3f{1, 1, 1} : Vec3f{1, 1, 1} - share;
+    add_lost(r, k, lights[i], lost * static_cast<float>(stride_of(k)));
+  };
+  for (std::uint32_t i = 0; i < lights.size(); ++i) {
+    const Vec3f l = lights[i].direction;
+    for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
+      const std::uint32_t stride = stride_of(k);
+      if ((i + k) % stride != 0) continue;
+      const float cosine = cosine_at(r, k, l);
+      if (!(cosine > 0) || !(r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0)) continue;
+      if (real && r.real_first[k]) {
+        const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
+        ++statistics.shadow_rays;
+        if (transmittance(*context.scene, origin, l, 0, ray_far, mask_real_blocker) == Vec3f{}) {
+          continue;
+        }
+      }
+      const float weight = cosine * static_cast<float>(stride);
+      r.open_r[k] += weight * lights[i].irradiance.x;
+      r.open_g[k] += weight * lights[i].irradiance.y;
+      r.open_b[k] += weight * lights[i].irradiance.z;
+      add_ray(w, r, k, i, l, r.mask[k]);
+      if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
+    }
+  }
+  flush(*context.scene, w, statistics, visit);
+}
+
+Vec3f gather_lamps(const LightContext& context,
+                   Vec3f origin,
+                   Vec3f normal,
+                   Vec3f geometric_normal,
+                   unsigned mask,
+                   RenderStatistics& statistics) {
+  Vec3f sum;
+  for (const LocalLight& lamp : context.table->lamps) {
+    const Vec3f to = lamp.position - origin;
+    const float distance = length(to);
+    if (!(distance > 1e-6F)) continue;
+    const Vec3f l = to * (1 / distance);
+    const float cosine = dot(normal, l);
+    if (!(cosine > 0) || !(dot(geometric_normal, l) > 0)) continue;
+    const float facing_lamp = lamp.normal == Vec3f{} ? 1.0F : -dot(lamp.normal, l);
+    if (!(facing_lamp > 0)) continue;
+    const Vec3f share =
+        transmittance(*context.scene, origin, l, 0, distance * (1 - 1e-3F), mask);
+    ++statistics.shadow_rays;
+    sum += lamp.intensity * share * (cosine * facing_lamp / (distance * distance));
+  }
+  return sum;
+}
+
+}  // namespace render

@@ -1,0 +1,96 @@
+// Irradiance from the light table at batches of points: who sees which light. Private to the kernel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "render/frame_job.h"
+#include "render/ray_log.h"
+#include "render/scene.h"
+
+namespace render {
+
+inline constexpr int cell_size = 16;
+inline constexpr int cell_pixels = cell_size * cell_size;
+inline constexpr int stream_rays = 256;  // rays that go to Embree at once
+
+// Up to 256 points that receive light, as structure of arrays. In a grid, entry y * 16 + x is the
+// pixel (x, y) of a cell, and idle entries are those without a receiver.
+struct Receivers {
+  alignas(64) std::array<float, cell_pixels> px, py, pz;  // shadow ray origins, off the surface
+  alignas(64) std::array<float, cell_pixels> nx, ny, nz;  // shading normal
+  alignas(64) std::array<float, cell_pixels> gx, gy, gz;  // geometric normal
+  alignas(64) std::array<float, cell_pixels> open_r, open_g, open_b;  // out: if nothing virtual blocked
+  alignas(64) std::array<float, cell_pixels> lost_r, lost_g, lost_b;  // out: what virtual objects block
+  std::array<std::uint32_t, cell_pixels> surface;   // same number = same object and material
+  std::array<std::uint32_t, cell_pixels> mask;      // what blocks: mask_virtual, mask_real_blocker
+  std::array<std::uint8_t, cell_pixels> real_first;  // light that real things block does not count as open
+  std::array<float, cell_pixels> share;             // of the pixel; weak points test fewer lights
+  std::array<std::uint64_t, 4> active;              // bit y % 4 * 16 + x of word y / 4
+  int count = 0;                                    // of entries, if not a grid
+};
+
+// 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.
+using CellMask = std::array<std::uint64_t, 4>;
+
+// Structure of arrays of one stream of shadow rays, and scratch of one gather.
+struct GatherWorkspace {
+  alignas(64) std::array<float, stream_rays> ox, oy, oz, dx, dy, dz, near_m, far_m, time;
+  alignas(64) std::array<unsigned, stream_rays> mask, id, flags;
+  alignas(64) std::array<float, stream_rays> tr, tg, tb;  // transmittance so far
+  std::array<std::uint32_t, stream_rays> ray_light, ray_point;
+  int rays = 0;
+  RayLog* log = nullptr;  // keeps all rays, if set
+
+  static constexpr int group = 64;  // lights at a time
+  std::array<CellMask, group> lit, seen, tested;
+  struct Tint {
+    std::uint32_t light, point;
+    Vec3f lost_share;
+  };
+  std::vector<Tint> tints;  // light that glass weakened, capacity reserved
+  CellMask same4, same2;    // pixels whose 4x4, 2x2 block is one smooth surface
+};
+
+// What every cell of a frame shares.
+struct LightContext {
+  const Scene* scene = nullptr;
+  const LightTable* table = nullptr;
+  const Effort* effort = nullptr;
+  std::vector<std::uint8_t> light_block;  // per light: 1, 2 or 4, how coarse its penumbrae may be
+};
+LightContext make_light_context(const Scene& scene, const LightTable& table, const Effort& effort);
+
+// Visibility of a cell from an earlier frame, and room for this one's. Either may be null.
+struct CellMemory {
+  const CellMask* kept = nullptr;  // one a light: pixels that see it
+  CellMask* room = nullptr;
+};
+
+// Adds up the light at the pixels of a cell: open and lost. Returns whether `memory.room` holds this
+// frame's visibility now (glass and real blockers are not kept). Shadow rays go to one pixel of every 4x4
+// block of a smooth surface first, another for each light; where neighbouring blocks disagree, to its
+// 2x2 blocks or pixels as the light's weight asks.
+bool gather_cell(const LightContext& context,
+                 Receivers& receivers,
+                 GatherWorkspace& workspace,
+                 const CellMemory& memory,
+                 RenderStatistics& statistics);
+
+// The same for any points: every point tests every light, or, where its share of the picture is
+// small, every second, fourth ... of them, begun at another one from point to point.
+void gather_points(const LightContext& context,
+                   Receivers& receivers,
+                   GatherWorkspace& workspace,
+                   RenderStatistics& statistics);
+
+// Irradiance of the table's lamps at one point, as it arrives.
+Vec3f gather_lamps(const LightContext& context,
+                   Vec3f origin,
+                   Vec3f normal,
+                   Vec3f geometric_normal,
+                   unsigned mask,
+                   RenderStatistics& statistics);
+
+}  // namespace render

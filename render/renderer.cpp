@@ -1,0 +1,78 @@
+// One frame on this machine's threads.
+#include "render/renderer.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <mutex>
+#include <stdexcept>
+
+#include "render/kernel.h"
+
+namespace render {
+namespace {
+
+// Per thread: what it renders tiles with.
+struct Worker {
+  TileWorkspace workspace;
+  TileJob job;
+  TileResult result;
+};
+
+// Threads keep their workspaces from frame to frame.
+tbb::enumerable_thread_specific<Worker>& workers() {
+  static tbb::enumerable_thread_specific<Worker> all;
+  return all;
+}
+
+void size_image(capture::HalfImage& image, int height, int width, int channels) {
+  image.height = height;
+  image.width = width;
+  image.channels = channels;
+  image.pixels.resize(static_cast<std::size_t>(height) * static_cast<std::size_t>(width) *
+                      static_cast<std::size_t>(channels));
+}
+
+void copy_rows(const std::vector<capture::Half>& from, const Rect& rect, capture::HalfImage& to) {
+  const auto row = static_cast<std::ptrdiff_t>(rect.width) * to.channels;
+  for (int y = 0; y < rect.height; ++y) {
+    std::copy_n(from.begin() + row * y, row,
+                to.pixels.begin() + static_cast<std::ptrdiff_t>(to.index(rect.y + y, rect.x)));
+  }
+}
+
+}  // namespace
+
+void render_frame(const FrameInputs& inputs,
+                  const FrameJob& job,
+                  const capture::HalfImage& plate,
+                  FrameResult& result) {
+  const FrameContext context = make_frame_context(inputs, job);
+  const int width = inputs.directions->width, height = inputs.directions->height;
+  if (plate.width != width || plate.height != height || plate.channels != 3) {
+    throw std::invalid_argument("the plate is " + std::to_string(plate.width) + "x" +
+                                std::to_string(plate.height) + ", but its lens is for " +
+                                std::to_string(width) + "x" + std::to_string(height));
+  }
+  size_image(result.rgba, height, width, 4);
+  size_image(result.matte, height, width, 1);
+  result.statistics = {};
+  const int size = job.effort.tile_size;
+  const int columns = (width + size - 1) / size, rows = (height + size - 1) / size;
+  std::mutex statistics_mutex;
+  tbb::parallel_for(0, columns * rows, [&](int i) {
+    Worker& worker = workers().local();
+    Rect rect{i % columns * size, i / columns * size, size, size};
+    rect.width = std::min(size, width - rect.x);
+    rect.height = std::min(size, height - rect.y);
+    cut_tile(plate, rect, 0, worker.job);
+    size_result(rect, worker.result);
+    render_tile(context, worker.job, worker.workspace, worker.result);
+    copy_rows(worker.result.rgba, rect, result.rgba);
+    copy_rows(worker.result.matte, rect, result.matte);
+    const std::lock_guard lock(statistics_mutex);
+    result.statistics += worker.result.statistics;
+  });
+}
+
+}  // namespace render

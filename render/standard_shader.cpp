@@ -1,0 +1,109 @@
+// The shader "standard", and the background "environment".
+#include <cmath>
+#include <cstring>
+
+#include "render/builtin_shaders.h"
+#include "render/standard.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+static_assert(sizeof(StandardSurface) <= shader_scratch_bytes);
+
+// The block of a material that check() has passed.
+StandardParameters block_of(const Material& material) {
+  StandardParameters parameters;
+  std::memcpy(&parameters, material.parameters.data(), sizeof parameters);
+  return parameters;
+}
+
+class StandardShader final : public Shader {
+ public:
+  void check(const SceneDescription& scene, const Material& material) const override {
+    standard_parameters(material, scene.textures.size());
+  }
+
+  void surface(const ShadeContext& context, std::span<ShadePoint* const> points) const override {
+    for (ShadePoint* p : points) {
+      const StandardSurface surface = standard_surface(
+          block_of(context.scene->materials[p->hit.material]), *context.scene, p->hit, p->footprint_m);
+      p->light_normal = surface.normal;
+      p->receives_light = surface.metallic < 1 && surface.transmission < 1 && surface.base != Vec3f{};
+      std::memcpy(p->scratch.data(), &surface, sizeof surface);
+    }
+  }
+
+  void shade(const ShadeContext&, std::span<ShadePoint* const> points, RaySink& rays) const override {
+    for (ShadePoint* p : points) {
+      StandardSurface surface;
+      std::memcpy(&surface, p->scratch.data(), sizeof surface);
+      const Vec3f view = -p->incoming;
+      const StandardWeights weights = standard_weights(surface, view);
+      constexpr float per_pi = 0.318309886F;
+      p->radiance =
+          surface.emission + weights.diffuse * (p->irradiance + p->irradiance_lamps) * per_pi;
+      if (weights.coat > 0) {
+        mirror(*p, surface.coat_normal, view, surface.clearcoat_roughness,
+               p->throughput * weights.coat, rays);
+      }
+      mirror(*p, surface.normal, view, surface.roughness, p->throughput * weights.specular, rays);
+      if (weights.transmission != Vec3f{}) {
+        rays.push(*p, {offset_origin(p->hit, p->incoming), p->incoming,
+                       p->throughput * weights.transmission, 0, p->kind});
+      }
+    }
+  }
+
+  bool lets_light_through(const Material& material) const override {
+    const StandardParameters parameters = block_of(material);
+    return parameters.transmission > 0 || parameters.alpha_cutoff > 0;
+  }
+
+  Vec3f transmittance(const ShadeContext& context,
+                      const Material& material,
+                      const HitPoint& hit,
+                      Vec3f incoming,
+                      RayKind kind) const override {
+    const StandardParameters parameters = block_of(material);
+    if (parameters.alpha_cutoff > 0 &&
+        standard_alpha(parameters, *context.scene, hit, 0) < parameters.alpha_cutoff) {
+      return {1, 1, 1};
+    }
+    if (kind != RayKind::shadow || !(parameters.transmission > 0)) return {};
+    const StandardSurface surface = standard_surface(parameters, *context.scene, hit, 0);
+    return standard_weights(surface, -incoming).transmission;
+  }
+
+ private:
+  static void mirror(const ShadePoint& p,
+                     Vec3f normal,
+                     Vec3f view,
+                     float roughness,
+                     Vec3f throughput,
+                     RaySink& rays) {
+    Vec3f direction = normalize(mirrored(view, normal));
+    // A mapped or interpolated normal may send the ray into the surface: mirror it out again.
+    const float into = dot(direction, p.hit.geometric_normal);
+    if (into < 0) direction -= p.hit.geometric_normal * (2 * into);
+    rays.push(p, {offset_origin(p.hit, direction), direction, throughput, roughness,
+                  p.kind == RayKind::difference ? RayKind::difference : RayKind::reflection});
+  }
+};
+
+class EnvironmentBackground final : public BackgroundShader {
+ public:
+  void shade(const ShadeContext& context, std::span<ShadePoint* const> points) const override {
+    for (ShadePoint* p : points) p->radiance = radiance_of(*context.environment, p->incoming, 0);
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<const Shader> make_standard_shader() { return std::make_shared<StandardShader>(); }
+
+std::shared_ptr<const BackgroundShader> make_environment_background() {
+  return std::make_shared<EnvironmentBackground>();
+}
+
+}  // namespace render

@@ -1,0 +1,34 @@
+// Rays through a compiled scene, one at a time: for the reference, tests and tools. Every ray, also
+// the kernel's, goes with a TraceContext, because holes and glass are decided while it travels.
+#pragma once
+
+#include <optional>
+
+#include "render/scene.h"
+#include "render/shader.h"
+
+namespace render {
+
+inline constexpr float ray_far = 1e30F;
+
+// Sets flush-to-zero for this thread, as Embree wants it.
+void prepare_thread();
+
+struct TracedHit {
+  float distance = 0;
+  unsigned geom_id = 0, prim_id = 0, inst_id = 0;
+  float u = 0, v = 0;
+};
+
+// The nearest hit beyond `near_m`, holes passed.
+std::optional<TracedHit> closest_hit(
+    const Scene& scene, Vec3f origin, Vec3f direction, float near_m, unsigned mask, RayKind kind);
+
+// RGB share of light that passes from origin to far_m along direction: 0 = blocked.
+Vec3f transmittance(
+    const Scene& scene, Vec3f origin, Vec3f direction, float near_m, float far_m, unsigned mask);
+
+// A start point moved off the surface, against hitting it again: scaled to the size of coordinates.
+Vec3f offset_origin(const HitPoint& hit, Vec3f direction);
+
+}  // namespace render

@@ -1,0 +1,193 @@
+// Laws of the tile kernel, with the shaders of augmented pictures plugged in.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <new>
+
+#include "made_shot.h"
+
+namespace {
+std::atomic<long> allocations{0};
+thread_local bool counting = false;
+}  // namespace
+
+// Counted, to show that nothing allocates in the tile loop.
+void* operator new(std::size_t size) {
+  if (counting) ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace compositing {
+namespace {
+
+using capture::float_from_half;
+using render::FrameResult;
+
+FrameResult render(const MadeShot& shot) {
+  FrameResult result;
+  render_frame(shot.inputs(), shot.job, shot.plate, result);
+  return result;
+}
+
+TEST(RenderFrame, LeavesThePlateBitForBitWhereNothingIsVirtual) {
+  const MadeShot shot = made_shot(100, 70, made_scene(false));
+  const FrameResult result = render(shot);
+  for (std::size_t i = 0; i < shot.plate.pixels.size() / 3; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      ASSERT_EQ(result.rgba.pixels[i * 4 + c], shot.plate.pixels[i * 3 + c]) << "pixel " << i;
+    }
+    ASSERT_EQ(result.rgba.pixels[i * 4 + 3], 0);
+    ASSERT_EQ(result.matte.pixels[i], 0);
+  }
+}
+
+TEST(RenderFrame, LeavesThePlateBitForBitFarFromTheObjects) {
+  const MadeShot shot = made_shot(160, 120, made_scene());
+  const FrameResult result = render(shot);
+  std::size_t untouched = 0;
+  for (std::size_t i = 0; i < shot.plate.pixels.size() / 3; ++i) {
+    if (result.matte.pixels[i] != 0) continue;
+    ++untouched;
+    for (std::size_t c = 0; c < 3; ++c) {
+      ASSERT_EQ(result.rgba.pixels[i * 4 + c], shot.plate.pixels[i * 3 + c]) << "pixel " << i;
+    }
+  }
+  EXPECT_GT(untouched, 1000U);
+}
+
+TEST(RenderFrame, DoesNotDependOnTilesOrThreads) {
+  MadeShot shot = made_shot(150, 110, made_scene());
+  for (const int interleave : {1, 2, 4}) {
+    shot.job.effort.interleave = interleave;
+    shot.job.effort.tile_size = 64;
+    const FrameResult first = render(shot);
+    for (const int tile : {16, 48, 160}) {
+      shot.job.effort.tile_size = tile;
+      for (const std::size_t threads : {1U, 2U}) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        const FrameResult again = render(shot);
+        EXPECT_EQ(again.rgba.pixels, first.rgba.pixels) << tile << " " << threads;
+        EXPECT_EQ(again.matte.pixels, first.matte.pixels) << tile << " " << threads;
+        EXPECT_EQ(again.statistics, first.statistics);
+      }
+    }
+  }
+}
+
+TEST(RenderFrame, IsTheSameColdAndWarm) {
+  const MadeShot shot = made_shot(96, 64, made_scene());
+  const FrameResult cold = render(shot);
+  MadeShot other = made_shot(96, 64, made_scene());
+  other.job.cam_from_set = calibrate::look_at({-2, 3, 2}, {0, 0, 0}, 0.1);
+  render(other);
+  EXPECT_EQ(render(shot).rgba.pixels, cold.rgba.pixels);
+}
+
+TEST(RenderFrame, RestoresThePictureFromPlateMatteAndFill) {
+  const MadeShot shot = made_shot(120, 90, made_scene());
+  const FrameResult result = render(shot);
+  for (std::size_t i = 0; i < shot.plate.pixels.size() / 3; ++i) {
+    const float matte = float_from_half(result.matte.pixels[i]);
+    ASSERT_GE(matte, -1e-3F);
+    ASSERT_LE(matte, 1.001F);
+    ASSERT_GE(matte, float_from_half(result.rgba.pixels[i * 4 + 3]) - 1e-3F)
+        << "an object covers at least what it hides";
+  }
+}
+
+TEST(RenderFrame, IsWhiteInAWhiteFurnace) {
+  for (const float roughness : {0.0F, 0.3F, 1.0F}) {
+    render::SceneDescription scene = made_scene(false);
+    scene.background = "environment";
+    scene.instances.clear();
+    render::StandardParameters white;
+    white.roughness = roughness;
+    white.clearcoat = 0.7F;
+    scene.materials.push_back(render::make_standard_material("white", white));
+    scene.meshes.push_back(made_ball({0, 0, 0}, 1, static_cast<std::uint32_t>(scene.materials.size() - 1)));
+    render::Instance ball;
+    ball.mesh = 1;
+    scene.instances.push_back(ball);
+    MadeShot shot = made_shot(80, 60, std::move(scene));
+    shot.environment = made_sky(32, 1, 1);
+    shot.job.lights.lights.clear();
+    constexpr int count = 4000;
+    for (int i = 0; i < count; ++i) {
+      const float z = 1 - 2 * (static_cast<float>(i) + 0.5F) / count;
+      const float phi = static_cast<float>(i) * 2.39996323F, r = std::sqrt(1 - z * z);
+      const float e = 4 * std::numbers::pi_v<float> / count;
+      shot.job.lights.lights.push_back({{r * std::cos(phi), r * std::sin(phi), z}, {e, e, e}, 0});
+    }
+    const FrameResult result = render(shot);
+    for (std::size_t i = 0; i < result.rgba.pixels.size(); i += 4) {
+      ASSERT_NEAR(float_from_half(result.rgba.pixels[i]), 1.0F, 0.005F)
+          << "roughness " << roughness << " pixel " << i / 4;
+    }
+  }
+}
+
+TEST(RenderFrame, PutsTheShadowWhereTheSunSaysAndAsDeep) {
+  MadeShot shot = made_shot(200, 150, made_scene());
+  // A sun of 3 parts and a sky of 1 part straight above: the shadow keeps a quarter.
+  shot.job.lights.lights = {{normalize(render::Vec3f{0, 1, 1}), {3 * 1.41421356F, 3, 3}, 0},
+                            {{0, 0, 1}, {1, 1, 1}, 0}};
+  const FrameResult result = render(shot);
+  const auto ratio_at = [&](calibrate::Vec3 p_set) {
+    const calibrate::Lens lens{"pinhole", 200, 150, {220, 220, 99.5, 74.5}};
+    const auto q = calibrate::project(lens, shot.job.cam_from_set * p_set);
+    const int x = static_cast<int>(std::lround(q->x)), y = static_cast<int>(std::lround(q->y));
+    return float_from_half(result.rgba.pixels[result.rgba.index(y, x, 0)]) /
+           float_from_half(shot.plate.pixels[shot.plate.index(y, x, 0)]);
+  };
+  EXPECT_NEAR(ratio_at({0, -1.0, 0}), 1.0F / 4, 0.01F) << "the ball's shadow falls towards -y";
+  EXPECT_NEAR(ratio_at({0, -2.2, 0}), 1.0F, 0.002F);
+}
+
+TEST(RenderTile, DoesNotAllocate) {
+  const MadeShot shot = made_shot(128, 96, made_scene());
+  const render::FrameContext context = make_frame_context(shot.inputs(), shot.job);
+  render::TileWorkspace workspace;
+  render::TileJob tile;
+  render::TileResult result;
+  const render::Rect rect{0, 0, 128, 96};
+  cut_tile(shot.plate, rect, 0, tile);
+  size_result(rect, result);
+  render_tile(context, tile, workspace, result);
+  allocations = 0;
+  counting = true;
+  render_tile(context, tile, workspace, result);
+  counting = false;
+  EXPECT_EQ(allocations, 0);
+}
+
+TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
+  MadeShot shot = made_shot(32, 32, made_scene());
+  const auto refuse = [&](auto&& change) {
+    const render::FrameJob before = shot.job;
+    change(shot.job);
+    FrameResult result;
+    EXPECT_THROW(render_frame(shot.inputs(), shot.job, shot.plate, result), std::invalid_argument);
+    shot.job = before;
+  };
+  refuse([](render::FrameJob& job) { job.effort.aa_samples = 0; });
+  refuse([](render::FrameJob& job) { job.effort.interleave = 3; });
+  refuse([](render::FrameJob& job) { job.effort.tile_size = 20; });
+  refuse([](render::FrameJob& job) { job.effort.accuracy = 2; });
+  refuse([](render::FrameJob& job) { job.effort.max_depth = -1; });
+  refuse([](render::FrameJob& job) { job.lights.lights[0].irradiance.x = std::nanf(""); });
+}
+
+TEST(RenderFrame, RefusesAPlateOfAnotherSize) {
+  const MadeShot shot = made_shot(32, 32, made_scene());
+  FrameResult result;
+  EXPECT_THROW(render_frame(shot.inputs(), shot.job, made_plate(32, 33), result),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace compositing

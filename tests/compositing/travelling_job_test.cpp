@@ -1,0 +1,63 @@
+// A frame is rendered from values alone: another process, given the same bytes, gives the same bits.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "made_shot.h"
+#include "render/environment_bytes.h"
+
+namespace compositing {
+namespace {
+
+void append(std::vector<std::byte>& to, std::span<const std::byte> block) {
+  const std::uint64_t size = block.size();
+  const auto* head = reinterpret_cast<const std::byte*>(&size);
+  to.insert(to.end(), head, head + sizeof size);
+  to.insert(to.end(), block.begin(), block.end());
+}
+
+TEST(FrameJob, RendersTheSameBitsInAnotherProcess) {
+  const int width = 96, height = 64;
+  MadeShot shot = made_shot(width, height, made_scene());
+  shot.job.frame = 7;
+  shot.job.effort.interleave = 2;
+  std::vector<std::byte> bytes;
+  append(bytes, serialize(shot.scene->description()));
+  append(bytes, serialize(shot.job));
+  append(bytes, serialize(shot.environment));
+  const int size[2] = {width, height};
+  append(bytes, std::as_bytes(std::span(size)));
+
+  std::vector<capture::Half> expected;
+  const render::FrameContext context = make_frame_context(shot.inputs(), shot.job);
+  render::TileWorkspace workspace;
+  for (int y = 0; y < height; y += 32) {
+    for (int x = 0; x < width; x += 32) {
+      render::TileJob tile;
+      cut_tile(shot.plate, {x, y, 32, 32}, 8, tile);
+      append(bytes, serialize(tile));
+      render::TileResult result;
+      size_result(tile.rect, result);
+      render_tile(context, tile, workspace, result);
+      expected.insert(expected.end(), result.rgba.begin(), result.rgba.end());
+      expected.insert(expected.end(), result.matte.begin(), result.matte.end());
+    }
+  }
+
+  const auto dir = std::filesystem::path(testing::TempDir()) / "travelling_job";
+  std::filesystem::create_directories(dir);
+  std::ofstream(dir / "in", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  const std::string command = std::string(PLATELIGHT_RENDER_CHILD) + " < " + (dir / "in").string() +
+                              " > " + (dir / "out").string();
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  std::ifstream out(dir / "out", std::ios::binary);
+  const std::vector<char> got{std::istreambuf_iterator<char>(out), {}};
+  ASSERT_EQ(got.size(), expected.size() * sizeof(capture::Half));
+  EXPECT_TRUE(std::equal(got.begin(), got.end(), reinterpret_cast<const char*>(expected.data())));
+}
+
+}  // namespace
+}  // namespace compositing

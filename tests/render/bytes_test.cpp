@@ -1,0 +1,123 @@
+// Jobs, scenes and environments survive as bytes, and refuse bytes that are not theirs.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "render/environment_bytes.h"
+#include "render/frame_job.h"
+#include "render/scene.h"
+
+namespace render {
+namespace {
+
+FrameJob made_job() {
+  FrameJob job;
+  job.frame = 12345;
+  job.time = capture::Time(987654321);
+  job.cam_from_set = calibrate::look_at({1, 2, 3}, {0, 0, 0}, 0.2);
+  job.lens = 3;
+  job.scene_version = 17;
+  job.effort.interleave = 4;
+  job.effort.adaptive_visibility = false;
+  job.textures = {{0, capture::Time(1)}, {1, capture::Time(2)}};
+  job.lights.lights = {{{0, 0, 1}, {1, 2, 3}, 0.1F}, {{1, 0, 0}, {4, 5, 6}, 0.2F}};
+  job.lights.lamps = {{{1, 2, 3}, {0, 0, -1}, {7, 8, 9}}};
+  job.lights.version = 5;
+  job.match = {1.5F, 1, 0.5F};
+  return job;
+}
+
+TileJob made_tile() {
+  return {{16, 32, 16, 16}, 2, {14, 30, 20, 20}, std::vector<capture::Half>(20 * 20 * 3, 0x3C00)};
+}
+
+SceneDescription made_scene() {
+  SceneDescription scene;
+  auto mesh = std::make_shared<Mesh>();
+  mesh->positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh->triangles = {{0, 1, 2}};
+  mesh->materials = {0};
+  scene.meshes.push_back(mesh);
+  scene.textures.push_back(std::make_shared<Texture>(Texture{1, 1, 3, true, {1, 2, 3}}));
+  scene.materials.push_back({"m", "standard", std::vector<std::byte>(88)});
+  Instance instance;
+  instance.name = "thing";
+  instance.kind = ObjectKind::stand_in;
+  instance.blocks_light = false;
+  scene.instances.push_back(instance);
+  scene.version = 9;
+  return scene;
+}
+
+Environment made_environment() {
+  Environment env;
+  env.radiance = capture::make_image(2, 4, 3);
+  env.radiance.at(1, 2, 0) = 1e9F;
+  env.seen.assign(8, 1);
+  env.smoothed = {env.radiance};
+  return env;
+}
+
+TEST(Serialize, KeepsEveryFieldOfAFrameJob) {
+  EXPECT_EQ(parse_frame_job(serialize(made_job())), made_job());
+}
+
+TEST(Serialize, KeepsEveryFieldOfATileJob) {
+  EXPECT_EQ(parse_tile_job(serialize(made_tile())), made_tile());
+}
+
+TEST(Serialize, KeepsAScene) {
+  const SceneDescription a = made_scene(), b = parse_scene(serialize(a));
+  EXPECT_EQ(b.meshes[0]->positions, a.meshes[0]->positions);
+  EXPECT_EQ(b.meshes[0]->triangles, a.meshes[0]->triangles);
+  EXPECT_EQ(*b.textures[0], *a.textures[0]);
+  EXPECT_EQ(b.materials, a.materials);
+  EXPECT_EQ(b.instances, a.instances);
+  EXPECT_EQ(b.background, a.background);
+  EXPECT_EQ(b.version, a.version);
+}
+
+TEST(Serialize, KeepsAnEnvironment) {
+  const Environment a = made_environment(), b = parse_environment(serialize(a));
+  EXPECT_EQ(b.radiance.pixels, a.radiance.pixels);
+  EXPECT_EQ(b.seen, a.seen);
+  EXPECT_EQ(b.smoothed[0].pixels, a.smoothed[0].pixels);
+}
+
+// Every prefix, and thousands of changed bytes: refused, or read as something of the same kind, but
+// never a crash, a hang, or an allocation beyond what the bytes could hold.
+template <class Parse>
+void survive(std::vector<std::byte> bytes, Parse parse) {
+  for (std::size_t size = 0; size < bytes.size(); size += 1 + size / 64) {
+    EXPECT_THROW(parse(std::span(bytes).first(size)), std::runtime_error) << size;
+  }
+  std::mt19937 random(1);
+  for (int i = 0; i < 3000; ++i) {
+    std::vector<std::byte> changed = bytes;
+    for (int k = 0; k < 3; ++k) {
+      changed[random() % changed.size()] = static_cast<std::byte>(random() & 255);
+    }
+    try {
+      parse(changed);
+    } catch (const std::runtime_error&) {
+    }
+  }
+  bytes.push_back({});
+  EXPECT_THROW(parse(bytes), std::runtime_error);
+}
+
+TEST(ParseFrameJob, RefusesDamage) {
+  survive(serialize(made_job()), [](auto bytes) { return parse_frame_job(bytes); });
+}
+TEST(ParseTileJob, RefusesDamage) {
+  survive(serialize(made_tile()), [](auto bytes) { return parse_tile_job(bytes); });
+}
+TEST(ParseScene, RefusesDamage) {
+  survive(serialize(made_scene()), [](auto bytes) { return parse_scene(bytes); });
+}
+TEST(ParseEnvironment, RefusesDamage) {
+  survive(serialize(made_environment()), [](auto bytes) { return parse_environment(bytes); });
+}
+
+}  // namespace
+}  // namespace render

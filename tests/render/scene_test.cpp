@@ -1,0 +1,135 @@
+// Scenes: what Embree's hits mean, instances, holes, damage.
+#include "render/scene.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "render/standard.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+std::shared_ptr<Mesh> square(float z, std::uint32_t material) {
+  auto mesh = std::make_shared<Mesh>();
+  mesh->positions = {{-1, -1, z}, {1, -1, z}, {1, 1, z}, {-1, 1, z}};
+  mesh->uvs = {{{0, 1}}, {{1, 1}}, {{1, 0}}, {{0, 0}}};
+  mesh->triangles = {{0, 1, 2}, {0, 2, 3}};
+  mesh->materials = {material};
+  return mesh;
+}
+
+SceneDescription one_square(StandardParameters parameters = {}) {
+  SceneDescription scene;
+  scene.meshes.push_back(square(1, 0));
+  scene.materials.push_back(make_standard_material("m", parameters));
+  scene.instances.emplace_back().mesh = 0;
+  return scene;
+}
+
+std::optional<TracedHit> look_down(const Scene& scene, Vec3f from) {
+  return closest_hit(scene, from, {0, 0, -1}, 0, ~0U, RayKind::camera);
+}
+
+TEST(Scene, GivesPositionNormalAndTextureCoordinatesOfAHit) {
+  const Scene scene(one_square());
+  const auto hit = look_down(scene, {0.5F, -0.25F, 5});
+  ASSERT_TRUE(hit);
+  EXPECT_NEAR(hit->distance, 4, 1e-5F);
+  const HitPoint point =
+      scene.hit_point(hit->geom_id, hit->prim_id, hit->inst_id, hit->u, hit->v, {0, 0, -1});
+  EXPECT_NEAR(point.position.x, 0.5F, 1e-6F);
+  EXPECT_NEAR(point.position.y, -0.25F, 1e-6F);
+  EXPECT_NEAR(point.position.z, 1, 1e-6F);
+  EXPECT_EQ(point.normal, (Vec3f{0, 0, 1}));
+  EXPECT_NEAR(point.u, 0.75F, 1e-6F);
+  EXPECT_NEAR(point.v, 0.625F, 1e-6F);
+  EXPECT_NEAR(point.uv_per_metre, 0.5F, 1e-6F);
+}
+
+TEST(Scene, GivesTheSameHitPlacedOnceOrAsAnInstance) {
+  SceneDescription once = one_square();
+  once.instances[0].set_from_object = {0, -2, 0, 3, 1, 0, 0, 4, 0, 0, 3, 5};
+  SceneDescription twice = once;
+  twice.instances.push_back(once.instances[0]);
+  twice.instances[1].set_from_object[3] = 100;
+  const Scene a(once), b(twice);
+  const auto hit_a = look_down(a, {3.2F, 4.1F, 20}), hit_b = look_down(b, {3.2F, 4.1F, 20});
+  ASSERT_TRUE(hit_a && hit_b);
+  const auto point = [](const Scene& scene, const TracedHit& h) {
+    return scene.hit_point(h.geom_id, h.prim_id, h.inst_id, h.u, h.v, {0, 0, -1});
+  };
+  const HitPoint p = point(a, *hit_a), q = point(b, *hit_b);
+  EXPECT_NEAR(length(p.position - q.position), 0, 1e-5F);
+  EXPECT_NEAR(length(p.normal - q.normal), 0, 1e-6F);
+  EXPECT_NEAR(p.u, q.u, 1e-5F);
+  EXPECT_EQ(p.instance, q.instance);
+  EXPECT_TRUE(look_down(b, {100, 4.1F, 20}));
+}
+
+TEST(Scene, LeavesOutTrianglesThatAreNotFiniteAndCountsThem) {
+  SceneDescription scene = one_square();
+  auto mesh = std::make_shared<Mesh>(*scene.meshes[0]);
+  mesh->positions[3].x = std::numeric_limits<float>::quiet_NaN();
+  scene.meshes[0] = mesh;
+  const Scene compiled(scene);
+  EXPECT_EQ(compiled.skipped_triangles(), 1U);
+  EXPECT_TRUE(look_down(compiled, {0.5F, -0.5F, 5}));
+  EXPECT_FALSE(look_down(compiled, {-0.5F, 0.5F, 5}));
+}
+
+TEST(Scene, TakesTrianglesWithoutAreaAndThousandInstances) {
+  SceneDescription scene = one_square();
+  auto mesh = std::make_shared<Mesh>(*scene.meshes[0]);
+  mesh->triangles.push_back({0, 0, 0});
+  scene.meshes[0] = mesh;
+  for (int i = 1; i < 1000; ++i) {
+    Instance instance = scene.instances[0];
+    instance.set_from_object[3] = 3.0F * static_cast<float>(i);
+    scene.instances.push_back(instance);
+  }
+  const Scene compiled(scene);
+  EXPECT_TRUE(look_down(compiled, {3 * 500.0F, 0, 5}));
+  EXPECT_EQ(triangle_count(scene), 3000U);
+}
+
+TEST(Scene, IsEmptyWithoutObjects) {
+  const Scene scene(SceneDescription{});
+  EXPECT_FALSE(look_down(scene, {0, 0, 5}));
+}
+
+TEST(Scene, LetsTintedLightThroughGlassAndNoneThroughPaint) {
+  StandardParameters glass;
+  glass.transmission = 1;
+  glass.base_color[0] = 0.5F;
+  const Scene through(one_square(glass));
+  const Vec3f share = transmittance(through, {0, 0, 0}, {0, 0, 1}, 0, ray_far, ~0U);
+  EXPECT_NEAR(share.x, 0.96F * 0.5F, 1e-4F) << "4 % are reflected, half of the red is absorbed";
+  EXPECT_NEAR(share.y, 0.96F, 1e-4F);
+  const Scene blocked(one_square());
+  EXPECT_EQ(transmittance(blocked, {0, 0, 0}, {0, 0, 1}, 0, ray_far, ~0U), Vec3f{});
+}
+
+TEST(Scene, RefusesWhatDoesNotFitTogether) {
+  const auto refuse = [](auto&& change) {
+    SceneDescription scene = one_square();
+    change(scene);
+    EXPECT_THROW(Scene{scene}, std::invalid_argument);
+  };
+  refuse([](SceneDescription& s) { s.instances[0].mesh = 1; });
+  refuse([](SceneDescription& s) { s.instances[0].set_from_object[0] = INFINITY; });
+  refuse([](SceneDescription& s) { s.materials.clear(); });
+  refuse([](SceneDescription& s) { s.materials[0].shader = "nothing"; });
+  refuse([](SceneDescription& s) { s.materials[0].parameters.resize(3); });
+  refuse([](SceneDescription& s) { s.background = "nothing"; });
+  refuse([](SceneDescription& s) {
+    auto mesh = std::make_shared<Mesh>(*s.meshes[0]);
+    mesh->triangles[0][1] = 4;
+    s.meshes[0] = mesh;
+  });
+}
+
+}  // namespace
+}  // namespace render
