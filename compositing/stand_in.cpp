@@ -56,7 +56,8 @@ class StandInShader final : public render::Shader {
     for (ShadePoint* p : points) {
       const StandInParameters block = block_of(context.scene->materials[p->hit.material]);
       p->light_normal = p->hit.normal;
-      p->receives_light = p->kind == RayKind::camera && (block.catches_shadow || block.catches_light);
+      p->receives_light =
+          p->kind == RayKind::camera && (block.catches_shadow || block.catches_light);
     }
   }
 
@@ -93,8 +94,8 @@ class StandInShader final : public render::Shader {
       p.plate_share += Vec3f{p.irradiance_lamps.x / open.x, p.irradiance_lamps.y / open.y,
                              p.irradiance_lamps.z / open.z};
     } else {
-      p.radiance += Vec3f{block.albedo[0], block.albedo[1], block.albedo[2]} * p.irradiance_lamps *
-                    (1 / pi);
+      p.radiance +=
+          Vec3f{block.albedo[0], block.albedo[1], block.albedo[2]} * p.irradiance_lamps * (1 / pi);
     }
     return clipped;
   }

@@ -11,15 +11,16 @@ namespace compositing {
 // A stand-in is a real surface that the plate shows. Per colour it gives
 //   out = plate (1 - lost/E) + (albedo/pi) E_virtual + F (L_hit - L_env),
 // where E is the irradiance of the real light there, lost what virtual objects take away of it,
-// E_virtual that of virtual lamps, F Fresnel's share and L_hit what the mirrored ray hits. Each term is
-// exactly 0 where nothing virtual changes the light. The albedo is pi plate / E, or the set's own where
-// E or the plate is too dark or clipped.
+// E_virtual that of virtual lamps, F Fresnel's share and L_hit what the mirrored ray hits. Each
+// term is exactly 0 where nothing virtual changes the light. The albedo is pi plate / E, or the
+// set's own where E or the plate is too dark or clipped.
 //
 // Debevec, "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, section 5 (differential
 // rendering), as ratios instead of differences: the plate's own texture stays under the shadow.
 void register_shaders();
 
 // A material of the shader "stand_in".
-render::Material make_stand_in_material(std::string name, const render::StandInParameters& parameters);
+render::Material make_stand_in_material(std::string name,
+                                        const render::StandInParameters& parameters);
 
 }  // namespace compositing

@@ -20,8 +20,8 @@ capture::Image get_image(ByteReader& in) {
   constexpr int limit = 1 << 15;
   if (image.height < 1 || image.width < 1 || image.channels != 3 || image.height > limit ||
       image.width > limit ||
-      image.pixels.size() != static_cast<std::size_t>(image.height) *
-                                 static_cast<std::size_t>(image.width) * 3) {
+      image.pixels.size() !=
+          static_cast<std::size_t>(image.height) * static_cast<std::size_t>(image.width) * 3) {
     in.fail("holds a map of another size than it says");
   }
   return image;

@@ -16,14 +16,14 @@ namespace render {
 
 // All settings of speed against accuracy.
 struct Effort {
-  int aa_samples = 9;         // camera rays in pixels where an edge passes; 1 = no anti-aliasing
-  int light_samples = 64;     // lights in the table
-  int interleave = 1;         // 1, 2 or 4: each pixel of a block of this size tests its share of lights
+  int aa_samples = 9;      // camera rays in pixels where an edge passes; 1 = no anti-aliasing
+  int light_samples = 64;  // lights in the table
+  int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
-  bool cull_lights = true;    // skip shadow rays that no object can block
-  float accuracy = 0.95F;     // rays whose share of the pixel falls below 1 - accuracy are cut
-  int max_depth = 8;          // safety net; counted when hit
-  int tile_size = 64;         // pixels, a multiple of 16
+  bool cull_lights = true;          // skip shadow rays that no object can block
+  float accuracy = 0.95F;      // rays whose share of the pixel falls below 1 - accuracy are cut
+  int max_depth = 8;           // safety net; counted when hit
+  int tile_size = 64;          // pixels, a multiple of 16
   int progressive_sample = 0;  // samples accumulated so far (later issues)
   friend bool operator==(const Effort&, const Effort&) = default;
 };
@@ -60,9 +60,9 @@ struct Rect {
 // A part of the frame: a union of 16x16 cells (clipped by the picture), with its background.
 struct TileJob {
   Rect rect;
-  int margin = 0;                           // of background around rect, clipped by the picture
-  Rect background_rect;                     // rect grown by margin, clipped
-  std::vector<capture::Half> background;    // (background_rect.height, .width, 3)
+  int margin = 0;                         // of background around rect, clipped by the picture
+  Rect background_rect;                   // rect grown by margin, clipped
+  std::vector<capture::Half> background;  // (background_rect.height, .width, 3)
   friend bool operator==(const TileJob&, const TileJob&) = default;
 };
 
@@ -73,11 +73,11 @@ struct RenderStatistics {
   std::uint64_t primary_rays = 0;
   std::uint64_t shadow_rays = 0;
   std::uint64_t secondary_rays = 0;
-  std::uint64_t depth_limit_hits = 0;   // rays that max_depth ended
-  std::uint64_t clamped_values = 0;     // outputs beyond half, or not finite, made finite
-  std::uint64_t clipped_plate = 0;      // stand-in pixels whose plate is clipped
-  std::uint64_t virtual_pixels = 0;     // with A > 0
-  std::uint64_t affected_pixels = 0;    // whose plate a stand-in changed, or with A > 0
+  std::uint64_t depth_limit_hits = 0;  // rays that max_depth ended
+  std::uint64_t clamped_values = 0;    // outputs beyond half, or not finite, made finite
+  std::uint64_t clipped_plate = 0;     // stand-in pixels whose plate is clipped
+  std::uint64_t virtual_pixels = 0;    // with A > 0
+  std::uint64_t affected_pixels = 0;   // whose plate a stand-in changed, or with A > 0
 
   RenderStatistics& operator+=(const RenderStatistics& other);
   friend bool operator==(const RenderStatistics&, const RenderStatistics&) = default;

@@ -8,15 +8,15 @@
 
 namespace render {
 
-// Visibility depends on the scene, the camera, the lights' directions and the effort, not on the lights'
-// energies: while those stay, shadow rays of camera rays' hits need not be shot again. A frame rendered
-// with a kept visibility has the same bits as one rendered without.
+// Visibility depends on the scene, the camera, the lights' directions and the effort, not on the
+// lights' energies: while those stay, shadow rays of camera rays' hits need not be shot again. A
+// frame rendered with a kept visibility has the same bits as one rendered without.
 //
 // One thread calls begin_frame; then many threads use cells, each cell by one thread at a time.
 class KeptVisibility {
  public:
-  // Forgets what another scene, camera, light directions or effort has left behind. Takes memory for
-  // all cells and lights, or keeps nothing if that were more than max_bytes.
+  // Forgets what another scene, camera, light directions or effort has left behind. Takes memory
+  // for all cells and lights, or keeps nothing if that were more than max_bytes.
   void begin_frame(std::uint64_t key, int columns, int rows, std::size_t lights);
 
   // The masks of a cell (one a light), or null if nothing is kept for it.

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
 constexpr int ring_pixels = ring_size * ring_size;
-constexpr int samples_max = 64;           // camera rays in one pixel
+constexpr int samples_max = 64;  // camera rays in one pixel
 constexpr std::uint32_t no_hit = ~0U;
 
 // A stream of rays with their hits.
@@ -193,21 +193,21 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.light = make_light_context(*inputs.scene, job.lights, job.effort);
   const auto& R = job.cam_from_set.R.m;
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) context.set_from_cam[i * 3 + j] = static_cast<float>(R[j * 3 + i]);
+    for (std::size_t j = 0; j < 3; ++j)
+      context.set_from_cam[i * 3 + j] = static_cast<float>(R[j * 3 + i]);
   }
   context.camera = calibrate::to_float(calibrate::position_of(job.cam_from_set));
   if (!finite(context.camera)) throw std::invalid_argument("the camera's pose is not finite");
   const auto& d = *inputs.directions;
-  const std::size_t a = d.index(d.height / 2, d.width / 2), b = d.index(d.height / 2, d.width / 2 + 1);
-  context.pixel_angle = std::clamp(
-      length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
+  const std::size_t a = d.index(d.height / 2, d.width / 2),
+                    b = d.index(d.height / 2, d.width / 2 + 1);
+  context.pixel_angle =
+      std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
   if (inputs.kept_visibility) {
-    inputs.kept_visibility->begin_frame(visibility_key(inputs, job),
-                                        (d.width + cell_size - 1) / cell_size,
-                                        (d.height + cell_size - 1) / cell_size,
-                                        job.lights.lights.size());
+    inputs.kept_visibility->begin_frame(
+        visibility_key(inputs, job), (d.width + cell_size - 1) / cell_size,
+        (d.height + cell_size - 1) / cell_size, job.lights.lights.size());
   }
-  context.background = &find_background(inputs.scene->description().background);
   return context;
 }
 
@@ -257,8 +257,9 @@ void TileWorkspace::Impl::push(const ShadePoint& from, const NewRay& ray) {
     }
     return;
   }
-  queue.push_back({ray.origin, ray.direction, ray.throughput, light, from.footprint_m, ray.roughness,
-                   from.pixel, from.slot, ray.kind, static_cast<std::uint8_t>(from.depth + 1)});
+  queue.push_back({ray.origin, ray.direction, ray.throughput, light, from.footprint_m,
+                   ray.roughness, from.pixel, from.slot, ray.kind,
+                   static_cast<std::uint8_t>(from.depth + 1)});
 }
 
 void TileWorkspace::Impl::trace(int count, bool coherent, RayKind kind) {
@@ -278,9 +279,9 @@ void TileWorkspace::Impl::trace(int count, bool coherent, RayKind kind) {
   }
   TraceContext context(kind, coherent);
   RTCRayHitNp rays;
-  rays.ray = {s.ox.data(), s.oy.data(), s.oz.data(), s.near_m.data(), s.dx.data(), s.dy.data(),
-              s.dz.data(), s.time.data(), s.far_m.data(), s.mask.data(), s.id.data(),
-              s.flags.data()};
+  rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
+              s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
+              s.far_m.data(), s.mask.data(), s.id.data(), s.flags.data()};
   rays.hit.Ng_x = s.ngx.data(), rays.hit.Ng_y = s.ngy.data(), rays.hit.Ng_z = s.ngz.data();
   rays.hit.u = s.u.data(), rays.hit.v = s.v.data();
   rays.hit.primID = s.prim.data(), rays.hit.geomID = s.geom.data();
@@ -310,9 +311,8 @@ Met TileWorkspace::Impl::met_at(int index) const {
   const Vec3f d{s.dx[i], s.dy[i], s.dz[i]};
   Vec3f n = normalize(Vec3f{s.ngx[i], s.ngy[i], s.ngz[i]});
   if (dot(n, d) > 0) n = -n;
-  const std::uint32_t surface = s.inst[i] == RTC_INVALID_GEOMETRY_ID
-                                    ? s.geom[i] * 2
-                                    : (s.inst[i] * 64 + s.geom[i]) * 2 + 1;
+  const std::uint32_t surface =
+      s.inst[i] == RTC_INVALID_GEOMETRY_ID ? s.geom[i] * 2 : (s.inst[i] * 64 + s.geom[i]) * 2 + 1;
   return {surface, n, frame->camera + d * s.far_m[i]};
 }
 
@@ -335,13 +335,16 @@ void TileWorkspace::Impl::trace_centres() {
   trace(cell_pixels, true, RayKind::camera);
 }
 
-void TileWorkspace::Impl::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::uint32_t slot) {
+void TileWorkspace::Impl::set_point(ShadePoint& p,
+                                    int index,
+                                    std::uint32_t pixel,
+                                    std::uint32_t slot) {
   const auto i = static_cast<std::size_t>(index);
   const RayStream& s = stream;
   p.incoming = {s.dx[i], s.dy[i], s.dz[i]};
   if (s.geom[i] != RTC_INVALID_GEOMETRY_ID) {
-    p.hit = frame->inputs.scene->hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i],
-                                           p.incoming);
+    p.hit =
+        frame->inputs.scene->hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i], p.incoming);
   }
   p.footprint_m = s.far_m[i] < ray_far ? s.far_m[i] * frame->pixel_angle : 0;
   p.throughput = {1, 1, 1};
@@ -454,8 +457,7 @@ void TileWorkspace::Impl::shade_points(int count, bool grid) {
     for (ShadePoint* p : group_points) {
       collect(*p);
       statistics->clipped_plate += p->clipped_plate;
-      const bool real =
-          scene.description().instances[p->hit.instance].kind == ObjectKind::stand_in;
+      const bool real = scene.description().instances[p->hit.instance].kind == ObjectKind::stand_in;
       if (real && p->kind == RayKind::camera) samples[p->slot].seen += mean(p->throughput);
     }
   });
@@ -465,7 +467,7 @@ void TileWorkspace::Impl::run_background(std::span<ShadePoint* const> leaving) {
   if (leaving.empty()) return;
   const ShadeContext context{&frame->inputs.scene->description(), frame->inputs.environment};
   for (ShadePoint* p : leaving) clear_results(*p);
-  frame->background->shade(context, leaving);
+  frame->inputs.scene->background().shade(context, leaving);
   for (ShadePoint* p : leaving) {
     collect(*p);
     samples[p->slot].seen += mean(p->throughput);
@@ -502,8 +504,7 @@ void TileWorkspace::Impl::bounce() {
       stream.ox[i] = q.origin.x, stream.oy[i] = q.origin.y, stream.oz[i] = q.origin.z;
       stream.dx[i] = q.direction.x, stream.dy[i] = q.direction.y, stream.dz[i] = q.direction.z;
       stream.near_m[i] = 0;
-      stream.mask[i] =
-          q.kind == RayKind::camera ? mask_virtual | mask_stand_in : mask_virtual;
+      stream.mask[i] = q.kind == RayKind::camera ? mask_virtual | mask_stand_in : mask_virtual;
     }
     trace(static_cast<int>(n), false, RayKind::reflection);
     statistics->secondary_rays += n;
@@ -519,7 +520,8 @@ void TileWorkspace::Impl::bounce() {
       if (hit && q.kind == RayKind::difference) {
         samples[q.slot].added -= q.throughput * q.environment;
       }
-      ShadePoint& p = hit ? points[static_cast<std::size_t>(count++)] : points[stream_rays - ++leaving];
+      ShadePoint& p =
+          hit ? points[static_cast<std::size_t>(count++)] : points[stream_rays - ++leaving];
       set_point(p, static_cast<int>(i), q.pixel, q.slot);
       if (!hit) group[leaving - 1] = &p;
       p.footprint_m += q.footprint_m;
@@ -646,7 +648,8 @@ void TileWorkspace::Impl::finish_further(int count) {
     samples[slot] = {};
     pixel_of[used++] = f.pixel;
     const bool hit = stream.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID;
-    ShadePoint& p = hit ? points[static_cast<std::size_t>(shaded++)] : points[stream_rays - ++leaving];
+    ShadePoint& p =
+        hit ? points[static_cast<std::size_t>(shaded++)] : points[stream_rays - ++leaving];
     set_point(p, i, f.pixel, static_cast<std::uint32_t>(slot));
     if (!hit) group[leaving - 1] = &p;
   }
@@ -713,7 +716,8 @@ void TileWorkspace::Impl::load_plate(const TileJob& tile) {
         continue;
       }
       const std::size_t at = (static_cast<std::size_t>(row) * static_cast<std::size_t>(b.width) +
-                              static_cast<std::size_t>(column)) * 3;
+                              static_cast<std::size_t>(column)) *
+                             3;
       to = {capture::float_from_half(tile.background[at]),
             capture::float_from_half(tile.background[at + 1]),
             capture::float_from_half(tile.background[at + 2])};

@@ -18,9 +18,9 @@ struct FrameContext {
   std::array<float, 9> set_from_cam{};  // rotation
   Vec3f camera;                         // its position in the set
   float pixel_angle = 0;                // radians across a pixel at the picture's centre
-  const BackgroundShader* background = nullptr;
 };
-// Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not finite).
+// Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not
+// finite).
 FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job);
 
 // All memory that rendering tiles takes on one thread. Nothing else is allocated in the tile loop.
@@ -42,8 +42,8 @@ class TileWorkspace {
 // Makes a tile's job: its slice of the plate with a margin. `job`'s buffer is used again.
 void cut_tile(const capture::HalfImage& plate, Rect rect, int margin, TileJob& job);
 
-// Renders one tile. `result` must have been sized by size_result. Its bits depend on the frame and the
-// pixels only, not on how they are cut into tiles.
+// Renders one tile. `result` must have been sized by size_result. Its bits depend on the frame and
+// the pixels only, not on how they are cut into tiles.
 void render_tile(const FrameContext& context,
                  const TileJob& tile,
                  TileWorkspace& workspace,

@@ -30,16 +30,15 @@ CellMask facing(const Receivers& r, Vec3f l) {
   const __m256 lx = _mm256_set1_ps(l.x), ly = _mm256_set1_ps(l.y), lz = _mm256_set1_ps(l.z);
   const __m256 zero = _mm256_setzero_ps();
   const auto dot8 = [&](const auto& x, const auto& y, const auto& z, std::size_t k) {
-    return _mm256_add_ps(
-        _mm256_add_ps(_mm256_mul_ps(_mm256_load_ps(&x[k]), lx),
-                      _mm256_mul_ps(_mm256_load_ps(&y[k]), ly)),
-        _mm256_mul_ps(_mm256_load_ps(&z[k]), lz));
+    return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(_mm256_load_ps(&x[k]), lx),
+                                       _mm256_mul_ps(_mm256_load_ps(&y[k]), ly)),
+                         _mm256_mul_ps(_mm256_load_ps(&z[k]), lz));
   };
   for (std::size_t k = 0; k < cell_pixels; k += 8) {
     const __m256 n = _mm256_cmp_ps(dot8(r.nx, r.ny, r.nz, k), zero, _CMP_GT_OQ);
     const __m256 g = _mm256_cmp_ps(dot8(r.gx, r.gy, r.gz, k), zero, _CMP_GT_OQ);
-    const auto bits = static_cast<std::uint64_t>(
-        static_cast<unsigned>(_mm256_movemask_ps(_mm256_and_ps(n, g))));
+    const auto bits =
+        static_cast<std::uint64_t>(static_cast<unsigned>(_mm256_movemask_ps(_mm256_and_ps(n, g))));
     mask[k / 64] |= bits << (k % 64);
   }
 #else
@@ -101,7 +100,8 @@ void add_ray(GatherWorkspace& w,
   w.ray_point[i] = static_cast<std::uint32_t>(point);
 }
 
-// Shoots the stream's rays. Afterwards far_m < 0 marks what is blocked; tr, tg, tb what glass let by.
+// Shoots the stream's rays. Afterwards far_m < 0 marks what is blocked; tr, tg, tb what glass let
+// by.
 void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics) {
   const auto n = static_cast<unsigned>(w.rays);
   TraceContext context(RayKind::shadow, false);
@@ -120,14 +120,15 @@ void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics)
                 w.near_m.data(), w.far_m.data()},
                w.mask.data(), n);
   }
-  RTCRayNp rays{w.ox.data(), w.oy.data(), w.oz.data(), w.near_m.data(), w.dx.data(), w.dy.data(),
-                w.dz.data(), w.time.data(), w.far_m.data(), w.mask.data(), w.id.data(),
-                w.flags.data()};
+  RTCRayNp rays{w.ox.data(),    w.oy.data(),   w.oz.data(), w.near_m.data(),
+                w.dx.data(),    w.dy.data(),   w.dz.data(), w.time.data(),
+                w.far_m.data(), w.mask.data(), w.id.data(), w.flags.data()};
   rtcOccludedNp(scene.embree(), &context.context, &rays, n);
   statistics.shadow_rays += n;
 }
 
-// Calls visit(point, light, blocked, share that passes) for every ray of the stream, and empties it.
+// Calls visit(point, light, blocked, share that passes) for every ray of the stream, and empties
+// it.
 template <class F>
 void flush(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics, F&& visit) {
   if (w.rays == 0) return;
@@ -395,7 +396,8 @@ LightContext make_light_context(const Scene& scene, const LightTable& table, con
     // A light twice as heavy as the mean is looked at twice as closely, in steps of two.
     const float weight = total > 0 ? largest(light.irradiance) / total * n : 0;
     const int finer = weight <= 2 ? 1 : weight <= 8 ? 2 : 4;
-    context.light_block.push_back(static_cast<std::uint8_t>(std::max(1, effort.interleave / finer)));
+    context.light_block.push_back(
+        static_cast<std::uint8_t>(std::max(1, effort.interleave / finer)));
   }
   return context;
 }
@@ -528,8 +530,7 @@ Vec3f gather_lamps(const LightContext& context,
     if (!(cosine > 0) || !(dot(geometric_normal, l) > 0)) continue;
     const float facing_lamp = lamp.normal == Vec3f{} ? 1.0F : -dot(lamp.normal, l);
     if (!(facing_lamp > 0)) continue;
-    const Vec3f share =
-        transmittance(*context.scene, origin, l, 0, distance * (1 - 1e-3F), mask);
+    const Vec3f share = transmittance(*context.scene, origin, l, 0, distance * (1 - 1e-3F), mask);
     ++statistics.shadow_rays;
     sum += lamp.intensity * share * (cosine * facing_lamp / (distance * distance));
   }

@@ -1,4 +1,5 @@
-// Irradiance from the light table at batches of points: who sees which light. Private to the kernel.
+// Irradiance from the light table at batches of points: who sees which light. Private to the
+// kernel.
 #pragma once
 
 #include <array>
@@ -21,14 +22,17 @@ struct Receivers {
   alignas(64) std::array<float, cell_pixels> px, py, pz;  // shadow ray origins, off the surface
   alignas(64) std::array<float, cell_pixels> nx, ny, nz;  // shading normal
   alignas(64) std::array<float, cell_pixels> gx, gy, gz;  // geometric normal
-  alignas(64) std::array<float, cell_pixels> open_r, open_g, open_b;  // out: if nothing virtual blocked
-  alignas(64) std::array<float, cell_pixels> lost_r, lost_g, lost_b;  // out: what virtual objects block
-  std::array<std::uint32_t, cell_pixels> surface;   // same number = same object and material
-  std::array<std::uint32_t, cell_pixels> mask;      // what blocks: mask_virtual, mask_real_blocker
-  std::array<std::uint8_t, cell_pixels> real_first;  // light that real things block does not count as open
-  std::array<float, cell_pixels> share;             // of the pixel; weak points test fewer lights
-  std::array<std::uint64_t, 4> active;              // bit y % 4 * 16 + x of word y / 4
-  int count = 0;                                    // of entries, if not a grid
+  alignas(64) std::array<float, cell_pixels> open_r, open_g,
+      open_b;  // out: if nothing virtual blocked
+  alignas(64) std::array<float, cell_pixels> lost_r, lost_g,
+      lost_b;                                      // out: what virtual objects block
+  std::array<std::uint32_t, cell_pixels> surface;  // same number = same object and material
+  std::array<std::uint32_t, cell_pixels> mask;     // what blocks: mask_virtual, mask_real_blocker
+  std::array<std::uint8_t, cell_pixels>
+      real_first;                        // light that real things block does not count as open
+  std::array<float, cell_pixels> share;  // of the pixel; weak points test fewer lights
+  std::array<std::uint64_t, 4> active;   // bit y % 4 * 16 + x of word y / 4
+  int count = 0;                         // of entries, if not a grid
 };
 
 // 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.
@@ -68,10 +72,10 @@ struct CellMemory {
   CellMask* room = nullptr;
 };
 
-// Adds up the light at the pixels of a cell: open and lost. Returns whether `memory.room` holds this
-// frame's visibility now (glass and real blockers are not kept). Shadow rays go to one pixel of every 4x4
-// block of a smooth surface first, another for each light; where neighbouring blocks disagree, to its
-// 2x2 blocks or pixels as the light's weight asks.
+// Adds up the light at the pixels of a cell: open and lost. Returns whether `memory.room` holds
+// this frame's visibility now (glass and real blockers are not kept). Shadow rays go to one pixel
+// of every 4x4 block of a smooth surface first, another for each light; where neighbouring blocks
+// disagree, to its 2x2 blocks or pixels as the light's weight asks.
 bool gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,

@@ -41,9 +41,12 @@ std::uint64_t shoot(const Scene& scene, const RayLog& log, const LoggedStream& s
   const auto input = [at](const std::vector<float>& values) {
     return const_cast<float*>(values.data() + at);
   };
-  RTCRayNp ray{input(log.ox), input(log.oy), input(log.oz), input(log.near_m), input(log.dx),
-               input(log.dy), input(log.dz), time.data(), far_m.data(),
-               const_cast<unsigned*>(log.mask.data() + at), id.data(), flags.data()};
+  RTCRayNp ray{input(log.ox), input(log.oy),
+               input(log.oz), input(log.near_m),
+               input(log.dx), input(log.dy),
+               input(log.dz), time.data(),
+               far_m.data(),  const_cast<unsigned*>(log.mask.data() + at),
+               id.data(),     flags.data()};
   TraceContext context(s.any_hit ? RayKind::shadow : RayKind::camera, coherent);
   std::uint64_t hits = 0;
   if (s.any_hit) {

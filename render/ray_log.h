@@ -1,4 +1,5 @@
-// The rays that a frame shoots, kept to be shot again: the limit that the kernel is measured against.
+// The rays that a frame shoots, kept to be shot again: the limit that the kernel is measured
+// against.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +11,8 @@ namespace render {
 
 // One stream as it went to Embree.
 struct LoggedStream {
-  bool any_hit = false;   // shadow rays
-  bool coherent = false;  // camera rays
+  bool any_hit = false;                // shadow rays
+  bool coherent = false;               // camera rays
   std::uint32_t first = 0, count = 0;  // in RayLog's arrays
 };
 

@@ -14,9 +14,10 @@ class KeptVisibility;
 // What a FrameJob's numbers stand for on this machine. All of it must outlive the call.
 struct FrameInputs {
   const Scene* scene = nullptr;
-  const calibrate::DirectionTable* directions = nullptr;  // of the job's lens; its size is the picture's
-  const Environment* environment = nullptr;               // of the job's time, match applied, smoothed
-  KeptVisibility* kept_visibility = nullptr;              // a cache, or null: the same bits, slower
+  const calibrate::DirectionTable* directions =
+      nullptr;                                // of the job's lens; its size is the picture's
+  const Environment* environment = nullptr;   // of the job's time, match applied, smoothed
+  KeptVisibility* kept_visibility = nullptr;  // a cache, or null: the same bits, slower
 };
 
 struct FrameResult {
@@ -25,8 +26,9 @@ struct FrameResult {
   RenderStatistics statistics;
 };
 
-// Renders a frame with oneTBB over tiles. `plate` is (height, width, 3) of the picture's size, linear.
-// `result` keeps its buffers from frame to frame. Throws std::invalid_argument if sizes disagree.
+// Renders a frame with oneTBB over tiles. `plate` is (height, width, 3) of the picture's size,
+// linear. `result` keeps its buffers from frame to frame. Throws std::invalid_argument if sizes
+// disagree.
 void render_frame(const FrameInputs& inputs,
                   const FrameJob& job,
                   const capture::HalfImage& plate,

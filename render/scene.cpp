@@ -43,9 +43,7 @@ unsigned mask_of(const Instance& instance) {
 }
 
 void check(const SceneDescription& scene) {
-  const auto fail = [](const std::string& what) {
-    throw std::invalid_argument("scene: " + what);
-  };
+  const auto fail = [](const std::string& what) { throw std::invalid_argument("scene: " + what); };
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
     if (!scene.meshes[i]) fail("mesh " + std::to_string(i) + " is missing");
     const Mesh& mesh = *scene.meshes[i];
@@ -94,18 +92,19 @@ struct Scene::Impl {
     std::uint32_t mesh = 0;
     std::uint32_t instance = none;  // none: inside an instanced scene
     const Vec3f* positions = nullptr;
-    std::vector<Vec3f> normals;  // placed; empty: the mesh's own
+    std::vector<Vec3f> normals;                   // placed; empty: the mesh's own
     std::vector<std::uint32_t> triangle_of_prim;  // empty: prim is the triangle
   };
   static constexpr std::uint32_t none = ~0U;
 
   std::uint64_t id = 0;
   SceneDescription description;
-  std::vector<const Shader*> shaders;     // per material
-  std::vector<std::uint8_t> filtered;     // per material
+  std::vector<std::shared_ptr<const Shader>> shaders;  // per material
+  std::shared_ptr<const BackgroundShader> background;
+  std::vector<std::uint8_t> filtered;  // per material
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
-  std::vector<RTCScene> mesh_scenes;      // of meshes used more than once, else null
+  std::vector<RTCScene> mesh_scenes;  // of meshes used more than once, else null
   std::vector<std::unique_ptr<Part>> parts;
   std::vector<const Part*> part_of_geometry;            // top level, null for instances
   std::vector<std::uint32_t> instance_of_geometry;      // top level
@@ -200,9 +199,8 @@ void Scene::Impl::find_blocker_boxes() {
       return side.x >= side.y && side.x >= side.z ? sum.x : side.y >= side.z ? sum.y : sum.z;
     };
     const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
-    std::nth_element(part.begin(), middle, part.end(), [&](const Item& p, const Item& q) {
-      return coordinate(p) < coordinate(q);
-    });
+    std::nth_element(part.begin(), middle, part.end(),
+                     [&](const Item& p, const Item& q) { return coordinate(p) < coordinate(q); });
     const auto half = part.size() / 2;
     self(self, part.first(half), depth - 1);
     self(self, part.subspan(half), depth - 1);
@@ -225,12 +223,12 @@ void Scene::Impl::grow(Bounds& bounds, const std::array<float, 12>& m, const Mes
 void Scene::Impl::build() {
   check(description);
   for (const Material& material : description.materials) {
-    const Shader& shader = find_shader(material.shader);
-    shader.check(description, material);
-    shaders.push_back(&shader);
-    filtered.push_back(shader.lets_light_through(material) ? 1 : 0);
+    const std::shared_ptr<const Shader>& shader =
+        shaders.emplace_back(find_shader(material.shader));
+    shader->check(description, material);
+    filtered.push_back(shader->lets_light_through(material) ? 1 : 0);
   }
-  find_background(description.background);
+  background = find_background(description.background);
   device = rtcNewDevice("");
   if (!device) throw std::runtime_error("Embree could not start on this machine");
   scene = rtcNewScene(device);
@@ -321,9 +319,9 @@ void Scene::Impl::add_part(std::uint32_t mesh_index,
   if (!all) part->triangle_of_prim = triangles;
 
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* positions = static_cast<Vec3f*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f),
-                              mesh.positions.size()));
+  auto* positions = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                                RTC_FORMAT_FLOAT3, sizeof(Vec3f),
+                                                                mesh.positions.size()));
   auto* indices = static_cast<std::array<std::uint32_t, 3>*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                               sizeof(std::array<std::uint32_t, 3>), triangles.size()));
@@ -365,12 +363,8 @@ void Scene::Impl::add_part(std::uint32_t mesh_index,
   parts.push_back(std::move(part));
 }
 
-HitPoint Scene::Impl::hit_point(unsigned geom_id,
-                                unsigned prim_id,
-                                unsigned inst_id,
-                                float u,
-                                float v,
-                                Vec3f incoming) const {
+HitPoint Scene::Impl::hit_point(
+    unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
   HitPoint hit;
   const Part& p = part(geom_id, inst_id, hit.instance);
   const Mesh& mesh = *description.meshes[p.mesh];
@@ -406,8 +400,8 @@ HitPoint Scene::Impl::hit_point(unsigned geom_id,
     const auto &t0 = mesh.uvs[a], &t1 = mesh.uvs[b], &t2 = mesh.uvs[c];
     hit.u = t0[0] * w + t1[0] * u + t2[0] * v;
     hit.v = t0[1] * w + t1[1] * u + t2[1] * v;
-    const float uv_area = std::abs((t1[0] - t0[0]) * (t2[1] - t0[1]) -
-                                   (t2[0] - t0[0]) * (t1[1] - t0[1]));
+    const float uv_area =
+        std::abs((t1[0] - t0[0]) * (t2[1] - t0[1]) - (t2[0] - t0[0]) * (t1[1] - t0[1]));
     hit.uv_per_metre = double_area > 0 ? std::sqrt(uv_area / double_area) : 0;
   }
   if (!mesh.tangents.empty()) {
@@ -427,10 +421,10 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
   const unsigned n = args->N;
   const Vec3f incoming{RTCRayN_dir_x(args->ray, n, lane), RTCRayN_dir_y(args->ray, n, lane),
                        RTCRayN_dir_z(args->ray, n, lane)};
-  const HitPoint hit = hit_point(
-      RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
-      RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
-      RTCHitN_v(args->hit, n, lane), incoming);
+  const HitPoint hit =
+      hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
+                RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
+                RTCHitN_v(args->hit, n, lane), incoming);
   const ShadeContext context{&description, nullptr};
   return shaders[hit.material]->transmittance(context, description.materials[hit.material], hit,
                                               incoming, kind);
@@ -474,18 +468,15 @@ Scene::~Scene() = default;
 const SceneDescription& Scene::description() const { return impl_->description; }
 std::uint64_t Scene::id() const { return impl_->id; }
 RTCSceneTy* Scene::embree() const { return impl_->scene; }
-HitPoint Scene::hit_point(unsigned geom_id,
-                          unsigned prim_id,
-                          unsigned inst_id,
-                          float u,
-                          float v,
-                          Vec3f incoming) const {
+HitPoint Scene::hit_point(
+    unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
   return impl_->hit_point(geom_id, prim_id, inst_id, u, v, incoming);
 }
 std::uint32_t Scene::instance_of(unsigned geom_id, unsigned inst_id) const {
   return impl_->instance_of_geometry[inst_id == RTC_INVALID_GEOMETRY_ID ? geom_id : inst_id];
 }
 const Shader& Scene::shader_of(std::uint32_t material) const { return *impl_->shaders[material]; }
+const BackgroundShader& Scene::background() const { return *impl_->background; }
 bool Scene::has_real_blockers() const { return impl_->real_blockers; }
 bool Scene::has_filters() const { return impl_->filters; }
 Scene::Bounds Scene::virtual_bounds() const { return impl_->virtual_bounds; }

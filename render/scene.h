@@ -16,6 +16,7 @@ struct RTCDeviceTy;
 
 namespace render {
 
+class BackgroundShader;
 class Shader;
 
 enum class ObjectKind : std::uint8_t { virtual_object = 0, stand_in = 1 };
@@ -80,11 +81,12 @@ class Scene {
   std::uint64_t id() const;
   RTCSceneTy* embree() const;
   // The point that Embree's ids and barycentric u, v name. `incoming` is the ray's direction.
-  HitPoint hit_point(unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v,
-                     Vec3f incoming) const;
+  HitPoint hit_point(
+      unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const;
   // Instance that Embree's ids name, without the rest.
   std::uint32_t instance_of(unsigned geom_id, unsigned inst_id) const;
   const Shader& shader_of(std::uint32_t material) const;
+  const BackgroundShader& background() const;
   // Whether any stand-in blocks light; whether any surface lets some through.
   bool has_real_blockers() const;
   bool has_filters() const;
@@ -94,7 +96,8 @@ class Scene {
   };
   Bounds virtual_bounds() const;
   Bounds bounds() const;
-  // Of all that blocks light (virtual objects, real blockers), and a few tighter boxes that hold it.
+  // Of all that blocks light (virtual objects, real blockers), and a few tighter boxes that hold
+  // it.
   Bounds blocker_bounds() const;
   const std::vector<Bounds>& blocker_boxes() const;
   std::size_t skipped_triangles() const;

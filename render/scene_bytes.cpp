@@ -52,7 +52,8 @@ Texture get_texture(ByteReader& in) {
       texture.channels < 1 || texture.channels > 4) {
     in.fail("has a texture of an impossible size");
   }
-  if (texture.texels.size() != texel_bytes(texture)) in.fail("has a texture without all its texels");
+  if (texture.texels.size() != texel_bytes(texture))
+    in.fail("has a texture without all its texels");
   return texture;
 }
 
@@ -113,7 +114,8 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
     in.get(instance.mesh);
     for (float& value : instance.set_from_object) in.get(value);
     const auto kind = in.get<std::uint8_t>();
-    if (kind > static_cast<std::uint8_t>(ObjectKind::stand_in)) in.fail("has an unknown object kind");
+    if (kind > static_cast<std::uint8_t>(ObjectKind::stand_in))
+      in.fail("has an unknown object kind");
     instance.kind = static_cast<ObjectKind>(kind);
     instance.blocks_light = in.get<std::uint8_t>() != 0;
   }

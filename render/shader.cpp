@@ -23,9 +23,9 @@ Table<BackgroundShader>& backgrounds() {
 }
 
 template <class T>
-const T& find(const Table<T>& table, std::string_view name, const char* what) {
+std::shared_ptr<const T> find(const Table<T>& table, std::string_view name, const char* what) {
   const auto found = table.find(name);
-  if (found != table.end()) return *found->second;
+  if (found != table.end()) return found->second;
   std::string known;
   for (const auto& [key, value] : table) known += (known.empty() ? "" : ", ") + key;
   throw std::invalid_argument("no " + std::string(what) + " is called \"" + std::string(name) +
@@ -40,8 +40,10 @@ void register_shader(std::string name, std::shared_ptr<const Shader> shader) {
 void register_background(std::string name, std::shared_ptr<const BackgroundShader> shader) {
   backgrounds()[std::move(name)] = std::move(shader);
 }
-const Shader& find_shader(std::string_view name) { return find(shaders(), name, "shader"); }
-const BackgroundShader& find_background(std::string_view name) {
+std::shared_ptr<const Shader> find_shader(std::string_view name) {
+  return find(shaders(), name, "shader");
+}
+std::shared_ptr<const BackgroundShader> find_background(std::string_view name) {
   return find(backgrounds(), name, "background");
 }
 

@@ -1,5 +1,6 @@
-// The shader interface: what plugs into the kernel. Shaders are registered by name; a material names
-// one and carries its parameter block (mesh.h). All calls are on batches, from many threads at once.
+// The shader interface: what plugs into the kernel. Shaders are registered by name; a material
+// names one and carries its parameter block (mesh.h). All calls are on batches, from many threads
+// at once.
 #pragma once
 
 #include <array>
@@ -15,7 +16,7 @@
 namespace render {
 
 enum class RayKind : std::uint8_t {
-  camera,      // from the camera, or straight on through something thin: what it sees is the picture
+  camera,  // from the camera, or straight on through something thin: what it sees is the picture
   reflection,  // mirrored or scattered in a narrow lobe: sees virtual objects and the environment
   difference,  // a reflection on a real surface: counts only as (what it hits - environment)
   shadow,
@@ -27,27 +28,27 @@ inline constexpr std::size_t shader_scratch_bytes = 96;
 // One point to shade. Filled by the kernel, by surface(), by the kernel again, by shade().
 struct ShadePoint {
   // From the kernel.
-  HitPoint hit;              // unset for background()
-  Vec3f incoming;            // unit, direction of the ray that arrived
-  float footprint_m = 0;     // width of the pixel's cone here
-  Vec3f throughput;          // share of the pixel that this ray carries
-  Vec3f plate;               // the pixel's background, scene-linear
-  std::uint32_t pixel = 0;   // index in the cell, for patterns
-  std::uint32_t slot = 0;    // the sample that the result is added to
+  HitPoint hit;             // unset for background()
+  Vec3f incoming;           // unit, direction of the ray that arrived
+  float footprint_m = 0;    // width of the pixel's cone here
+  Vec3f throughput;         // share of the pixel that this ray carries
+  Vec3f plate;              // the pixel's background, scene-linear
+  std::uint32_t pixel = 0;  // index in the cell, for patterns
+  std::uint32_t slot = 0;   // the sample that the result is added to
   RayKind kind = RayKind::camera;
   std::uint8_t depth = 0;
   // From surface().
   bool receives_light = false;
-  Vec3f light_normal;        // unit
+  Vec3f light_normal;  // unit
   alignas(8) std::array<std::byte, shader_scratch_bytes> scratch;
   // From the kernel: irradiance on light_normal.
-  Vec3f irradiance;          // of the light table, as it arrives
-  Vec3f irradiance_open;     // the same if no virtual object blocked it
-  Vec3f irradiance_lamps;    // of the set's own lamps, as it arrives
+  Vec3f irradiance;        // of the light table, as it arrives
+  Vec3f irradiance_open;   // the same if no virtual object blocked it
+  Vec3f irradiance_lamps;  // of the set's own lamps, as it arrives
   // From shade(): each is multiplied by throughput by the kernel.
-  Vec3f radiance;            // added to the pixel
-  Vec3f plate_share;         // share of the pixel's background that passes, lamps' light included
-  Vec3f plate_passed;        // the same without lamps: what the matte is made from
+  Vec3f radiance;              // added to the pixel
+  Vec3f plate_share;           // share of the pixel's background that passes, lamps' light included
+  Vec3f plate_passed;          // the same without lamps: what the matte is made from
   bool clipped_plate = false;  // the plate was too bright to tell the surface's albedo
 };
 
@@ -109,12 +110,13 @@ class BackgroundShader {
   virtual void shade(const ShadeContext& context, std::span<ShadePoint* const> points) const = 0;
 };
 
-// Adds a shader. Call at start-up, before threads. Registering a name again replaces it.
+// Adds a shader. Call at start-up, before threads. Registering a name again replaces it for scenes
+// that are built later.
 void register_shader(std::string name, std::shared_ptr<const Shader> shader);
 void register_background(std::string name, std::shared_ptr<const BackgroundShader> shader);
 // Throw std::invalid_argument naming what is not there. "standard" and the background "environment"
 // are always there.
-const Shader& find_shader(std::string_view name);
-const BackgroundShader& find_background(std::string_view name);
+std::shared_ptr<const Shader> find_shader(std::string_view name);
+std::shared_ptr<const BackgroundShader> find_background(std::string_view name);
 
 }  // namespace render

@@ -26,15 +26,19 @@ class StandardShader final : public Shader {
 
   void surface(const ShadeContext& context, std::span<ShadePoint* const> points) const override {
     for (ShadePoint* p : points) {
-      const StandardSurface surface = standard_surface(
-          block_of(context.scene->materials[p->hit.material]), *context.scene, p->hit, p->footprint_m);
+      const StandardSurface surface =
+          standard_surface(block_of(context.scene->materials[p->hit.material]), *context.scene,
+                           p->hit, p->footprint_m);
       p->light_normal = surface.normal;
-      p->receives_light = surface.metallic < 1 && surface.transmission < 1 && surface.base != Vec3f{};
+      p->receives_light =
+          surface.metallic < 1 && surface.transmission < 1 && surface.base != Vec3f{};
       std::memcpy(p->scratch.data(), &surface, sizeof surface);
     }
   }
 
-  void shade(const ShadeContext&, std::span<ShadePoint* const> points, RaySink& rays) const override {
+  void shade(const ShadeContext&,
+             std::span<ShadePoint* const> points,
+             RaySink& rays) const override {
     for (ShadePoint* p : points) {
       StandardSurface surface;
       std::memcpy(&surface, p->scratch.data(), sizeof surface);

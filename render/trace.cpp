@@ -20,15 +20,24 @@ std::optional<TracedHit> closest_hit(
     const Scene& scene, Vec3f origin, Vec3f direction, float near_m, unsigned mask, RayKind kind) {
   TraceContext context(kind, false);
   RTCRayHit ray{};
-  ray.ray = {.org_x = origin.x, .org_y = origin.y, .org_z = origin.z, .tnear = near_m,
-             .dir_x = direction.x, .dir_y = direction.y, .dir_z = direction.z, .time = 0,
-             .tfar = ray_far, .mask = mask, .id = 0, .flags = 0};
+  ray.ray = {.org_x = origin.x,
+             .org_y = origin.y,
+             .org_z = origin.z,
+             .tnear = near_m,
+             .dir_x = direction.x,
+             .dir_y = direction.y,
+             .dir_z = direction.z,
+             .time = 0,
+             .tfar = ray_far,
+             .mask = mask,
+             .id = 0,
+             .flags = 0};
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene.embree(), &context.context, &ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return TracedHit{ray.ray.tfar, ray.hit.geomID, ray.hit.primID, ray.hit.instID[0],
-                   ray.hit.u,    ray.hit.v};
+  return TracedHit{ray.ray.tfar,      ray.hit.geomID, ray.hit.primID,
+                   ray.hit.instID[0], ray.hit.u,      ray.hit.v};
 }
 
 Vec3f transmittance(
@@ -38,9 +47,18 @@ Vec3f transmittance(
   context.transmittance_r = &share.x;
   context.transmittance_g = &share.y;
   context.transmittance_b = &share.z;
-  RTCRay ray{.org_x = origin.x, .org_y = origin.y, .org_z = origin.z, .tnear = near_m,
-             .dir_x = direction.x, .dir_y = direction.y, .dir_z = direction.z, .time = 0,
-             .tfar = far_m, .mask = mask, .id = 0, .flags = 0};
+  RTCRay ray{.org_x = origin.x,
+             .org_y = origin.y,
+             .org_z = origin.z,
+             .tnear = near_m,
+             .dir_x = direction.x,
+             .dir_y = direction.y,
+             .dir_z = direction.z,
+             .time = 0,
+             .tfar = far_m,
+             .mask = mask,
+             .id = 0,
+             .flags = 0};
   rtcOccluded1(scene.embree(), &context.context, &ray);
   return ray.tfar < 0 ? Vec3f{} : share;
 }

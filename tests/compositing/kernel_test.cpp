@@ -3,10 +3,12 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdlib>
 #include <new>
 
 #include "made_shot.h"
+#include "render/kept_visibility.h"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -14,13 +16,14 @@ thread_local bool counting = false;
 }  // namespace
 
 // Counted, to show that nothing allocates in the tile loop.
-void* operator new(std::size_t size) {
+// Not inlined, so that the compiler does not see malloc behind new.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   if (counting) ++allocations;
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace compositing {
 namespace {
@@ -79,13 +82,25 @@ TEST(RenderFrame, DoesNotDependOnTilesOrThreads) {
   }
 }
 
+// Lights' energies, camera and effort change from frame to frame; kept visibility must not show.
 TEST(RenderFrame, IsTheSameColdAndWarm) {
-  const MadeShot shot = made_shot(96, 64, made_scene());
-  const FrameResult cold = render(shot);
-  MadeShot other = made_shot(96, 64, made_scene());
-  other.job.cam_from_set = calibrate::look_at({-2, 3, 2}, {0, 0, 0}, 0.1);
-  render(other);
-  EXPECT_EQ(render(shot).rgba.pixels, cold.rgba.pixels);
+  MadeShot shot = made_shot(96, 64, made_scene(), 70);
+  render::KeptVisibility kept;
+  for (int frame = 0; frame < 6; ++frame) {
+    if (frame == 2) shot.job.lights.lights[3].irradiance *= 0.5F;
+    if (frame == 3) shot.job.cam_from_set = calibrate::look_at({3, -3, 1.6}, {0.3, 0, 0.3}, 0);
+    if (frame == 4) shot.job.lights.lights[5].direction = {0, 0, 1};
+    if (frame == 5) shot.job.effort.interleave = 4;
+    const FrameResult cold = render(shot);
+    FrameResult warm;
+    render::FrameInputs inputs = shot.inputs();
+    inputs.kept_visibility = &kept;
+    render_frame(inputs, shot.job, shot.plate, warm);
+    EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
+    EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
+    const bool reused = frame == 1 || frame == 2;
+    EXPECT_EQ(warm.statistics.shadow_rays < cold.statistics.shadow_rays, reused) << frame;
+  }
 }
 
 TEST(RenderFrame, RestoresThePictureFromPlateMatteAndFill) {
@@ -109,7 +124,8 @@ TEST(RenderFrame, IsWhiteInAWhiteFurnace) {
     white.roughness = roughness;
     white.clearcoat = 0.7F;
     scene.materials.push_back(render::make_standard_material("white", white));
-    scene.meshes.push_back(made_ball({0, 0, 0}, 1, static_cast<std::uint32_t>(scene.materials.size() - 1)));
+    scene.meshes.push_back(
+        made_ball({0, 0, 0}, 1, static_cast<std::uint32_t>(scene.materials.size() - 1)));
     render::Instance ball;
     ball.mesh = 1;
     scene.instances.push_back(ball);

@@ -21,7 +21,9 @@ struct MadeShot {
   render::FrameInputs inputs() const { return {scene.get(), &directions, &environment}; }
 };
 
-inline std::shared_ptr<render::Mesh> made_ball(render::Vec3f centre, float radius, std::uint32_t material) {
+inline std::shared_ptr<render::Mesh> made_ball(render::Vec3f centre,
+                                               float radius,
+                                               std::uint32_t material) {
   auto mesh = std::make_shared<render::Mesh>();
   constexpr int columns = 48, rows = 24;
   for (int j = 0; j <= rows; ++j) {
@@ -120,7 +122,10 @@ inline render::SceneDescription made_scene(bool objects = true) {
   return scene;
 }
 
-inline MadeShot made_shot(int width, int height, render::SceneDescription description, int lights = 32) {
+inline MadeShot made_shot(int width,
+                          int height,
+                          render::SceneDescription description,
+                          int lights = 32) {
   MadeShot shot;
   shot.scene = std::make_unique<render::Scene>(std::move(description));
   const double f = width * 1.1;

@@ -1,5 +1,6 @@
 // A node in miniature: reads one frame's job, scene, environment and tiles as bytes from standard
 // input, and writes the tiles' halves to standard output. Part of travelling_job_test.cpp.
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <span>
@@ -36,7 +37,9 @@ int main() {
   std::copy_n(size.data(), sizeof width_height, reinterpret_cast<std::byte*>(width_height));
   const double f = width_height[0] * 1.1;
   const auto directions = calibrate::make_direction_table(
-      {"pinhole", width_height[0], width_height[1],
+      {"pinhole",
+       width_height[0],
+       width_height[1],
        {f, f, (width_height[0] - 1) / 2.0, (width_height[1] - 1) / 2.0}});
   const render::FrameContext context = make_frame_context({&scene, &directions, &environment}, job);
   render::TileWorkspace workspace;

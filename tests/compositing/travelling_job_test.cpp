@@ -1,4 +1,5 @@
-// A frame is rendered from values alone: another process, given the same bytes, gives the same bits.
+// A frame is rendered from values alone: another process, given the same bytes, gives the same
+// bits.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -49,7 +50,8 @@ TEST(FrameJob, RendersTheSameBitsInAnotherProcess) {
   const auto dir = std::filesystem::path(testing::TempDir()) / "travelling_job";
   std::filesystem::create_directories(dir);
   std::ofstream(dir / "in", std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      .write(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::streamsize>(bytes.size()));
   const std::string command = std::string(PLATELIGHT_RENDER_CHILD) + " < " + (dir / "in").string() +
                               " > " + (dir / "out").string();
   ASSERT_EQ(std::system(command.c_str()), 0);

@@ -105,11 +105,11 @@ TEST(Scene, LetsTintedLightThroughGlassAndNoneThroughPaint) {
   glass.transmission = 1;
   glass.base_color[0] = 0.5F;
   const Scene through(one_square(glass));
-  const Vec3f share = transmittance(through, {0, 0, 0}, {0, 0, 1}, 0, ray_far, ~0U);
+  const Vec3f share = transmittance(through, {0.3F, 0.1F, 0}, {0, 0, 1}, 0, ray_far, ~0U);
   EXPECT_NEAR(share.x, 0.96F * 0.5F, 1e-4F) << "4 % are reflected, half of the red is absorbed";
   EXPECT_NEAR(share.y, 0.96F, 1e-4F);
   const Scene blocked(one_square());
-  EXPECT_EQ(transmittance(blocked, {0, 0, 0}, {0, 0, 1}, 0, ray_far, ~0U), Vec3f{});
+  EXPECT_EQ(transmittance(blocked, {0.3F, 0.1F, 0}, {0, 0, 1}, 0, ray_far, ~0U), Vec3f{});
 }
 
 TEST(Scene, RefusesWhatDoesNotFitTogether) {
