@@ -1,0 +1,75 @@
+// A take as a folder of OpenEXR files: half R, G, B, A and matte, one file per frame.
+#include "compositing/exr_sequence.h"
+
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "capture/exr.h"
+
+namespace compositing {
+namespace {
+
+constexpr std::array<std::pair<const char*, capture::ExrCompression>, 4> compressions{{
+    {"none", capture::ExrCompression::none},
+    {"rle", capture::ExrCompression::rle},
+    {"zip", capture::ExrCompression::zip},
+    {"piz", capture::ExrCompression::piz},
+}};
+
+capture::ExrCompression compression_from_name(const std::string& name) {
+  std::string names;
+  for (const auto& [known, compression] : compressions) {
+    if (name == known) return compression;
+    names += (names.empty() ? "\"" : ", \"") + std::string(known) + "\"";
+  }
+  throw std::invalid_argument("no EXR compression \"" + name + "\"; there are " + names);
+}
+
+}  // namespace
+
+ExrSequence::ExrSequence(const ExrSequenceSettings& settings) : settings_(settings) {
+  compression_from_name(settings.compression);
+  timecode_base(settings.rate);
+  std::error_code error;
+  std::filesystem::create_directories(settings.dir, error);
+  if (error) {
+    throw std::runtime_error(settings.dir + ": cannot be made: " + error.message());
+  }
+  if (::access(settings.dir.c_str(), W_OK | X_OK) != 0 ||
+      !std::filesystem::is_directory(settings.dir, error)) {
+    throw std::runtime_error(settings.dir + ": no folder that can be written to: " +
+                             std::generic_category().message(errno != 0 ? errno : ENOTDIR));
+  }
+}
+
+std::string ExrSequence::path_of(std::int64_t number) const {
+  std::array<char, 64> name{};
+  std::snprintf(name.data(), name.size(), "frame.%06lld.exr", static_cast<long long>(number));
+  return (std::filesystem::path(settings_.dir) / name.data()).string();
+}
+
+void ExrSequence::write(std::int64_t number,
+                        const capture::HalfImage& rgba,
+                        const capture::HalfImage& matte,
+                        const Timecode& timecode) const {
+  constexpr int most_frames_per_second = 40;  // the attribute counts frames 0..39
+  capture::ExrOptions options;
+  options.compression = compression_from_name(settings_.compression);
+  options.frames_per_second = settings_.rate;
+  if (timecode_base(settings_.rate) <= most_frames_per_second) {
+    options.timecode = capture::ExrTimecode{timecode.hours, timecode.minutes, timecode.seconds,
+                                            timecode.frames, timecode.drop_frame};
+  }
+  const std::array<capture::ExrPlanes, 2> planes{capture::ExrPlanes{rgba, {"R", "G", "B", "A"}},
+                                                 capture::ExrPlanes{matte, {"matte"}}};
+  capture::write_exr(path_of(number), planes, options);
+}
+
+}  // namespace compositing

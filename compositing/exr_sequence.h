@@ -1,0 +1,40 @@
+// A take as a folder of OpenEXR files: half R, G, B, A and matte, one file per frame.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "capture/frame.h"
+#include "capture/image.h"
+#include "compositing/timecode.h"
+
+namespace compositing {
+
+struct ExrSequenceSettings {
+  std::string dir;  // made if missing; frames of the same number are replaced
+  capture::Rational rate;
+  std::string compression = "none";  // or "rle", "zip", "piz": smaller and slower in this order
+};
+
+class ExrSequence {
+ public:
+  // Throws std::invalid_argument for an unknown compression, std::runtime_error with path and
+  // reason if the folder cannot be made or written.
+  explicit ExrSequence(const ExrSequenceSettings& settings);
+
+  // Writes frame.NNNNNN.exr: rgba (height, width, 4), matte (height, width, 1), bits as they are,
+  // with the timecode where the rate leaves it room (up to 40 per second). A file has its name only
+  // once it is whole. Throws std::invalid_argument if the images do not fit together,
+  // std::runtime_error with path and reason if the file cannot be written.
+  void write(std::int64_t number,
+             const capture::HalfImage& rgba,
+             const capture::HalfImage& matte,
+             const Timecode& timecode) const;
+
+  std::string path_of(std::int64_t number) const;
+
+ private:
+  ExrSequenceSettings settings_;
+};
+
+}  // namespace compositing

@@ -1,0 +1,103 @@
+// A file that libav writes through, which knows how far it was written whole.
+#include "compositing/output_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <new>
+#include <stdexcept>
+#include <system_error>
+
+extern "C" {
+#include <libavformat/avio.h>
+#include <libavutil/error.h>
+#include <libavutil/mem.h>
+}
+
+namespace compositing {
+namespace {
+
+constexpr int buffer_size = 1 << 16;
+constexpr std::size_t marks_kept = 8;
+
+}  // namespace
+
+OutputFile::OutputFile(const std::string& path) {
+  descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) {
+    throw std::runtime_error(path +
+                             ": cannot be written: " + std::generic_category().message(errno));
+  }
+  auto* const buffer = static_cast<unsigned char*>(av_malloc(buffer_size));
+  if (buffer != nullptr) {
+    context_ = avio_alloc_context(buffer, buffer_size, 1, this, nullptr, &OutputFile::write,
+                                  &OutputFile::seek);
+  }
+  if (context_ == nullptr) {
+    av_free(buffer);
+    ::close(descriptor_);
+    throw std::bad_alloc();
+  }
+}
+
+OutputFile::~OutputFile() {
+  av_freep(&context_->buffer);
+  avio_context_free(&context_);
+  ::close(descriptor_);
+}
+
+int OutputFile::write(void* file, std::uint8_t* data, int size) {
+  const int descriptor = static_cast<OutputFile*>(file)->descriptor_;
+  for (int done = 0; done < size;) {
+    const ssize_t count = ::write(descriptor, data + done, static_cast<std::size_t>(size - done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return AVERROR(errno);
+    done += static_cast<int>(count);
+  }
+  return size;
+}
+
+std::int64_t OutputFile::seek(void* file, std::int64_t offset, int whence) {
+  const int descriptor = static_cast<OutputFile*>(file)->descriptor_;
+  if (whence == AVSEEK_SIZE) return AVERROR(ENOSYS);
+  const off_t place = ::lseek(descriptor, offset, whence & ~AVSEEK_FORCE);
+  return place < 0 ? AVERROR(errno) : place;
+}
+
+bool OutputFile::mark() {
+  const std::int64_t place = avio_tell(context_);
+  if (!marks_.empty() && marks_.back() == place) return false;
+  if (marks_.size() == marks_kept) marks_.erase(marks_.begin());
+  marks_.push_back(place);
+  return true;
+}
+
+bool OutputFile::has_room(std::int64_t place, std::int64_t room) noexcept {
+  static constexpr std::array<std::uint8_t, 65536> zeros{};
+  if (::ftruncate(descriptor_, place) != 0) return false;
+  bool fits = true;
+  for (std::int64_t done = 0; fits && done < room;) {
+    const auto size = static_cast<std::size_t>(
+        std::min<std::int64_t>(room - done, static_cast<std::int64_t>(zeros.size())));
+    const ssize_t count = ::pwrite(descriptor_, zeros.data(), size, place + done);
+    fits = count > 0;
+    done += std::max<ssize_t>(count, 0);
+  }
+  return ::ftruncate(descriptor_, place) == 0 && fits;
+}
+
+bool OutputFile::cut_back(std::int64_t room) noexcept {
+  for (auto place = marks_.rbegin(); place != marks_.rend(); ++place) {
+    if (!has_room(*place, room)) continue;
+    context_->error = 0;
+    return avio_seek(context_, *place, SEEK_SET) == *place;
+  }
+  // Cutting gave up what might have gone beyond this mark; nothing more can be done if it fails.
+  if (!marks_.empty()) static_cast<void>(has_room(marks_.back(), 0));
+  return false;
+}
+
+}  // namespace compositing

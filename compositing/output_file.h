@@ -1,0 +1,41 @@
+// A file that libav writes through, which knows how far it was written whole.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+struct AVIOContext;
+
+namespace compositing {
+
+class OutputFile {
+ public:
+  // Creates or replaces the file. Throws std::runtime_error with path and reason.
+  explicit OutputFile(const std::string& path);
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  ~OutputFile();
+
+  AVIOContext* context() const { return context_; }
+
+  // Remembers that all up to here is whole. Only the last few places are kept. Returns whether the
+  // file grew since.
+  bool mark();
+
+  // After a failed write: cuts the file back to the last mark after which `room` more bytes can be
+  // written, and lets libav write there again. If there is no such mark, cuts it back to the last
+  // one and returns false.
+  bool cut_back(std::int64_t room) noexcept;
+
+ private:
+  static int write(void* file, std::uint8_t* data, int size);
+  bool has_room(std::int64_t place, std::int64_t room) noexcept;
+  static std::int64_t seek(void* file, std::int64_t offset, int whence);
+
+  int descriptor_ = -1;
+  AVIOContext* context_ = nullptr;
+  std::vector<std::int64_t> marks_;
+};
+
+}  // namespace compositing

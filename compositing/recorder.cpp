@@ -1,0 +1,287 @@
+// Records a take beside the show: video with sound, EXR frames, or both, on a thread of its own.
+#include "compositing/recorder.h"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+
+#include "compositing/exr_sequence.h"
+#include "compositing/sound_track.h"
+#include "compositing/video_writer.h"
+
+namespace compositing {
+namespace {
+
+// Sound of dropped frames that waits for the next frame; at 25 frames per second, 40 s.
+constexpr std::size_t most_waiting_sounds = 1024;
+// Sound may lie this far ahead of its picture; what lies further has a damaged time.
+constexpr capture::Time most_sound_ahead = std::chrono::seconds(10);
+
+VideoSettings video_settings(const RecorderSettings& settings) {
+  return {.file = settings.file,
+          .rate = settings.rate,
+          .width = settings.width,
+          .height = settings.height,
+          .codec = settings.codec,
+          .crf = settings.crf,
+          .transfer = settings.transfer,
+          .timecode = to_string(settings.start),
+          .sound_channels = settings.sound_channels,
+          .sound_rate = settings.sound_rate};
+}
+
+void require(bool holds, const std::string& reason) {
+  if (!holds) throw std::invalid_argument(reason);
+}
+
+bool has_form(const capture::HalfImage* image, const RecorderSettings& settings, int channels) {
+  return image != nullptr && image->width == settings.width && image->height == settings.height &&
+         image->channels == channels &&
+         image->pixels.size() == static_cast<std::size_t>(settings.width) *
+                                     static_cast<std::size_t>(settings.height) *
+                                     static_cast<std::size_t>(channels);
+}
+
+void validate(const RecorderSettings& settings) {
+  require(!settings.file.empty() || !settings.exr_dir.empty(),
+          "nothing to record: name a video file, a folder for EXR frames, or both");
+  require(
+      settings.queue_frames >= 1 && settings.queue_frames <= 4096,
+      "the recorder's queue holds 1 to 4096 frames, not " + std::to_string(settings.queue_frames));
+  require(settings.width >= 1 && settings.height >= 1,
+          "a take has at least one row and column, not " + std::to_string(settings.width) + " x " +
+              std::to_string(settings.height));
+  if (!settings.file.empty()) validate(video_settings(settings));
+  frames_since_midnight(settings.start, settings.rate);
+}
+
+}  // namespace
+
+class Recorder::Take {
+ public:
+  explicit Take(const RecorderSettings& settings);
+  ~Take() { close(); }
+
+  bool push(RecordedFrame frame);
+  void wait_for_room();
+  RecorderStatus status() const;
+  void close();
+
+ private:
+  // A frame with the sound that came with it, and with dropped frames before it.
+  struct Item {
+    RecordedFrame frame;
+    std::vector<capture::Sound> sounds;
+  };
+
+  void require_complete(const RecordedFrame& frame) const;
+  bool has_room() const { return static_cast<int>(queue_.size()) < settings_.queue_frames; }
+  bool has_stopped() const { return closing_ || !status_.error.empty(); }
+  void run();
+  bool write_next();
+  void write(const Item& item);
+  std::vector<capture::Sound> take_waiting_sounds();
+  void write_sounds(const std::vector<capture::Sound>& sounds, capture::Time latest);
+  void stop(const std::string& error);
+
+  const RecorderSettings settings_;
+
+  // The recording thread's own.
+  std::optional<ExrSequence> exr_;
+  std::optional<VideoWriter> video_;
+  std::optional<SoundTrack> sound_;
+  std::optional<std::int64_t> first_number_;
+  capture::Time start_{};
+  capture::Time latest_sound_{};
+  std::int64_t taken_ = 0;  // frames from the queue, whatever became of them
+
+  mutable std::mutex mutex_;  // guards what follows
+  std::condition_variable work_;
+  std::condition_variable room_;
+  std::deque<Item> queue_;
+  std::vector<capture::Sound> waiting_sounds_;
+  std::optional<std::int64_t> last_number_;
+  bool closing_ = false;
+  RecorderStatus status_;
+
+  std::thread thread_;
+};
+
+Recorder::Take::Take(const RecorderSettings& settings) : settings_(settings) {
+  validate(settings);
+  if (!settings.exr_dir.empty()) {
+    exr_.emplace(ExrSequenceSettings{settings.exr_dir, settings.rate, settings.exr_compression});
+  }
+  if (!settings.file.empty()) {
+    video_.emplace(video_settings(settings));
+    if (settings.sound_channels > 0) sound_.emplace(settings.sound_channels, settings.sound_rate);
+  }
+  thread_ = std::thread([this] { run(); });
+}
+
+void Recorder::Take::require_complete(const RecordedFrame& frame) const {
+  const std::string name = "frame " + std::to_string(frame.number);
+  require(settings_.exr_dir.empty() || (has_form(frame.rgba.get(), settings_, 4) &&
+                                        has_form(frame.matte.get(), settings_, 1)),
+          name + " lacks a picture and matte of the take's size for its EXR file");
+  require(settings_.file.empty() ||
+              (frame.display_rgb8 &&
+               frame.display_rgb8->size() == static_cast<std::size_t>(settings_.width) *
+                                                 static_cast<std::size_t>(settings_.height) * 3),
+          name + " lacks display codes of the take's size for the video");
+}
+
+bool Recorder::Take::push(RecordedFrame frame) {
+  require_complete(frame);
+  std::unique_lock lock(mutex_);
+  require(!last_number_ || frame.number > *last_number_,
+          "frame " + std::to_string(frame.number) + " came after frame " +
+              std::to_string(last_number_.value_or(0)));
+  last_number_ = frame.number;
+  if (has_stopped()) {
+    ++status_.dropped;
+    return false;
+  }
+  if (frame.sound && waiting_sounds_.size() < most_waiting_sounds) {
+    waiting_sounds_.push_back(std::move(*frame.sound));
+  }
+  frame.sound.reset();
+  if (!has_room()) {
+    ++status_.dropped;
+    return false;
+  }
+  queue_.push_back({std::move(frame), std::exchange(waiting_sounds_, {})});
+  lock.unlock();
+  work_.notify_one();
+  return true;
+}
+
+void Recorder::Take::wait_for_room() {
+  std::unique_lock lock(mutex_);
+  room_.wait(lock, [this] { return has_room() || has_stopped(); });
+}
+
+RecorderStatus Recorder::Take::status() const {
+  const std::lock_guard lock(mutex_);
+  RecorderStatus status = status_;
+  status.queued = static_cast<int>(queue_.size());
+  return status;
+}
+
+void Recorder::Take::close() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+  }
+  work_.notify_one();
+  room_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Recorder::Take::run() {
+  try {
+    while (write_next()) continue;
+    write_sounds(take_waiting_sounds(), latest_sound_);
+    if (video_) video_->close();
+  } catch (const std::exception& error) {
+    stop(error.what());
+  }
+}
+
+std::vector<capture::Sound> Recorder::Take::take_waiting_sounds() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(waiting_sounds_, {});
+}
+
+// Writes the next frame once there is one; false at the end of the take.
+bool Recorder::Take::write_next() {
+  Item item;
+  {
+    std::unique_lock lock(mutex_);
+    work_.wait(lock, [this] { return !queue_.empty() || closing_; });
+    if (queue_.empty()) return false;
+    item = std::move(queue_.front());
+    queue_.pop_front();
+    ++taken_;
+  }
+  room_.notify_all();
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point begin = Clock::now();
+  write(item);
+  const double taken_s = std::chrono::duration<double>(Clock::now() - begin).count();
+  const std::lock_guard lock(mutex_);
+  ++status_.written;
+  status_.write_s += taken_s;
+  status_.worst_write_s = std::max(status_.worst_write_s, taken_s);
+  return true;
+}
+
+void Recorder::Take::write(const Item& item) {
+  const RecordedFrame& frame = item.frame;
+  if (!first_number_) {
+    first_number_ = frame.number;
+    start_ = frame.time;
+  }
+  const std::int64_t index = frame.number - *first_number_;
+  latest_sound_ = start_ + capture::time_of_frame(index, settings_.rate) + most_sound_ahead;
+  if (video_) {
+    video_->write_picture(index, *frame.display_rgb8);
+    write_sounds(item.sounds, latest_sound_);
+  }
+  if (exr_) {
+    exr_->write(frame.number, *frame.rgba, *frame.matte,
+                advance(settings_.start, index, settings_.rate));
+  }
+}
+
+void Recorder::Take::write_sounds(const std::vector<capture::Sound>& sounds, capture::Time latest) {
+  if (!sound_) return;
+  for (const capture::Sound& chunk : sounds) {
+    std::int64_t next = sound_->length();
+    const std::optional<LaidSound> laid = sound_->lay(chunk, start_, latest);
+    if (!laid) {
+      const std::lock_guard lock(mutex_);
+      ++status_.sounds_left_out;
+      continue;
+    }
+    const auto channels = static_cast<std::size_t>(settings_.sound_channels);
+    const std::vector<float> silence(
+        std::min<std::size_t>(static_cast<std::size_t>(laid->silence),
+                              static_cast<std::size_t>(settings_.sound_rate)) *
+        channels);
+    for (std::int64_t left = laid->silence; left > 0;) {
+      const std::int64_t count = std::min<std::int64_t>(left, settings_.sound_rate);
+      video_->write_sound(next,
+                          std::span(silence).first(static_cast<std::size_t>(count) * channels));
+      next += count;
+      left -= count;
+    }
+    video_->write_sound(next, laid->samples);
+  }
+}
+
+void Recorder::Take::stop(const std::string& error) {
+  if (video_) video_->salvage();
+  {
+    const std::lock_guard lock(mutex_);
+    status_.error = error;
+    // The frame that failed, if it was one, and those behind it.
+    status_.dropped += taken_ - status_.written + static_cast<std::int64_t>(queue_.size());
+    queue_.clear();
+  }
+  room_.notify_all();
+}
+
+Recorder::Recorder(const RecorderSettings& settings) : take_(std::make_unique<Take>(settings)) {}
+Recorder::~Recorder() = default;
+bool Recorder::push(RecordedFrame frame) { return take_->push(std::move(frame)); }
+void Recorder::wait_for_room() { take_->wait_for_room(); }
+RecorderStatus Recorder::status() const { return take_->status(); }
+void Recorder::close() { take_->close(); }
+
+}  // namespace compositing

@@ -1,0 +1,86 @@
+// Records a take beside the show: video with sound, EXR frames, or both, on a thread of its own.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/camera.h"
+#include "capture/colour.h"
+#include "capture/frame.h"
+#include "capture/image.h"
+#include "compositing/timecode.h"
+
+namespace compositing {
+
+struct RecorderSettings {
+  std::string file;     // *.mkv, see video_writer.h; "" = no video
+  std::string exr_dir;  // see exr_sequence.h; "" = no EXR frames
+  capture::Rational rate;
+  int width = 0;
+  int height = 0;
+  std::string codec = "h264";                               // or "lossless"
+  int crf = 18;                                             // H.264's constant rate factor
+  capture::Transfer transfer = capture::Transfer::rec1886;  // of display_rgb8: for the file's tags
+  std::string exr_compression = "none";                     // or "rle", "zip", "piz"
+  Timecode start;                                           // label of the first frame
+  int sound_channels = 0;                                   // 0 = silent
+  int sound_rate = 0;
+  int queue_frames = 32;  // frames that may wait, at least 1
+};
+
+// One frame of the take. Numbers ascend; one left out shows the picture before for longer.
+struct RecordedFrame {
+  std::int64_t number = 0;
+  capture::Time time{};  // of the picture, on the sound's clock; the first frame's is the take's 0
+  std::shared_ptr<const capture::HalfImage> rgba;                 // (height, width, 4); for EXR
+  std::shared_ptr<const capture::HalfImage> matte;                // (height, width, 1); for EXR
+  std::shared_ptr<const std::vector<std::uint8_t>> display_rgb8;  // (height, width, 3); for video
+  std::optional<capture::Sound> sound;  // that came with the frame, if any
+};
+
+struct RecorderStatus {
+  std::int64_t written = 0;
+  std::int64_t dropped = 0;  // came while the queue was full, or after an error
+  int queued = 0;
+  std::int64_t sounds_left_out = 0;  // chunks of another form, or with a time far after their frame
+  double worst_write_s = 0;          // longest time that one frame took to write
+  double write_s = 0;                // time spent writing, in all
+  std::string error;                 // why recording stopped; "" = it has not
+};
+
+// Never blocks or throws into the show once it runs: what goes wrong then stands in the status, and
+// what was recorded until then is kept. One thread pushes; any thread may ask for the status.
+//
+// Sound is laid from the first frame's time on without gaps: what is missing becomes silence, what
+// comes twice is left out. The sound of a frame that is dropped is kept.
+class Recorder {
+ public:
+  // Throws std::invalid_argument for settings that cannot be, std::runtime_error with path and
+  // reason if video or folder cannot be written.
+  explicit Recorder(const RecorderSettings& settings);
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+  ~Recorder();  // closes
+
+  // Hands a frame over. False if it was dropped. Never waits for the disk. Throws
+  // std::invalid_argument if the frame lacks what is to be recorded or has another size, or if its
+  // number does not ascend.
+  bool push(RecordedFrame frame);
+
+  // For runs that are not live: waits until the queue has room or recording has stopped.
+  void wait_for_room();
+
+  RecorderStatus status() const;
+
+  // Writes what is queued and finishes the files. Further frames are dropped. Again: does nothing.
+  void close();
+
+ private:
+  class Take;
+  std::unique_ptr<Take> take_;
+};
+
+}  // namespace compositing
