@@ -1,0 +1,173 @@
+// The made court, piece by piece.
+#include "render/made_court.h"
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "render/made_shapes.h"
+#include "render/made_surfaces.h"
+#include "render/standard.h"
+
+namespace render {
+namespace {
+
+constexpr float half_court = court_m / 2;
+constexpr float court_front = court_middle_y - half_court;
+constexpr float court_back = court_middle_y + half_court;
+constexpr float kerb_height = 0.14F;
+constexpr float wall_y = court_back + 2.2F;
+constexpr float wall_height = 2.4F;
+constexpr float far_m = 150;  // where the ground ends
+
+class Builder {
+ public:
+  std::int32_t add(Texture texture) {
+    scene_.textures.push_back(std::make_shared<const Texture>(std::move(texture)));
+    return static_cast<std::int32_t>(scene_.textures.size()) - 1;
+  }
+
+  // A thing of one material: a textured one if `texture` is not -1.
+  void add(const std::string& name,
+           Mesh mesh,
+           std::array<float, 3> base,
+           float roughness,
+           std::int32_t texture = -1,
+           float metallic = 0) {
+    StandardParameters parameters;
+    std::ranges::copy(base, parameters.base_color);
+    parameters.roughness = roughness;
+    parameters.metallic = metallic;
+    parameters.base_color_texture = texture;
+    mesh.materials = {static_cast<std::uint32_t>(scene_.materials.size())};
+    scene_.materials.push_back(make_standard_material(name, parameters));
+    Instance instance;
+    instance.name = name;
+    instance.mesh = static_cast<std::uint32_t>(scene_.meshes.size());
+    scene_.instances.push_back(std::move(instance));
+    scene_.meshes.push_back(std::make_shared<const Mesh>(std::move(mesh)));
+  }
+
+  SceneDescription take() { return std::move(scene_); }
+
+ private:
+  SceneDescription scene_;
+};
+
+constexpr std::array<float, 3> white{1, 1, 1};
+
+void add_ground(Builder& court, int texture_size, std::uint32_t seed) {
+  const auto asphalt = court.add(make_court_texture(texture_size, seed));
+  const auto paving = court.add(make_paving_texture(std::max(texture_size / 4, 1), seed + 1));
+  court.add("court",
+            make_rectangle({-half_court, court_front, 0}, {court_m, 0, 0}, {0, court_m, 0}, 0),
+            white, 0.85F, asphalt);
+  constexpr float slab_tile = 2.4F;
+  const float depth = 2 * far_m;
+  Mesh around =
+      make_rectangle({-far_m, court_back, kerb_height}, {depth, 0, 0}, {0, far_m, 0}, slab_tile);
+  append(around,
+         make_rectangle({-far_m, court_front - far_m, 0}, {depth, 0, 0}, {0, far_m, 0}, slab_tile));
+  append(around, make_rectangle({-far_m, court_front, kerb_height}, {far_m - half_court, 0, 0},
+                                {0, court_m, 0}, slab_tile));
+  append(around, make_rectangle({half_court, court_front, kerb_height}, {far_m - half_court, 0, 0},
+                                {0, court_m, 0}, slab_tile));
+  court.add("paving", std::move(around), white, 0.9F, paving);
+}
+
+void add_concrete(Builder& court, int texture_size, std::uint32_t seed) {
+  const auto concrete = court.add(make_concrete_texture(std::max(texture_size / 8, 1), seed + 2));
+  const auto wall = court.add(make_wall_texture(std::max(texture_size / 2, 1), seed + 3));
+  Mesh kerbs;
+  constexpr float stone = 1.0F;
+  constexpr float gap = 0.008F;
+  for (int i = 0; i < static_cast<int>(court_m); ++i) {
+    const float from = static_cast<float>(i) * stone;
+    const Mesh piece =
+        make_box({gap, 0, -0.1F}, {stone - gap, 0.16F, kerb_height + 0.01F}, 0.018F, 1.3F);
+    append(kerbs, piece, {-half_court + from, court_back, 0});
+    for (const float side : {-half_court - 0.16F, half_court}) {
+      append(kerbs,
+             make_box({0, gap, -0.1F}, {0.16F, stone - gap, kerb_height + 0.01F}, 0.018F, 1.3F),
+             {side, court_front + from, 0});
+    }
+  }
+  court.add("kerb", std::move(kerbs), white, 0.8F, concrete);
+
+  Mesh panels;
+  constexpr float tile = wall_height;  // two panels wide
+  for (int i = -8; i < 8; ++i) {
+    append(panels, make_rectangle({tile * static_cast<float>(i), wall_y, kerb_height}, {tile, 0, 0},
+                                  {0, 0, wall_height}, 0));
+  }
+  court.add("wall", std::move(panels), white, 0.75F, wall);
+  court.add("coping",
+            make_box({-8 * tile, wall_y - 0.05F, kerb_height + wall_height},
+                     {8 * tile, wall_y + 0.35F, kerb_height + wall_height + 0.09F}, 0.015F, 1.1F),
+            white, 0.8F, concrete);
+}
+
+void add_things(Builder& court, int texture_size, std::uint32_t seed) {
+  const auto boards = court.add(make_board_texture(std::max(texture_size / 4, 1), seed + 4));
+  Mesh crates;
+  const Vec3f half = court_crate.size * 0.5F;
+  append(crates,
+         make_box({-half.x, -half.y, 0}, {half.x, half.y, court_crate.size.z}, 0.012F, 1.0F),
+         court_crate.middle, court_crate.yaw_rad);
+  append(crates, make_box({-0.45F, -0.45F, 0}, {0.45F, 0.45F, 0.8F}, 0.012F, 0.9F),
+         {-5.6F, 6.0F, 0}, -0.3F);
+  append(crates, make_box({-0.3F, -0.3F, 0}, {0.3F, 0.3F, 0.55F}, 0.012F, 0.7F),
+         {-5.5F, 6.05F, 0.8F}, 0.2F);
+  append(crates, make_box({-0.35F, -0.35F, 0}, {0.35F, 0.35F, 0.7F}, 0.012F, 0.8F),
+         {-6.7F, 6.3F, 0}, 0.5F);
+  court.add("crates", std::move(crates), white, 0.7F, boards);
+
+  constexpr std::array<std::array<float, 2>, 2> cones{{{-4.1F, 2.2F}, {-3.1F, 4.0F}}};
+  Mesh orange;
+  Mesh rings;
+  for (const auto& [x, y] : cones) {
+    constexpr std::array<std::array<float, 2>, 4> body{
+        {{0.165F, 0.03F}, {0.128F, 0.20F}, {0.031F, 0.68F}, {0, 0.68F}}};
+    append(orange, make_lathe(body, 48, 1), {x, y, 0});
+    append(orange, make_box({-0.2F, -0.2F, 0}, {0.2F, 0.2F, 0.03F}, 0.006F, 1), {x, y, 0}, 0.4F);
+    constexpr std::array<std::array<float, 2>, 2> ring{{{0.1045F, 0.33F}, {0.0745F, 0.48F}}};
+    append(rings, make_lathe(ring, 48, 1), {x, y, 0});
+  }
+  court.add("cones", std::move(orange), {0.78F, 0.13F, 0.02F}, 0.45F);
+  court.add("cone rings", std::move(rings), {0.75F, 0.75F, 0.73F}, 0.4F);
+
+  Mesh posts;
+  constexpr std::array<std::array<float, 2>, 4> post{
+      {{0.055F, 0}, {0.055F, 0.86F}, {0.04F, 0.9F}, {0, 0.9F}}};
+  for (int i = -2; i <= 2; ++i) {
+    append(posts, make_lathe(post, 32, 1),
+           {2.6F * static_cast<float>(i) + 1.3F, court_back + 0.5F, kerb_height});
+  }
+  court.add("bollards", std::move(posts), {0.55F, 0.40F, 0.03F}, 0.4F);
+
+  Mesh lamp;
+  constexpr std::array<std::array<float, 2>, 6> pole{
+      {{0.11F, 0}, {0.11F, 0.5F}, {0.07F, 0.55F}, {0.05F, 5.4F}, {0.02F, 5.45F}, {0, 5.45F}}};
+  append(lamp, make_lathe(pole, 40, 1), {6.4F, court_back + 1.0F, kerb_height});
+  append(lamp, make_box({-1.2F, -0.03F, 5.3F}, {0, 0.03F, 5.36F}, 0.008F, 1),
+         {6.4F, court_back + 1.0F, kerb_height});
+  append(lamp, make_box({-1.75F, -0.13F, 5.25F}, {-1.15F, 0.13F, 5.37F}, 0.03F, 1),
+         {6.4F, court_back + 1.0F, kerb_height});
+  court.add("lamp post", std::move(lamp), {0.55F, 0.56F, 0.57F}, 0.5F, -1, 1);
+}
+
+}  // namespace
+
+SceneDescription make_court(const MadeCourtSettings& settings) {
+  Builder court;
+  add_ground(court, settings.texture_size, settings.seed);
+  add_concrete(court, settings.texture_size, settings.seed);
+  add_things(court, settings.texture_size, settings.seed);
+  SceneDescription scene = court.take();
+  scene.version = 1;
+  return scene;
+}
+
+}  // namespace render
