@@ -11,7 +11,9 @@
 namespace render {
 namespace {
 
-MadeSkySettings small() { return {.height = 128, .sun_azimuth_rad = 2.1F, .sun_elevation_rad = 0.6F}; }
+MadeSkySettings small() {
+  return {.height = 128, .sun_azimuth_rad = 2.1F, .sun_elevation_rad = 0.6F};
+}
 
 Environment as_environment(const capture::Image& map) {
   Environment environment;
