@@ -1,0 +1,154 @@
+// Scenes at the edge of what the kernel can take: the right picture, or a clear refusal; never a
+// number that is not finite.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/compositing/made_shot.h"
+
+namespace compositing {
+namespace {
+
+using capture::float_from_half;
+using render::FrameResult;
+
+FrameResult render(const MadeShot& shot) {
+  FrameResult result;
+  render_frame(shot.inputs(), shot.job, shot.plate, result);
+  for (const capture::Half half : result.rgba.pixels) {
+    EXPECT_TRUE(std::isfinite(float_from_half(half)));
+    if (!std::isfinite(float_from_half(half))) break;
+  }
+  for (const capture::Half half : result.matte.pixels) {
+    EXPECT_TRUE(std::isfinite(float_from_half(half)));
+    if (!std::isfinite(float_from_half(half))) break;
+  }
+  return result;
+}
+
+bool is_plate(const MadeShot& shot, const FrameResult& result) {
+  for (std::size_t i = 0; i < shot.plate.pixels.size(); ++i) {
+    if (result.rgba.pixels[i / 3 * 4 + i % 3] != shot.plate.pixels[i]) return false;
+  }
+  return true;
+}
+
+TEST(KernelAtTheEdge, ShowsThePlateWithoutObjectsOrStandIns) {
+  register_shaders();
+  render::SceneDescription nothing;
+  nothing.background = "plate";
+  const MadeShot shot = made_shot(50, 40, nothing);
+  EXPECT_TRUE(is_plate(shot, render(shot)));
+}
+
+TEST(KernelAtTheEdge, ShowsThePlateWhenTheObjectIsBehindTheCamera) {
+  render::SceneDescription scene = made_scene();
+  for (std::size_t i = 1; i < scene.instances.size(); ++i) {
+    scene.instances[i].set_from_object[3] += 60;
+    scene.instances[i].set_from_object[7] -= 60;
+  }
+  MadeShot shot = made_shot(50, 40, scene);
+  // High light only: objects this far away cast no shadow into the picture.
+  shot.job.lights.lights = {{{0, 0, 1}, {1, 1, 1}, 0}};
+  EXPECT_TRUE(is_plate(shot, render(shot)));
+}
+
+TEST(KernelAtTheEdge, IsAllObjectWhenTheCameraIsInsideIt) {
+  MadeShot shot = made_shot(50, 40, made_scene());
+  shot.job.cam_from_set = calibrate::look_at({0, 0, 0.5}, {0, 1, 0.5}, 0);
+  const FrameResult result = render(shot);
+  for (std::size_t i = 3; i < result.rgba.pixels.size(); i += 4) {
+    ASSERT_EQ(float_from_half(result.rgba.pixels[i]), 1.0F);
+  }
+}
+
+TEST(KernelAtTheEdge, ShowsThePlateOnAStandInSeenEdgeOn) {
+  MadeShot shot = made_shot(60, 45, made_scene(false));
+  for (const double height : {0.0, 1e-9, 1e-6, 1e-3}) {
+    shot.job.cam_from_set = calibrate::look_at({3, -3, height}, {0, 0, height}, 0);
+    EXPECT_TRUE(is_plate(shot, render(shot))) << height;
+  }
+}
+
+TEST(KernelAtTheEdge, RendersPicturesOfOnePixelAndOddSizes) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {1, 50}, {17, 3}, {15, 33}}) {
+    const MadeShot shot = made_shot(width, height, made_scene());
+    const FrameResult result = render(shot);
+    EXPECT_EQ(result.rgba.width, width);
+    EXPECT_EQ(result.rgba.height, height);
+  }
+}
+
+TEST(KernelAtTheEdge, RendersAnEightKPicture) {
+  MadeShot shot = made_shot(7680, 4320, made_scene(), 2);
+  shot.job.effort.aa_samples = 1;
+  const FrameResult result = render(shot);
+  EXPECT_GT(result.statistics.virtual_pixels, 1000000U);
+}
+
+TEST(KernelAtTheEdge, TakesAThousandInstances) {
+  render::SceneDescription scene = made_scene();
+  for (int i = 0; i < 1000; ++i) {
+    render::Instance ball = scene.instances[1];
+    ball.set_from_object[3] = static_cast<float>(i % 32) - 16;
+    ball.set_from_object[7] = static_cast<float>(i / 32) * 1.5F + 2;
+    scene.instances.push_back(ball);
+  }
+  const MadeShot shot = made_shot(160, 120, scene);
+  EXPECT_GT(render(shot).statistics.virtual_pixels, 4000U);
+}
+
+TEST(KernelAtTheEdge, TakesTrianglesWithoutAreaAndVerticesThatAreNotFinite) {
+  render::SceneDescription scene = made_scene();
+  auto mesh = std::make_shared<render::Mesh>(*scene.meshes[1]);
+  for (std::uint32_t i = 0; i < mesh->triangles.size(); i += 3)
+    mesh->triangles[i][1] = mesh->triangles[i][0];
+  for (std::size_t i = 0; i < mesh->positions.size(); i += 50) mesh->positions[i].y = NAN;
+  for (std::size_t i = 0; i < mesh->normals.size(); i += 7) mesh->normals[i] = {};
+  scene.meshes[1] = mesh;
+  render(made_shot(80, 60, scene));
+}
+
+TEST(KernelAtTheEdge, ShowsBlackObjectsAndTheWholePlateInTheDark) {
+  MadeShot shot = made_shot(80, 60, made_scene());
+  shot.environment = made_sky(32, 0, 0);
+  shot.job.lights.lights.clear();
+  const FrameResult result = render(shot);
+  for (std::size_t i = 0; i < result.matte.pixels.size(); ++i) {
+    const float coverage = float_from_half(result.rgba.pixels[i * 4 + 3]);
+    ASSERT_NEAR(float_from_half(result.matte.pixels[i]), coverage, 2e-3F) << "no light, no shadow";
+    if (coverage == 1) {
+      ASSERT_LT(float_from_half(result.rgba.pixels[i * 4]), 1e-3F);
+    }
+  }
+}
+
+TEST(KernelAtTheEdge, ClampsSunsBeyondHalfAndCountsThem) {
+  MadeShot shot = made_shot(80, 60, made_scene());
+  shot.environment.radiance.at(3, 20, 0) = shot.environment.radiance.at(3, 20, 1) = 1e9F;
+  shot.environment.smoothed.clear();
+  smooth_for_reflections(shot.environment);
+  shot.job.lights.lights.push_back({{0, 0.6F, 0.8F}, {1e9F, 1e9F, 1e9F}, 0});
+  const FrameResult result = render(shot);
+  EXPECT_GT(result.statistics.clamped_values, 0U);
+}
+
+TEST(KernelAtTheEdge, CountsTheDepthLimitInAHallOfMirrors) {
+  render::SceneDescription scene = made_scene(false);
+  scene.instances.clear();
+  render::StandardParameters mirror;
+  mirror.metallic = 1;
+  mirror.roughness = 0;
+  scene.materials.push_back(render::make_standard_material("mirror", mirror));
+  scene.meshes.push_back(
+      made_ball({0, 0, 0}, 10, static_cast<std::uint32_t>(scene.materials.size() - 1)));
+  render::Instance ball;
+  ball.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+  scene.instances.push_back(ball);
+  MadeShot shot = made_shot(40, 30, scene);
+  shot.job.effort.accuracy = 1;
+  EXPECT_GT(render(shot).statistics.depth_limit_hits, 1000U);
+}
+
+}  // namespace
+}  // namespace compositing
