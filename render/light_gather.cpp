@@ -23,48 +23,93 @@ int point_of(int word, int bit) { return word * 64 + bit; }
 
 float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
 
-// Which of the four words' pixels face the light, in both their normals.
-CellMask facing(const Receivers& r, Vec3f l) {
-  CellMask mask{};
 #if defined(__AVX2__)
-  const __m256 lx = _mm256_set1_ps(l.x), ly = _mm256_set1_ps(l.y), lz = _mm256_set1_ps(l.z);
-  const __m256 zero = _mm256_setzero_ps();
-  const auto dot8 = [&](const auto& x, const auto& y, const auto& z, std::size_t k) {
-    return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(_mm256_load_ps(&x[k]), lx),
-                                       _mm256_mul_ps(_mm256_load_ps(&y[k]), ly)),
-                         _mm256_mul_ps(_mm256_load_ps(&z[k]), lz));
-  };
-  for (std::size_t k = 0; k < cell_pixels; k += 8) {
-    const __m256 n = _mm256_cmp_ps(dot8(r.nx, r.ny, r.nz, k), zero, _CMP_GT_OQ);
-    const __m256 g = _mm256_cmp_ps(dot8(r.gx, r.gy, r.gz, k), zero, _CMP_GT_OQ);
-    const auto bits =
-        static_cast<std::uint64_t>(static_cast<unsigned>(_mm256_movemask_ps(_mm256_and_ps(n, g))));
-    mask[k / 64] |= bits << (k % 64);
-  }
+using Lanes = __m256;
+constexpr std::size_t lanes = 8;
+Lanes load(const float* at) { return _mm256_load_ps(at); }
+void store(float* at, Lanes v) { _mm256_store_ps(at, v); }
+Lanes all(float v) { return _mm256_set1_ps(v); }
+Lanes add(Lanes a, Lanes b) { return _mm256_add_ps(a, b); }
+Lanes multiply(Lanes a, Lanes b) { return _mm256_mul_ps(a, b); }
+Lanes positive(Lanes v) { return _mm256_cmp_ps(v, _mm256_setzero_ps(), _CMP_GT_OQ); }
+Lanes both(Lanes a, Lanes b) { return _mm256_and_ps(a, b); }
+unsigned bits_of(Lanes mask) { return static_cast<unsigned>(_mm256_movemask_ps(mask)); }
+// Lanes whose bit is set, as a mask.
+Lanes mask_of(unsigned bits) {
+  const __m256i which = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i set = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(bits)), which);
+  return _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, which));
+}
 #else
-  for (std::size_t k = 0; k < cell_pixels; ++k) {
-    const float n = r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
-    const float g = r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z;
-    if (n > 0 && g > 0) mask[k / 64] |= std::uint64_t{1} << (k % 64);
-  }
+struct Lanes {
+  float v;
+};
+constexpr std::size_t lanes = 1;
+Lanes load(const float* at) { return {*at}; }
+void store(float* at, Lanes v) { *at = v.v; }
+Lanes all(float v) { return {v}; }
+Lanes add(Lanes a, Lanes b) { return {a.v + b.v}; }
+Lanes multiply(Lanes a, Lanes b) { return {a.v * b.v}; }
+// Masks are all ones or all zeros; as floats they are only ever combined by both() and bits_of().
+Lanes positive(Lanes v) { return {std::bit_cast<float>(v.v > 0 ? ~0U : 0U)}; }
+Lanes both(Lanes a, Lanes b) {
+  return {std::bit_cast<float>(std::bit_cast<unsigned>(a.v) & std::bit_cast<unsigned>(b.v))};
+}
+unsigned bits_of(Lanes mask) { return std::bit_cast<unsigned>(mask.v) >> 31; }
+Lanes mask_of(unsigned bits) { return {std::bit_cast<float>(bits & 1 ? ~0U : 0U)}; }
 #endif
-  for (std::size_t w = 0; w < 4; ++w) mask[w] &= r.active[w];
-  return mask;
+
+Lanes dot(Lanes ax, Lanes ay, Lanes az, Vec3f b) {
+  return add(add(multiply(ax, all(b.x)), multiply(ay, all(b.y))), multiply(az, all(b.z)));
 }
 
-// open += irradiance of one light at all pixels that it faces.
-void add_open(Receivers& r, const DirectionalLight& light) {
-  const Vec3f l = light.direction, e = light.irradiance;
-  alignas(64) std::array<float, cell_pixels> cosine;
-  for (std::size_t k = 0; k < cell_pixels; ++k) {
-    const float n = r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
-    const float g = r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z;
-    cosine[k] = (n > 0 && g > 0) ? n : 0.0F;
+// For each light: which pixels it shines on (in both their normals); and its irradiance there,
+// added to `open`.
+void find_lit(Receivers& r, std::span<const DirectionalLight> lights, std::span<CellMask> lit) {
+  std::fill(lit.begin(), lit.end(), CellMask{});
+  for (std::size_t k = 0; k < cell_pixels; k += lanes) {
+    const auto active = static_cast<unsigned>(r.active[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
+    if (!active) continue;
+    const Lanes here = mask_of(active);
+    const Lanes nx = load(&r.nx[k]), ny = load(&r.ny[k]), nz = load(&r.nz[k]);
+    const Lanes gx = load(&r.gx[k]), gy = load(&r.gy[k]), gz = load(&r.gz[k]);
+    Lanes red = load(&r.open_r[k]), green = load(&r.open_g[k]), blue = load(&r.open_b[k]);
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      const Lanes cosine = dot(nx, ny, nz, lights[i].direction);
+      const Lanes shines =
+          both(both(positive(cosine), positive(dot(gx, gy, gz, lights[i].direction))), here);
+      const Lanes weight = both(cosine, shines);
+      const Vec3f e = lights[i].irradiance;
+      red = add(red, multiply(weight, all(e.x)));
+      green = add(green, multiply(weight, all(e.y)));
+      blue = add(blue, multiply(weight, all(e.z)));
+      lit[i][k / 64] |= static_cast<std::uint64_t>(bits_of(shines)) << (k % 64);
+    }
+    store(&r.open_r[k], red), store(&r.open_g[k], green), store(&r.open_b[k], blue);
   }
-  for (std::size_t k = 0; k < cell_pixels; ++k) {
-    r.open_r[k] += cosine[k] * e.x;
-    r.open_g[k] += cosine[k] * e.y;
-    r.open_b[k] += cosine[k] * e.z;
+}
+
+// Irradiance of the lights that shine on a pixel but are not seen from it, added to `lost`.
+void add_hidden(Receivers& r,
+                std::span<const DirectionalLight> lights,
+                std::span<const CellMask> lit,
+                std::span<const CellMask> seen) {
+  for (std::size_t k = 0; k < cell_pixels; k += lanes) {
+    const auto active = static_cast<unsigned>(r.active[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
+    if (!active) continue;
+    const Lanes nx = load(&r.nx[k]), ny = load(&r.ny[k]), nz = load(&r.nz[k]);
+    Lanes red = load(&r.lost_r[k]), green = load(&r.lost_g[k]), blue = load(&r.lost_b[k]);
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      const auto hidden = static_cast<unsigned>((lit[i][k / 64] & ~seen[i][k / 64]) >> (k % 64)) &
+                          ((1U << lanes) - 1);
+      if (!hidden) continue;
+      const Lanes weight = both(dot(nx, ny, nz, lights[i].direction), mask_of(hidden));
+      const Vec3f e = lights[i].irradiance;
+      red = add(red, multiply(weight, all(e.x)));
+      green = add(green, multiply(weight, all(e.y)));
+      blue = add(blue, multiply(weight, all(e.z)));
+    }
+    store(&r.lost_r[k], red), store(&r.lost_g[k], green), store(&r.lost_b[k], blue);
   }
 }
 
@@ -410,7 +455,7 @@ bool gather_cell(const LightContext& context,
   clear_sums(r);
   if (!memory.kept) find_smooth_blocks(r, w);
   const auto& lights = context.table->lights;
-  const Box box = box_of(r);
+  const Box box = memory.kept ? Box{} : box_of(r);
   const bool real = context.scene->has_real_blockers();
   CellMask real_first{};
   if (real) {
@@ -427,12 +472,12 @@ bool gather_cell(const LightContext& context,
     const auto first32 = static_cast<std::uint32_t>(first);
     w.tints.clear();
     std::array<bool, GatherWorkspace::group> skip{};
-    for (std::size_t i = 0; i < count; ++i) {
-      const DirectionalLight& light = lights[first + i];
-      w.lit[i] = facing(r, light.direction);
-      add_open(r, light);
-      if (memory.kept) continue;
-      skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, light.direction);
+    const std::span<const DirectionalLight> group(&lights[first], count);
+    find_lit(r, group, std::span(w.lit).first(count));
+    if (!memory.kept) {
+      for (std::size_t i = 0; i < count; ++i) {
+        skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, group[i].direction);
+      }
     }
     if (any_real_first) {
       // Light that real things block is not there to be lost.
@@ -460,14 +505,7 @@ bool gather_cell(const LightContext& context,
       complete &= w.tints.empty();
       if (complete) std::copy_n(w.seen.begin(), count, memory.room + first);
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::size_t word = 0; word < 4; ++word) {
-        for (std::uint64_t bits = w.lit[i][word] & ~w.seen[i][word]; bits != 0; bits &= bits - 1) {
-          const auto k = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-          add_lost(r, k, lights[first + i], {1, 1, 1});
-        }
-      }
-    }
+    add_hidden(r, group, std::span(w.lit).first(count), std::span(w.seen).first(count));
     for (const auto& tint : w.tints) add_lost(r, tint.point, lights[tint.light], tint.lost_share);
   }
   return complete;
