@@ -83,13 +83,6 @@ Vec3f bilinear(const capture::Image& map, MapPoint at) {
   return top * (1 - fy) + bottom * fy;
 }
 
-void check_map(const capture::Image& map) {
-  if (map.height < 1 || map.width != 2 * map.height || map.channels != 3 ||
-      map.pixels.size() != map.index(map.height, 0)) {
-    throw std::invalid_argument("an environment must be twice as wide as high, with 3 channels");
-  }
-}
-
 // `level` = `map` with every value as it counts.
 void copy_counted(const capture::Image& map, capture::Image& level) {
   level.height = map.height;
@@ -100,6 +93,14 @@ void copy_counted(const capture::Image& map, capture::Image& level) {
 }
 
 }  // namespace
+
+void check(const Environment& env) {
+  const capture::Image& map = env.radiance;
+  if (map.height < 1 || map.width != 2 * map.height || map.channels != 3 ||
+      map.pixels.size() != map.index(map.height, 0)) {
+    throw std::invalid_argument("an environment must be twice as wide as high, with 3 channels");
+  }
+}
 
 Vec3f direction_of_texel(float x, float y, int width, int height) {
   const float azimuth_rad = (0.5F - (x + 0.5F) / static_cast<float>(width)) * 2 * pi;
@@ -150,7 +151,7 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal) {
 }
 
 void smooth_for_reflections(Environment& env, int levels) {
-  check_map(env.radiance);
+  check(env);
   if (levels < 2)
     throw std::invalid_argument("an environment needs at least 2 levels of roughness");
   env.smoothed.resize(static_cast<std::size_t>(levels));

@@ -26,6 +26,9 @@ struct Environment {
   float unseen_share = 0;  // of the irradiance on a surface that faces up: filled, not measured
 };
 
+// Throws std::invalid_argument if `radiance` is not (height, 2 * height, 3).
+void check(const Environment& env);
+
 // The brightest radiance that counts; brighter ones, and infinity, are taken as this.
 inline constexpr float brightest_radiance = 1e9F;
 
@@ -53,7 +56,7 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal);
 // Fills `smoothed` with `levels` (at least 2) levels. About 2 ms for 512x256. The lobe is that of a
 // surface seen head-on, the same all around, of alpha = roughness^2; what it would send below the
 // surface is mirrored up again, as in standard.h, so every level keeps a white map white.
-// Throws std::invalid_argument if `radiance` is not (height, 2 * height, 3) or levels is below 2.
+// Throws std::invalid_argument as check(), or if levels is below 2.
 void smooth_for_reflections(Environment& env, int levels = 6);
 
 // How directions that the probe did not see are filled.

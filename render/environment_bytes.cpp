@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t environment_magic = 0x314E4550;  // "PEN1"
+constexpr std::uint32_t environment_magic = 0x324E4550;  // "PEN2"
 
 void put(ByteWriter& out, const capture::Image& image) {
   out.put(image.height), out.put(image.width), out.put(image.channels);
@@ -34,6 +34,7 @@ std::vector<std::byte> serialize(const Environment& environment) {
   out.put(environment_magic);
   put(out, environment.radiance);
   out.put_all(environment.seen);
+  out.put(environment.unseen_share);
   out.put(static_cast<std::uint64_t>(environment.smoothed.size()));
   for (const capture::Image& level : environment.smoothed) put(out, level);
   return out.take();
@@ -45,6 +46,7 @@ Environment parse_environment(std::span<const std::byte> bytes) {
   Environment environment;
   environment.radiance = get_image(in);
   in.get_all(environment.seen);
+  in.get(environment.unseen_share);
   const std::size_t texels = environment.radiance.pixels.size() / 3;
   if (!environment.seen.empty() && environment.seen.size() != texels) {
     in.fail("has a coverage of another size than its map");

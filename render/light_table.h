@@ -28,24 +28,36 @@ struct LightTable {
   std::vector<DirectionalLight> lights;
   std::vector<LocalLight> lamps;
   std::uint64_t version = 0;
-  float unseen_share = 0;     // of the upward irradiance: filled, not measured
-  float error_estimate = 0;   // relative RMS error of shading that the table expects of itself
+  float unseen_share = 0;    // of the upward irradiance: filled, not measured
+  float error_estimate = 0;  // relative RMS error of shading that the table expects of itself
   friend bool operator==(const LightTable&, const LightTable&) = default;
 };
 
+// median_cut: regions of equal energy, cut across their longer side.
+// split: bright compact sources (sun, lamps, windows) are told from the rest and cut apart from it;
+// the region whose shadows would err most is cut next, where its parts spread least. So sources get
+// lights in proportion to their energy and size.
 enum class LightMethod { median_cut, split };
 
 struct LightTableSettings {
   int count = 64;
   LightMethod method = LightMethod::split;
-  float bright_share = 0.125F;  // split: share of the lights kept for bright compact sources
+  friend bool operator==(const LightTableSettings&, const LightTableSettings&) = default;
 };
 
-// The table of an environment. Works on a copy area-averaged to 256x128 or less. NaN and negative
-// radiance count as 0. A black map gives an empty table. Deterministic.
+inline constexpr int most_lights = 4096;
+
+// Throws std::invalid_argument unless count is from 1 to 4096.
+void check(const LightTableSettings& settings);
+
+// The table of an environment: at most `count` lights. Works on a copy area-averaged to 256x128 or
+// less; directions of bright sources are taken from the full map. NaN and negative radiance count
+// as 0. A black map gives an empty table. The lights' irradiances add up to the map's radiance
+// times solid angle. Deterministic. Throws std::invalid_argument as check(), or if the map is none.
 //
-// Debevec, "A Median Cut Algorithm for Light Probe Sampling", SIGGRAPH 2005 posters; bright sources
-// are split off first, as the design says.
+// Debevec, "A Median Cut Algorithm for Light Probe Sampling", SIGGRAPH 2005 posters. Where to cut,
+// in `split`: Viriyothai and Debevec, "Variance Minimization Light Probe Sampling", SIGGRAPH 2009
+// posters; which region to cut next is ours.
 LightTable make_light_table(const Environment& env, const LightTableSettings& settings);
 
 }  // namespace render

@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "render/lobe_filter.h"
-#include "tests/render/made_sky.h"
+#include "tests/render/sun_and_sky.h"
 
 namespace render {
 namespace {
@@ -72,7 +72,7 @@ TEST(IrradianceOf, IsPiUnderAnEvenSkyFromEverySide) {
 }
 
 TEST(RadianceOf, IsTheTexelAtItsCentreAndContinuousEverywhere) {
-  const Environment env = make_sky({}, 32);
+  const Environment env = make_sun_and_sky({}, 32);
   for (int y = 0; y < 32; ++y) {
     for (int x = 0; x < 64; ++x) {
       const Vec3f d = direction_of_texel(static_cast<float>(x), static_cast<float>(y), 64, 32);
@@ -81,7 +81,7 @@ TEST(RadianceOf, IsTheTexelAtItsCentreAndContinuousEverywhere) {
     }
   }
   // Across the seam and over both poles.
-  const Environment smooth = make_sky({.sun_radius_rad = 0.5F}, 64);
+  const Environment smooth = make_sun_and_sky({.sun_radius_rad = 0.5F}, 64);
   for (const Vec3f a : {Vec3f{-1, 1e-6F, 0.2F}, Vec3f{1e-6F, 0, 1}, Vec3f{1e-6F, 0, -1}}) {
     const Vec3f b{a.x, -a.y, a.z};
     const Vec3f c{-a.x, a.y, a.z};
@@ -125,7 +125,7 @@ TEST(SmoothForReflections, KeepsAWhiteMapWhiteAtEveryRoughness) {
 }
 
 TEST(SmoothForReflections, AgreesWithTheLobeSummedDirectlyOverTheMap) {
-  Environment env = make_sky({.sun_radius_rad = 0.1F}, 128);
+  Environment env = make_sun_and_sky({.sun_radius_rad = 0.1F}, 128);
   smooth_for_reflections(env);
   std::mt19937 random(4);
   for (const std::size_t level : {1U, 2U, 3U, 5U}) {
@@ -204,7 +204,7 @@ TEST(SmoothForReflections, CountsNotANumberAndNegativeRadianceAsZero) {
 }
 
 TEST(SmoothForReflections, GivesTheSameBitsEachTime) {
-  Environment a = make_sky({}, 64);
+  Environment a = make_sun_and_sky({}, 64);
   Environment b = a;
   smooth_for_reflections(a);
   smooth_for_reflections(b);
@@ -221,7 +221,7 @@ TEST(SmoothForReflections, RefusesMapsThatAreNotTwiceAsWideAsHigh) {
 }
 
 TEST(AreaAveraged, KeepsThePowerOfAnyMapAtAnySize) {
-  const Environment env = make_sky({}, 90);
+  const Environment env = make_sun_and_sky({}, 90);
   for (const int height : {64, 45, 30, 7, 1, 180}) {
     const capture::Image small = area_averaged(env.radiance, height);
     EXPECT_EQ(small.width, 2 * height);

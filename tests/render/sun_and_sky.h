@@ -9,7 +9,7 @@
 
 namespace render {
 
-struct MadeSky {
+struct SunAndSky {
   float sun_radius_rad = 0.00465F;  // the real sun's
   float sun_irradiance = 2.5F;      // on a surface that faces it
   float sun_azimuth_rad = -0.35F;
@@ -17,13 +17,13 @@ struct MadeSky {
   float clouds = 0.9F;
 };
 
-inline Vec3f sun_direction(const MadeSky& sky) {
+inline Vec3f sun_direction(const SunAndSky& sky) {
   const float c = std::cos(sky.sun_elevation_rad);
   return {c * std::cos(sky.sun_azimuth_rad), c * std::sin(sky.sun_azimuth_rad),
           std::sin(sky.sun_elevation_rad)};
 }
 
-inline Vec3f radiance_without_sun(const MadeSky& sky, Vec3f d) {
+inline Vec3f radiance_without_sun(const SunAndSky& sky, Vec3f d) {
   if (d.z <= 0) return {.14F, .13F, .11F};
   const float t = (1 - d.z) * (1 - d.z) * (1 - d.z);
   Vec3f c = Vec3f{.18F, .32F, .62F} * (1 - t) + Vec3f{.75F, .8F, .85F} * t;
@@ -34,7 +34,7 @@ inline Vec3f radiance_without_sun(const MadeSky& sky, Vec3f d) {
 }
 
 // (height, 2 * height, 3). The sun's irradiance is exact, however few texels it covers.
-inline Environment make_sky(const MadeSky& sky, int height) {
+inline Environment make_sun_and_sky(const SunAndSky& sky, int height) {
   Environment env;
   env.radiance = capture::make_image(height, 2 * height);
   env.seen.assign(env.radiance.pixels.size() / 3, 1);
@@ -102,7 +102,7 @@ inline Environment with_noise(const Environment& env, float sigma, unsigned seed
   return noisy;
 }
 
-// Surface normals evenly over the upper half.
+// ShadedSurface normals evenly over the upper half.
 inline std::vector<Vec3f> upward_normals(int count) {
   std::vector<Vec3f> normals;
   for (int i = 0; i < count; ++i) {

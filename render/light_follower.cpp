@@ -1,0 +1,101 @@
+// The table of lights from frame to frame, without flicker.
+#include "render/light_follower.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "render/lobe_filter.h"
+
+namespace render {
+namespace {
+
+// Lights with less of the energy than this may jump without being called changed: they are noise.
+constexpr double least_share = 0.005;
+
+double luminance_of(const std::array<double, 3>& irradiance) {
+  return .2126 * irradiance[0] + .7152 * irradiance[1] + .0722 * irradiance[2];
+}
+
+double total_luminance(const std::vector<RegionLight>& sums) {
+  double total = 0;
+  for (const RegionLight& sum : sums) total += sum.luminance;
+  return total;
+}
+
+}  // namespace
+
+LightTable LightFollower::follow(const Environment& env, const LightFollowerSettings& settings) {
+  check(settings.table);
+  check(env);
+  area_average(env.radiance, std::min(env.radiance.height, light_map_height), map_);
+  LightTable table;
+  table.unseen_share = env.unseen_share;
+  std::vector<RegionLight> sums;
+  if (regions_.height == map_.height && made_with_ == settings.table) {
+    sums = sum_regions(regions_, map_, env.radiance);
+  }
+  if (sums.empty() || (total_luminance(sums) > 0 && has_moved(sums, settings.tolerance_rad))) {
+    sums = make_anew(env, settings.table);
+  }
+  table.version = version_;
+  if (!(total_luminance(sums) > 0)) return table;
+  take_energies(sums, settings);
+  for (const Followed& followed : lights_) {
+    DirectionalLight light = followed.light;
+    light.irradiance = {static_cast<float>(followed.irradiance[0]),
+                        static_cast<float>(followed.irradiance[1]),
+                        static_cast<float>(followed.irradiance[2])};
+    table.lights.push_back(light);
+  }
+  table.error_estimate = estimate_light_error(table.lights, env.radiance.height);
+  return table;
+}
+
+std::vector<RegionLight> LightFollower::make_anew(const Environment& env,
+                                                  const LightTableSettings& settings) {
+  regions_ = cut_light_regions(map_, settings);
+  made_with_ = settings;
+  lights_.clear();
+  std::vector<RegionLight> sums = sum_regions(regions_, map_, env.radiance);
+  for (const RegionLight& sum : sums) lights_.push_back({make_light(sum), sum.irradiance});
+  averaged_frames_ = 0;
+  ++version_;
+  return sums;
+}
+
+bool LightFollower::has_moved(const std::vector<RegionLight>& sums, float tolerance_rad) const {
+  double moved = 0;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (!(sums[i].luminance > 0)) continue;
+    const Vec3f now = make_light(sums[i]).direction;
+    const Vec3f frozen = lights_[i].light.direction;
+    moved += sums[i].luminance * std::atan2(length(cross(now, frozen)), dot(now, frozen));
+  }
+  return moved > tolerance_rad * total_luminance(sums);
+}
+
+void LightFollower::take_energies(const std::vector<RegionLight>& sums,
+                                  const LightFollowerSettings& settings) {
+  const double least_gain = 1 / std::max(settings.smoothing_frames, 1.0F);
+  double averaged_total = 0;
+  for (const Followed& followed : lights_) averaged_total += luminance_of(followed.irradiance);
+  const double total = total_luminance(sums);
+  bool changed = std::abs(total - averaged_total) > settings.sudden_change / 2 * averaged_total;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const double before = luminance_of(lights_[i].irradiance);
+    const double change = std::abs(sums[i].luminance - before);
+    changed = changed || change > settings.sudden_change * std::max(before, least_share * total);
+  }
+  // All at once: light that went from one region to another must not count in both for a while.
+  if (changed) averaged_frames_ = 0;
+  // A plain mean at first, then an exponential one.
+  const double gain = std::max(1.0 / (averaged_frames_ + 1), least_gain);
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    std::array<double, 3>& averaged = lights_[i].irradiance;
+    for (std::size_t c = 0; c < 3; ++c) averaged[c] += gain * (sums[i].irradiance[c] - averaged[c]);
+  }
+  ++averaged_frames_;
+}
+
+}  // namespace render

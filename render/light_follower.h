@@ -1,0 +1,50 @@
+// The table of lights from frame to frame, without flicker.
+#pragma once
+
+#include <vector>
+
+#include "render/light_regions.h"
+
+namespace render {
+
+struct LightFollowerSettings {
+  LightTableSettings table;
+  // Energies are averaged over about this many frames; 1 = every frame for itself.
+  float smoothing_frames = 12;
+  // Directions are made anew when the light has moved this far from them, in the energy-weighted
+  // mean.
+  float tolerance_rad = 0.01F;
+  // Relative change of a light's energy, or of all light by half of it, that is taken for a change
+  // of the light and not for noise: its averaging starts anew.
+  float sudden_change = 0.3F;
+};
+
+// Follows the light of a show. Directions stay frozen while the light stays where it is, so that
+// what was found about their shadows stays true; energies follow each frame. The state is all
+// memory that the table has: it lives with the show, not with a kernel.
+class LightFollower {
+ public:
+  // The table of the next frame. Its version grows when directions change. A black frame gives an
+  // empty table, and directions wait. Throws as make_light_table().
+  LightTable follow(const Environment& env, const LightFollowerSettings& settings);
+
+ private:
+  // A light with its averaged energy.
+  struct Followed {
+    DirectionalLight light;
+    std::array<double, 3> irradiance;
+  };
+
+  std::vector<RegionLight> make_anew(const Environment& env, const LightTableSettings& settings);
+  bool has_moved(const std::vector<RegionLight>& sums, float tolerance_rad) const;
+  void take_energies(const std::vector<RegionLight>& sums, const LightFollowerSettings& settings);
+
+  capture::Image map_;
+  LightRegions regions_;
+  LightTableSettings made_with_;
+  std::vector<Followed> lights_;
+  int averaged_frames_ = 0;
+  std::uint64_t version_ = 0;
+};
+
+}  // namespace render
