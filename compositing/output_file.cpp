@@ -50,7 +50,9 @@ OutputFile::~OutputFile() {
 }
 
 int OutputFile::write(void* file, std::uint8_t* data, int size) {
-  const int descriptor = static_cast<OutputFile*>(file)->descriptor_;
+  const auto* const self = static_cast<OutputFile*>(file);
+  if (self->discarding_) return size;
+  const int descriptor = self->descriptor_;
   for (int done = 0; done < size;) {
     const ssize_t count = ::write(descriptor, data + done, static_cast<std::size_t>(size - done));
     if (count < 0 && errno == EINTR) continue;
@@ -67,12 +69,16 @@ std::int64_t OutputFile::seek(void* file, std::int64_t offset, int whence) {
   return place < 0 ? AVERROR(errno) : place;
 }
 
-bool OutputFile::mark() {
+void OutputFile::mark() {
   const std::int64_t place = avio_tell(context_);
-  if (!marks_.empty() && marks_.back() == place) return false;
+  if (!marks_.empty() && marks_.back() == place) return;
   if (marks_.size() == marks_kept) marks_.erase(marks_.begin());
   marks_.push_back(place);
-  return true;
+}
+
+void OutputFile::discard(bool discarding) noexcept {
+  discarding_ = discarding;
+  context_->error = 0;
 }
 
 bool OutputFile::has_room(std::int64_t place, std::int64_t room) noexcept {
@@ -92,7 +98,6 @@ bool OutputFile::has_room(std::int64_t place, std::int64_t room) noexcept {
 bool OutputFile::cut_back(std::int64_t room) noexcept {
   for (auto place = marks_.rbegin(); place != marks_.rend(); ++place) {
     if (!has_room(*place, room)) continue;
-    context_->error = 0;
     return avio_seek(context_, *place, SEEK_SET) == *place;
   }
   // Cutting gave up what might have gone beyond this mark; nothing more can be done if it fails.

@@ -19,13 +19,15 @@ class OutputFile {
 
   AVIOContext* context() const { return context_; }
 
-  // Remembers that all up to here is whole. Only the last few places are kept. Returns whether the
-  // file grew since.
-  bool mark();
+  // Remembers that all up to here is whole. Only the last few places are kept.
+  void mark();
 
-  // After a failed write: cuts the file back to the last mark after which `room` more bytes can be
-  // written, and lets libav write there again. If there is no such mark, cuts it back to the last
-  // one and returns false.
+  // Clears a failed write. While discarding, writes seem to succeed and go nowhere.
+  void discard(bool discarding) noexcept;
+
+  // Cuts the file back to the last mark after which `room` more bytes can be written, and lets
+  // libav write there again. If there is no such mark, cuts it back to the last one and returns
+  // false.
   bool cut_back(std::int64_t room) noexcept;
 
  private:
@@ -36,6 +38,7 @@ class OutputFile {
   int descriptor_ = -1;
   AVIOContext* context_ = nullptr;
   std::vector<std::int64_t> marks_;
+  bool discarding_ = false;
 };
 
 }  // namespace compositing

@@ -23,8 +23,9 @@ extern "C" {
 namespace compositing {
 namespace {
 
-// A killed writer loses at most the cluster that it was gathering.
+// A killed writer, or a full disk, loses at most the cluster that is being gathered.
 constexpr int cluster_limit_ms = 500;
+constexpr int cluster_limit_bytes = 1 << 20;
 
 struct FreeOutput {
   void operator()(AVFormatContext* context) const { avformat_free_context(context); }
@@ -148,7 +149,6 @@ struct VideoWriter::State {
   std::optional<Yuv420Converter> converter;
   std::int64_t last_index = -1;
   std::int64_t next_sample = 0;
-  std::int64_t gathered = 0;  // bytes given to the muxer since the file last grew
   bool finished = false;
 };
 
@@ -187,6 +187,7 @@ void VideoWriter::State::open_streams() {
   }
   AVDictionary* options = nullptr;
   av_dict_set_int(&options, "cluster_time_limit", cluster_limit_ms, 0);
+  av_dict_set_int(&options, "cluster_size_limit", cluster_limit_bytes, 0);
   capture::libav::forget_log();
   const int error = avformat_write_header(context, &options);
   av_dict_free(&options);
@@ -200,13 +201,10 @@ void VideoWriter::State::write_packet(AVPacket* ready,
   ready->stream_index = stream->index;
   av_packet_rescale_ts(ready, time_base, stream->time_base);
   // Not interleaved by libav: it would hold pictures back until sound comes, and sound may end.
-  const std::int64_t size = ready->size;
   const int error = av_write_frame(muxer.get(), ready);
   av_packet_unref(ready);
-  // The muxer gathers a cluster and writes it at once when the next one starts.
-  const bool started_cluster = error < 0 || file.mark();
-  gathered = started_cluster ? size : gathered + size;
   if (error < 0) fail("writing failed", error);
+  file.mark();  // the muxer gathers a cluster, and writes it at once when the next one starts
 }
 
 void VideoWriter::State::encode(const AVFrame* picture_or_end) {
@@ -304,13 +302,15 @@ void VideoWriter::salvage() noexcept {
   State& state = *state_;
   if (state.finished) return;
   state.finished = true;
-  // The started cluster, the index with some 30 bytes per second of the take, and what is fixed.
-  constexpr std::int64_t fixed_room = 64 << 10;
+  // What the muxer still holds refers to pictures that were lost.
+  state.file.discard(true);
+  av_write_frame(state.muxer.get(), nullptr);
+  state.file.discard(false);
+  // The index, some 30 bytes per second of the take, and what is fixed.
+  constexpr std::int64_t fixed_room = 16 << 10;
   const double seconds = static_cast<double>(state.last_index + 1) / state.settings.rate.value();
   const auto index_room = static_cast<std::int64_t>(30 * seconds);
-  if (state.file.cut_back(state.gathered + index_room + fixed_room)) {
-    av_write_trailer(state.muxer.get());
-  }
+  if (state.file.cut_back(index_room + fixed_room)) av_write_trailer(state.muxer.get());
 }
 
 }  // namespace compositing
