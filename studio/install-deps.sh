@@ -6,7 +6,7 @@ packages=(
   build-essential clang-format cmake ninja-build pkg-config git ca-certificates
   # capture
   libavcodec-dev libavformat-dev libavutil-dev libswresample-dev libswscale-dev
-  libexif-dev libimath-dev libopenexr-dev
+  libeigen3-dev libexif-dev libimath-dev libopenexr-dev
   # calibrate
   libmrcal-dev libtomlplusplus-dev
   # render

@@ -1,0 +1,247 @@
+// HDR merge by inverse variances: per sample, and through tables.
+#include "capture/hdr.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace capture {
+namespace {
+
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+void require_exposure(double exposure_s) {
+  if (!(exposure_s > 0) || !std::isfinite(exposure_s)) {
+    throw std::invalid_argument("an exposure time is above 0");
+  }
+}
+
+void require_one_size(std::span<const Shot> shots) {
+  if (shots.empty()) throw std::invalid_argument("there are no shots to merge");
+  const Image& first = shots[0].linear;
+  for (const Shot& shot : shots) {
+    require_exposure(shot.exposure_s);
+    if (shot.linear.width != first.width || shot.linear.height != first.height ||
+        shot.linear.channels != first.channels || shot.linear.empty()) {
+      throw std::invalid_argument("the shots of a bracket need one size");
+    }
+  }
+}
+
+struct Estimate {
+  double radiance = 0;
+  double variance = infinite;
+};
+
+// The mean of a sample's unsaturated shots, weighted by the inverse variances that they have if
+// `radiance` is right.
+Estimate weighted_mean(std::span<const Shot> shots,
+                       std::size_t sample,
+                       const NoiseModel& noise,
+                       double radiance) {
+  double weighted = 0;
+  double weights = 0;
+  for (const Shot& shot : shots) {
+    const double value = static_cast<double>(shot.linear.pixels[sample]);
+    if (!(value < noise.saturation) || !std::isfinite(value)) continue;
+    const double t = shot.exposure_s;
+    const double weight = t * t / noise.variance(radiance * t);
+    weighted += weight * value / t;
+    weights += weight;
+  }
+  if (weights == 0) return {};
+  return {weighted / weights, 1 / weights};
+}
+
+Estimate merge_sample(std::span<const Shot> shots,
+                      std::size_t sample,
+                      const NoiseModel& noise,
+                      const Shot& shortest) {
+  // At radiance 0 all variances are equal: weights go by exposure alone, and are free of noise.
+  Estimate estimate = weighted_mean(shots, sample, noise, 0);
+  if (estimate.variance == infinite) {
+    const double bound = static_cast<double>(shortest.linear.pixels[sample]);
+    return {std::isfinite(bound) ? bound / shortest.exposure_s : 0, infinite};
+  }
+  constexpr int rounds = 2;  // a third one changes nothing that noise does not hide
+  for (int round = 0; round < rounds; ++round) {
+    estimate = weighted_mean(shots, sample, noise, estimate.radiance);
+  }
+  return estimate;
+}
+
+}  // namespace
+
+double NoiseModel::variance(double value) const {
+  const double light = std::max(0.0, value);
+  return read + shot * light + relative * relative * light * light;
+}
+
+Image merge_shots(std::span<const Shot> shots, const NoiseModel& noise, Image* deviation) {
+  require_one_size(shots);
+  if (!(noise.read > 0) || !(noise.shot >= 0) || !(noise.saturation > 0)) {
+    throw std::invalid_argument("a noise model has variance at black, and a saturation above it");
+  }
+  const Image& first = shots[0].linear;
+  const Shot& shortest =
+      *std::min_element(shots.begin(), shots.end(),
+                        [](const Shot& a, const Shot& b) { return a.exposure_s < b.exposure_s; });
+  Image radiance = make_image(first.height, first.width, first.channels);
+  if (deviation != nullptr) *deviation = radiance;
+  for (std::size_t i = 0; i < radiance.pixels.size(); ++i) {
+    const Estimate estimate = merge_sample(shots, i, noise, shortest);
+    radiance.pixels[i] = static_cast<float>(estimate.radiance);
+    if (deviation != nullptr) {
+      deviation->pixels[i] = static_cast<float>(std::sqrt(estimate.variance));
+    }
+  }
+  return radiance;
+}
+
+CodeTable linear_code_table(int bits, double black, double white, const NoiseModel& noise) {
+  if (bits < 8 || bits > 16 || !(white > black)) {
+    throw std::invalid_argument("a camera has codes of 8 to 16 bits, white above black");
+  }
+  CodeTable table;
+  for (std::size_t code = 0; code < (std::size_t{1} << bits); ++code) {
+    const double value = (static_cast<double>(code) - black) / (white - black);
+    table.value.push_back(value);
+    table.variance.push_back(value < noise.saturation ? noise.variance(value) : infinite);
+  }
+  return table;
+}
+
+CodeTable response_code_table(const Response& response, int channel, double code_sigma) {
+  constexpr int codes = Response::codes;
+  constexpr int saturated = 250;       // JPEG's ringing reaches some codes below 255
+  constexpr int reach = 2;             // codes over which the slope is taken
+  constexpr double least_step = 1e-5;  // of light between codes: a flat foot is not exact
+  const auto& light = response.light.at(static_cast<std::size_t>(channel));
+  CodeTable table;
+  for (int code = 0; code < codes; ++code) {
+    const int low = std::max(0, code - reach);
+    const int high = std::min(codes - 1, code + reach);
+    const double step = std::max(
+        least_step, (light[static_cast<std::size_t>(high)] - light[static_cast<std::size_t>(low)]) /
+                        (high - low));
+    table.value.push_back(light[static_cast<std::size_t>(code)]);
+    table.variance.push_back(code < saturated ? step * step * code_sigma * code_sigma : infinite);
+  }
+  return table;
+}
+
+MergeTables::MergeTables(std::array<CodeTable, 3> channels, int shots)
+    : channels_(std::move(channels)) {
+  if (shots < 1) throw std::invalid_argument("there are no shots to merge");
+  shots_ = static_cast<std::size_t>(shots);
+  codes_ = channels_[0].value.size();
+  for (const CodeTable& channel : channels_) {
+    if (channel.value.size() != codes_ || channel.variance.size() != codes_) {
+      throw std::invalid_argument("the channels' code tables need one size");
+    }
+    bool unsaturated = false;
+    for (const double variance : channel.variance) {
+      if (!(variance > 0)) throw std::invalid_argument("a code's variance is above 0");
+      unsaturated = unsaturated || variance < infinite;
+    }
+    if (!unsaturated) throw std::invalid_argument("every code is saturated");
+  }
+  entries_.resize(shots_ * channels_.size() * codes_);
+}
+
+void MergeTables::set_exposures(std::span<const double> exposures_s) {
+  if (exposures_s.size() != shots_) {
+    throw std::invalid_argument("every shot of a bracket needs an exposure");
+  }
+  for (const double exposure_s : exposures_s) require_exposure(exposure_s);
+  const double longest = *std::max_element(exposures_s.begin(), exposures_s.end());
+  const auto shortest = static_cast<std::size_t>(
+      std::min_element(exposures_s.begin(), exposures_s.end()) - exposures_s.begin());
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    const CodeTable& table = channels_[c];
+    const double least = *std::min_element(table.variance.begin(), table.variance.end());
+    double lightest = infinite;  // weight of any code that counts
+    for (std::size_t s = 0; s < shots_; ++s) {
+      const double t = exposures_s[s] / longest;  // keeps weights in a float's range
+      for (std::size_t code = 0; code < codes_; ++code) {
+        const double weight = t * t * least / table.variance[code];  // 0 if saturated
+        if (weight > 0) lightest = std::min(lightest, weight);
+        entries_[(s * channels_.size() + c) * codes_ + code] = {
+            static_cast<float>(weight * table.value[code] / exposures_s[s]),
+            static_cast<float>(weight)};
+      }
+    }
+    // Saturated in every shot: the shortest one's value alone counts. Beside any other it weighs
+    // less than a float's last bit.
+    constexpr double negligible = 1e-9;
+    for (std::size_t code = 0; code < codes_; ++code) {
+      if (table.variance[code] < infinite) continue;
+      const double weight = negligible * lightest;
+      entries_[(shortest * channels_.size() + c) * codes_ + code] = {
+          static_cast<float>(weight * table.value[code] / exposures_s[shortest]),
+          static_cast<float>(weight)};
+    }
+  }
+}
+
+template <class Code>
+void MergeTables::merge_codes(std::span<const Code* const> shots,
+                              int width,
+                              int first_row,
+                              int last_row,
+                              float* radiance) const {
+  constexpr std::size_t channels = 3;
+  if (shots.size() != shots_) {
+    throw std::invalid_argument("the tables are for another number of shots");
+  }
+  if (sizeof(Code) == 1 && codes_ < 256) {
+    throw std::invalid_argument("8-bit codes need tables of 256 entries");
+  }
+  const std::size_t begin = static_cast<std::size_t>(first_row) * static_cast<std::size_t>(width);
+  const std::size_t end = static_cast<std::size_t>(last_row) * static_cast<std::size_t>(width);
+  const auto merge_pixels = [&](auto shot_count) {
+    for (std::size_t i = begin * channels; i < end * channels; i += channels) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        const Entry* table = entries_.data() + c * codes_;
+        Entry sum;
+        for (std::size_t s = 0; s < shot_count; ++s, table += channels * codes_) {
+          const Entry& entry = table[shots[s][i + c]];
+          sum.weighted += entry.weighted;
+          sum.weight += entry.weight;
+        }
+        radiance[i + c] = sum.weighted / sum.weight;
+      }
+    }
+  };
+  // Counts that are known to the compiler unroll.
+  switch (shots_) {
+    case 2:
+      return merge_pixels(std::integral_constant<std::size_t, 2>());
+    case 3:
+      return merge_pixels(std::integral_constant<std::size_t, 3>());
+    case 4:
+      return merge_pixels(std::integral_constant<std::size_t, 4>());
+    default:
+      return merge_pixels(shots_);
+  }
+}
+
+void MergeTables::merge(std::span<const std::uint8_t* const> shots,
+                        int width,
+                        int first_row,
+                        int last_row,
+                        float* radiance) const {
+  merge_codes(shots, width, first_row, last_row, radiance);
+}
+
+void MergeTables::merge(std::span<const std::uint16_t* const> shots,
+                        int width,
+                        int first_row,
+                        int last_row,
+                        float* radiance) const {
+  merge_codes(shots, width, first_row, last_row, radiance);
+}
+
+}  // namespace capture

@@ -1,0 +1,155 @@
+// From files to radiance: made and real brackets, HDR pictures, and what must be refused.
+#include "capture/make_hdr.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "capture/colour.h"
+#include "capture/exr.h"
+#include "capture/hdr.h"
+#include "capture/png.h"
+#include "capture/rgbe.h"
+#include "tests/capture/made_bracket.h"
+#include "tests/made_files.h"
+
+namespace capture {
+namespace {
+
+std::string message_of(const std::vector<std::string>& paths, const HdrOptions& options = {}) {
+  try {
+    make_hdr(paths, options);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string write_still(const std::string& path, const Still8& still) {
+  write_png(path, still.width, still.height, still.channels, still.texels);
+  return path;
+}
+
+TEST(MakeHdr, RecoversAMadeSceneFromFiles) {
+  const auto directory = made::make_temporary_directory();
+  const made::Scene scene = made::patches(240, 160, 1);
+  const auto curve = [](double z) { return 0.1 * z + 0.4 * z * z + 0.5 * std::pow(z, 4); };
+  std::vector<std::string> paths;
+  HdrOptions options;
+  for (int i = -3; i <= 3; ++i) {
+    options.exposures_s.push_back(std::exp2(2 * i));
+    paths.push_back(write_still(
+        directory / (std::to_string(i + 3) + ".png"),
+        made::photograph(scene, options.exposures_s.back(), curve, static_cast<unsigned>(i + 50))));
+  }
+  const HdrResult result = make_hdr(paths, options);
+  ASSERT_EQ(result.radiance.pixels.size(), scene.radiance.size());
+  double squares = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < scene.radiance.size(); ++i) {
+    if (scene.radiance[i] > 50) continue;  // 64 clips in the shortest shot
+    squares += std::pow(static_cast<double>(result.radiance.pixels[i]) / scene.radiance[i] - 1, 2);
+    ++count;
+  }
+  EXPECT_LT(std::sqrt(squares / static_cast<double>(count)), 0.05);
+  EXPECT_NEAR(result.stops, 14, 1);
+  EXPECT_EQ(result.exposures_s.size(), paths.size());
+  EXPECT_FALSE(result.candidates.empty());
+  EXPECT_GT(result.time_ms, 0);
+}
+
+TEST(MakeHdr, TakesOneShotAsSrgb) {
+  const std::string path =
+      write_still(made::make_temporary_directory() / "a.png", {1, 1, 3, {0, 128, 200}});
+  const HdrResult result = make_hdr(std::vector{path}, {.exposures_s = {0.5}});
+  EXPECT_NEAR(result.radiance.at(0, 0, 1), decode(Transfer::srgb, 128 / 255.0) / 0.5, 1e-5);
+  EXPECT_EQ(result.response.name, "sRGB");
+}
+
+TEST(MakeHdr, ConvertsOneHdrPictureBitForBit) {
+  const auto directory = made::make_temporary_directory();
+  Image image = make_image(4, 9);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    image.pixels[i] = static_cast<float>(i) * 1e3F;
+  }
+  write_exr(directory / "a.exr", image);
+  write_rgbe(directory / "a.hdr", image);
+  EXPECT_EQ(make_hdr(std::vector<std::string>{directory / "a.exr"}).radiance.pixels, image.pixels);
+  EXPECT_EQ(make_hdr(std::vector<std::string>{directory / "a.hdr"}).radiance.pixels,
+            read_rgbe(directory / "a.hdr").pixels);
+}
+
+TEST(MakeHdr, MergesLinearShotsInExrFiles) {
+  const auto directory = made::make_temporary_directory();
+  Image bright{1, 1, {1, 0.5F, 0.1F}};
+  Image dark{1, 1, {0.2F, 0.05F, 0.01F}};
+  write_exr(directory / "a.exr", bright);
+  write_exr(directory / "b.exr", dark);
+  const HdrResult result =
+      make_hdr(std::vector<std::string>{directory / "a.exr", directory / "b.exr"},
+               {.exposures_s = {1, 0.1}});
+  EXPECT_NEAR(result.radiance.at(0, 0, 0), 2, 1e-5);
+  EXPECT_NEAR(result.radiance.at(0, 0, 1), 0.5, 1e-5);
+}
+
+TEST(MakeHdr, MergesTheRealFishEyeBracket) {
+  const auto directory = made::real_data() / "brackets" / "fisheye8mm";
+  if (!std::filesystem::exists(directory)) GTEST_SKIP() << "no real data at " << directory;
+  std::vector<std::string> paths;
+  for (int number = 6955; number <= 6971; number += 2) {
+    paths.push_back(directory / ("IMG_" + std::to_string(number) + ".JPG"));
+  }
+  const HdrResult result = make_hdr(paths);
+  EXPECT_EQ(result.radiance.width, 2808);
+  EXPECT_EQ(result.radiance.height, 1872);
+  EXPECT_NEAR(result.stops, 14, 0.5);
+  for (const float value : result.radiance.pixels) {
+    ASSERT_TRUE(std::isfinite(value) && value >= 0);
+  }
+}
+
+TEST(MakeHdr, RefusesShotsOfTwoSizesNamingBoth) {
+  const auto directory = made::make_temporary_directory();
+  const std::string a = write_still(directory / "a.png", {2, 1, 3, std::vector<std::uint8_t>(6)});
+  const std::string b = write_still(directory / "b.png", {1, 1, 3, std::vector<std::uint8_t>(3)});
+  const std::string message = message_of({a, b}, {.exposures_s = {1, 2}});
+  EXPECT_NE(message.find(b + ": is 1 x 1"), std::string::npos) << message;
+  EXPECT_NE(message.find(a + " is 2 x 1"), std::string::npos) << message;
+}
+
+TEST(MakeHdr, RefusesShotsWithoutExposureTimes) {
+  const std::string a = write_still(made::make_temporary_directory() / "a.png",
+                                    {1, 1, 3, std::vector<std::uint8_t>(3)});
+  EXPECT_NE(message_of({a}).find(a + ": tells no exposure time"), std::string::npos);
+}
+
+TEST(MakeHdr, RefusesWhatIsNoBracket) {
+  const auto directory = made::make_temporary_directory();
+  const std::string still =
+      write_still(directory / "a.png", {1, 1, 3, std::vector<std::uint8_t>(3)});
+  const std::string picture = directory / "a.exr";
+  write_exr(picture, make_image(1, 1));
+  EXPECT_THROW(make_hdr({}), std::invalid_argument);
+  EXPECT_THROW(make_hdr(std::vector{still}, {.exposures_s = {1, 2}}), std::invalid_argument);
+  EXPECT_NE(message_of({still, picture}, {.exposures_s = {1, 2}}).find("one kind"),
+            std::string::npos);
+  EXPECT_NE(message_of({picture, picture}).find("tells no exposure time"), std::string::npos);
+  EXPECT_NE(message_of({directory / "missing.jpg"}).find("missing.jpg"), std::string::npos);
+  EXPECT_NE(
+      message_of({PLATELIGHT_SOURCE_DIR "/tests/data/bad/truncated.exr"}).find("truncated.exr"),
+      std::string::npos);
+}
+
+TEST(RangeStops, IsTheRatioOfBrightestToFaintest) {
+  Image image = make_image(100, 100);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    image.pixels[i] = i < 9000 ? 0.0F : i < 18000 ? 0.25F : 8.0F;  // black does not count
+  }
+  for (std::size_t i = 0; i < 9; ++i) image.pixels[i] = 1e6F;  // nor do three pixels
+  EXPECT_NEAR(range_stops(image), 5, 1e-9);
+  EXPECT_EQ(range_stops(make_image(1, 1)), 0);
+}
+
+}  // namespace
+}  // namespace capture
