@@ -22,6 +22,9 @@ constexpr float wall_y = court_back + 2.2F;
 constexpr float wall_height = 2.4F;
 constexpr float far_m = 150;  // where the ground ends
 
+// Rough ground hides its own glints: hardly any mirrored light leaves it.
+constexpr float rough_ground = 0.1F;
+
 class Builder {
  public:
   std::int32_t add(Texture texture) {
@@ -35,11 +38,13 @@ class Builder {
            std::array<float, 3> base,
            float roughness,
            std::int32_t texture = -1,
+           float specular = 1,
            float metallic = 0) {
     StandardParameters parameters;
     std::ranges::copy(base, parameters.base_color);
     parameters.roughness = roughness;
     parameters.metallic = metallic;
+    parameters.specular = specular;
     parameters.base_color_texture = texture;
     mesh.materials = {static_cast<std::uint32_t>(scene_.materials.size())};
     scene_.materials.push_back(make_standard_material(name, parameters));
@@ -63,7 +68,7 @@ void add_ground(Builder& court, int texture_size, std::uint32_t seed) {
   const auto paving = court.add(make_paving_texture(std::max(texture_size / 4, 1), seed + 1));
   court.add("court",
             make_rectangle({-half_court, court_front, 0}, {court_m, 0, 0}, {0, court_m, 0}, 0),
-            white, 0.85F, asphalt);
+            white, 0.85F, asphalt, rough_ground);
   constexpr float slab_tile = 2.4F;
   const float depth = 2 * far_m;
   Mesh around =
@@ -74,12 +79,12 @@ void add_ground(Builder& court, int texture_size, std::uint32_t seed) {
                                 {0, court_m, 0}, slab_tile));
   append(around, make_rectangle({half_court, court_front, kerb_height}, {far_m - half_court, 0, 0},
                                 {0, court_m, 0}, slab_tile));
-  court.add("paving", std::move(around), white, 0.9F, paving);
+  court.add("paving", std::move(around), white, 0.9F, paving, rough_ground);
 }
 
 void add_concrete(Builder& court, int texture_size, std::uint32_t seed) {
   const auto concrete = court.add(make_concrete_texture(std::max(texture_size / 8, 1), seed + 2));
-  const auto wall = court.add(make_wall_texture(std::max(texture_size / 2, 1), seed + 3));
+  const auto wall = court.add(make_wall_texture(std::max(texture_size / 4, 1), seed + 3));
   Mesh kerbs;
   constexpr float stone = 1.0F;
   constexpr float gap = 0.008F;
@@ -94,19 +99,22 @@ void add_concrete(Builder& court, int texture_size, std::uint32_t seed) {
              {side, court_front + from, 0});
     }
   }
-  court.add("kerb", std::move(kerbs), white, 0.8F, concrete);
+  court.add("kerb", std::move(kerbs), white, 0.8F, concrete, rough_ground);
 
   Mesh panels;
   constexpr float tile = wall_height;  // two panels wide
-  for (int i = -8; i < 8; ++i) {
+  constexpr int first_panel = -9;
+  constexpr int last_panel = 16;
+  for (int i = first_panel; i < last_panel; ++i) {
     append(panels, make_rectangle({tile * static_cast<float>(i), wall_y, kerb_height}, {tile, 0, 0},
                                   {0, 0, wall_height}, 0));
   }
-  court.add("wall", std::move(panels), white, 0.75F, wall);
+  court.add("wall", std::move(panels), white, 0.75F, wall, rough_ground);
   court.add("coping",
-            make_box({-8 * tile, wall_y - 0.05F, kerb_height + wall_height},
-                     {8 * tile, wall_y + 0.35F, kerb_height + wall_height + 0.09F}, 0.015F, 1.1F),
-            white, 0.8F, concrete);
+            make_box({first_panel * tile, wall_y - 0.05F, kerb_height + wall_height},
+                     {last_panel * tile, wall_y + 0.35F, kerb_height + wall_height + 0.09F}, 0.015F,
+                     1.1F),
+            white, 0.8F, concrete, rough_ground);
 }
 
 void add_things(Builder& court, int texture_size, std::uint32_t seed) {
@@ -155,7 +163,7 @@ void add_things(Builder& court, int texture_size, std::uint32_t seed) {
          {6.4F, court_back + 1.0F, kerb_height});
   append(lamp, make_box({-1.75F, -0.13F, 5.25F}, {-1.15F, 0.13F, 5.37F}, 0.03F, 1),
          {6.4F, court_back + 1.0F, kerb_height});
-  court.add("lamp post", std::move(lamp), {0.55F, 0.56F, 0.57F}, 0.5F, -1, 1);
+  court.add("lamp post", std::move(lamp), {0.55F, 0.56F, 0.57F}, 0.5F, -1, 1, 1);
 }
 
 }  // namespace

@@ -32,9 +32,9 @@ struct Weather {
 };
 
 // Cumulus: how thick the layer is where it is met, 0 = clear.
-float cumulus(const Weather& weather, float x, float y) {
+float cumulus(const Weather& weather, float x, float y, int octaves) {
   const float bend = 0.35F * plane_noise(x * 0.7F, y * 0.7F, weather.seed + 11);
-  const float shape = fractal_noise(x + bend, y - bend, 7, weather.seed + 1);
+  const float shape = fractal_noise(x + bend, y - bend, octaves, weather.seed + 1);
   const float cover = 0.42F - 0.62F * weather.cloudiness;
   return std::max(0.0F, shape - cover * 0.6F) * 2.4F;
 }
@@ -64,7 +64,7 @@ Vec3f cloudy_sky(const Weather& weather, Vec3f v) {
   const float forward = 1 + 1.2F * std::pow(toward, 8.0F);
   sky = mix(sky, Vec3f{1.0F, 0.99F, 0.97F} * (0.95F * forward), 0.35F * veil);
 
-  const float thick = cumulus(weather, x * 1.15F, y * 1.15F);
+  const float thick = cumulus(weather, x * 1.15F, y * 1.15F, 7);
   const float cover = 1 - std::exp(-5 * thick);
   if (cover < 1e-3F) return sky;
   // Light that reaches this spot, through what lies between it and the sun along the layer.
@@ -72,8 +72,8 @@ Vec3f cloudy_sky(const Weather& weather, Vec3f v) {
   float between = 0;
   for (int i = 1; i <= 3; ++i) {
     const float along = step * static_cast<float>(i);
-    between +=
-        cumulus(weather, (x + weather.sun.x * along) * 1.15F, (y + weather.sun.y * along) * 1.15F);
+    between += cumulus(weather, (x + weather.sun.x * along) * 1.15F,
+                       (y + weather.sun.y * along) * 1.15F, 4);
   }
   const float lit = std::exp(-0.55F * between - 0.5F * thick);
   const Vec3f shadow{0.50F, 0.55F, 0.63F};

@@ -63,9 +63,11 @@ float painted(float x, float y) {
     paint = std::max(paint, band(bay * 2.6F, line, soft));
   }
   paint = std::max(paint, band(y - 2.2F, line, soft) * (std::abs(x) < 7.86F ? 1 : 0));
+  // A broken line along the drive.
+  if (x / 3 - std::floor(x / 3) < 0.62F) paint = std::max(paint, band(y + 3.55F, line, soft));
   // An arrow to the right.
-  const float ax = x - 3.1F;
-  const float ay = y + 4.6F;
+  const float ax = x - 2.9F;
+  const float ay = y + 2.4F;
   if (ax > -1.3F && ax < 0.5F) paint = std::max(paint, band(ay, 0.09F, soft));
   if (ax >= 0.5F && ax < 1.3F) paint = std::max(paint, band(ay, 0.36F * (1.3F - ax) / 0.8F, soft));
   return paint;
@@ -79,9 +81,14 @@ Vec3f asphalt(int x, int y, float mx, float my, std::uint32_t seed) {
   float albedo = 0.165F * (1 + 0.28F * stains) * (1 + 0.07F * mottle);
   albedo *= 1 + 0.20F * grit + (stones > 0.8F ? 0.35F : 0.06F * stones);
 
-  const bool mended = mx > -6.4F && mx < -3.7F && my > -3.4F && my < -0.9F;
+  constexpr float mend_left = -2.0F;
+  constexpr float mend_right = -0.4F;
+  constexpr float mend_low = 0.1F;
+  constexpr float mend_high = 1.7F;
+  const bool mended = mx > mend_left && mx < mend_right && my > mend_low && my < mend_high;
   if (mended) albedo *= 0.72F;
-  const float edge = std::max(std::max(-6.4F - mx, mx + 3.7F), std::max(-3.4F - my, my + 0.9F));
+  const float edge =
+      std::max(std::max(mend_left - mx, mx - mend_right), std::max(mend_low - my, my - mend_high));
   const float seam = band(edge + 0.02F * plane_noise(mx * 3, my * 3, seed + 4), 0.025F, 0.012F);
   float crack = 0;
   const float open = smooth_step(0.05F, 0.3F, plane_noise(mx * 0.3F, my * 0.3F, seed + 7));

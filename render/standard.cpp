@@ -15,7 +15,7 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 88, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 92, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
@@ -87,7 +87,8 @@ StandardParameters standard_parameters(const Material& material, std::size_t tex
         parameters.metallic, parameters.roughness, parameters.clearcoat,
         parameters.clearcoat_roughness, parameters.transmission, parameters.emission[0],
         parameters.emission[1], parameters.emission[2], parameters.emission_gain,
-        parameters.normal_scale, parameters.alpha_cutoff, parameters.base_color_alpha})
+        parameters.normal_scale, parameters.alpha_cutoff, parameters.base_color_alpha,
+        parameters.specular})
     if (!std::isfinite(value)) refuse("a number of its block is not finite");
   for (const std::int32_t index :
        {parameters.base_color_texture, parameters.metallic_roughness_texture,
@@ -127,6 +128,7 @@ StandardSurface standard_surface(const StandardParameters& parameters,
   surface.clearcoat = unit(parameters.clearcoat);
   if (surface.clearcoat > 0) surface.clearcoat *= look_up(parameters.clearcoat_texture)[0];
   surface.clearcoat_roughness = unit(parameters.clearcoat_roughness);
+  surface.specular = unit(parameters.specular);
   surface.transmission = unit(parameters.transmission);
   if (surface.transmission > 0) surface.transmission *= look_up(parameters.transmission_texture)[0];
   surface.emission = Vec3f{parameters.emission[0], parameters.emission[1], parameters.emission[2]} *

@@ -1,7 +1,7 @@
 // The standard surface: glTF 2.0 metallic-roughness with clear coat, thin transmission, emission.
 //
-// With unit view direction v, normal n, F0 = lerp(.04, base, metallic), Fd = Schlick(.04, n.v),
-// Fc = coat * Fd, F = Schlick(F0, n.v):
+// With unit view direction v, normal n, Fc = coat * Schlick(.04, n.v), Fd = specular * Schlick(.04,
+// n.v), F = lerp(Fd, Schlick(base, n.v), metallic):
 //   coat         reflects Fc, in a lobe of coat_roughness
 //   specular     reflects (1 - Fc) F, in a lobe of roughness
 //   diffuse      (1 - Fc)(1 - metallic)(1 - Fd)(1 - transmission) base / pi
@@ -42,6 +42,7 @@ struct StandardParameters {
   std::int32_t transmission_texture = -1;  // red
   std::int32_t emission_texture = -1;
   float base_color_alpha = 1;
+  float specular = 1;  // share of the mirrored light of what is not metal (KHR_materials_specular)
   std::uint32_t two_sided = 1;
 };
 
@@ -59,6 +60,7 @@ struct StandardSurface {
   Vec3f normal;       // with the normal map, unit, on the viewer's side of the surface
   Vec3f coat_normal;  // without it: the coat is smooth over a rough ground
   float alpha;        // below alpha_cutoff = hole
+  float specular = 1;
 };
 
 struct HitPoint;          // scene.h
@@ -101,9 +103,10 @@ inline StandardWeights standard_weights(const StandardSurface& surface, Vec3f vi
   weights.coat = surface.clearcoat * schlick(0.04F, std::abs(dot(surface.coat_normal, view)));
   const float under = 1 - weights.coat;
   const float dielectric = 1 - surface.metallic;
-  const float below = under * dielectric * (1 - schlick(0.04F, cosine));
+  const float sheen = surface.specular * schlick(0.04F, cosine);
+  const float below = under * dielectric * (1 - sheen);
   const auto channel = [&](float base, float& specular, float& diffuse, float& transmission) {
-    specular = under * schlick(0.04F * dielectric + base * surface.metallic, cosine);
+    specular = under * (dielectric * sheen + surface.metallic * schlick(base, cosine));
     diffuse = below * (1 - surface.transmission) * base;
     transmission = below * surface.transmission * base;
   };

@@ -44,10 +44,25 @@ TEST(StandardWeights, PassOnAllLightOfAWhiteSurface) {
     surface.metallic = random();
     surface.clearcoat = random();
     surface.transmission = random();
+    surface.specular = random();
     Vec3f view = random.direction();
     if (dot(view, normal) < 0) view = -view;
     const auto w = render::standard_weights(surface, view);
     EXPECT_NEAR(w.coat + w.specular.x + w.diffuse.x + w.transmission.x, 1, 1e-5);
+  }
+}
+
+TEST(StandardWeights, MirrorTheShareThatSpecularStatesUnlessOfMetal) {
+  Random random(9);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Vec3f normal = random.direction();
+    const Vec3f view = random.direction();
+    StandardSurface surface = white_surface(normal);
+    const float whole = render::standard_weights(surface, view).specular.x;
+    surface.specular = 0.25F;
+    EXPECT_NEAR(render::standard_weights(surface, view).specular.x, 0.25F * whole, 1e-6);
+    surface.metallic = 1;
+    EXPECT_NEAR(render::standard_weights(surface, view).specular.x, 1, 1e-6);
   }
 }
 
