@@ -33,16 +33,17 @@ struct Sound {
 };
 
 struct CameraStatistics {
-  std::int64_t delivered = 0;
+  std::int64_t delivered = 0;  // all frames that next() gave; the following are among them
   std::int64_t lost = 0;
   std::int64_t damaged = 0;
 };
 
 struct CameraOptions {
-  PlateColour colour;                 // how codes become scene-linear values
-  std::optional<std::int64_t> frame;  // start at this frame; for stills and sequences, which one
+  PlateColour colour;                      // how codes become scene-linear values
+  std::optional<std::int64_t> frame;       // start at this one; the source's first is 0
   std::optional<std::array<int, 4>> crop;  // x, y, width, height in source pixels
   bool loop = false;                       // files start again at their end, time going on
+  Rational picture_rate{25, 1};            // of sequences, and of stills that loop
   std::string base_dir;                    // relative paths start here
   std::string response;  // .rsp file of a camera that is not linear; "" = by colour
 };
@@ -55,7 +56,8 @@ class Camera {
   // The next frame in order; nothing at the end. A frame that cannot be decoded comes with status
   // `lost`, and the previous image. Never throws for damage inside a stream once it is open.
   virtual std::optional<Frame> next() = 0;
-  // The sound up to and including the last frame's time that was not taken yet.
+  // The sound up to and including the last frame's time that was not taken yet; after the end, up
+  // to where the next frame would have been. What is not taken within 10 s is dropped.
   virtual std::optional<Sound> take_sound() { return std::nullopt; }
   virtual CameraStatistics statistics() const = 0;
 };

@@ -1,10 +1,13 @@
 // Handles of libav that free themselves, and its errors in words. For the files that wrap libav.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 
 struct AVCodecContext;
+struct AVCodecParameters;
 struct AVFormatContext;
 struct AVFrame;
 struct AVPacket;
@@ -29,16 +32,40 @@ using PacketHandle = std::unique_ptr<AVPacket, Free>;
 using Resampler = std::unique_ptr<SwrContext, Free>;
 using Scaler = std::unique_ptr<SwsContext, Free>;
 
+// The largest pictures that are decoded: a hostile header cannot claim more memory than these.
+inline constexpr int max_side = 16384;
+inline constexpr std::int64_t max_image_bytes = std::int64_t{1} << 30;  // as floats
+
+// Throws std::runtime_error, without a file name, if a picture is larger than that.
+void check_size(int width, int height);
+
 // Throw std::bad_alloc where libav returns null.
 FrameHandle make_frame();
 PacketHandle make_packet();
 
-// From now on libav writes nothing to stderr; its last complaint in each thread is kept for
+// What a decoder complained about, from whichever of its threads.
+class Complaints {
+ public:
+  void add(std::string complaint);
+  // The last one since the previous call; "" if none.
+  std::string take();
+
+ private:
+  std::mutex mutex_;
+  std::string last_;
+};
+
+// A decoder that is not yet open: `threads` of them at most, sizes bounded. Its complaints go to
+// `complaints`, if any, which must outlive it. Throws std::runtime_error, without a file name, if
+// libav has none for it.
+CodecContext make_decoder(int codec_id, int threads, Complaints* complaints);
+
+// From now on libav writes nothing to stderr; its complaints in each thread are kept for
 // `reason`. Cheap to call again.
 void gather_log();
-// Forgets this thread's last complaint.
+// Forgets this thread's complaints.
 void forget_log();
-// What went wrong: libav's words for `error`, and its last complaint in this thread, if any.
+// What went wrong: libav's words for `error`, and its complaints in this thread, if any.
 std::string reason(int error);
 
 }  // namespace capture::libav

@@ -1,0 +1,79 @@
+// Cameras by URI.
+#include "capture/camera.h"
+
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "capture/linearise.h"
+#include "capture/picture_camera.h"
+#include "capture/replay.h"
+#include "capture/sequence.h"
+#include "capture/video_file.h"
+
+namespace capture {
+namespace {
+
+std::string absolute(std::string_view path, const CameraOptions& options) {
+  const std::filesystem::path given(path);
+  return (given.is_absolute() || options.base_dir.empty()
+              ? given
+              : std::filesystem::path(options.base_dir) / given)
+      .string();
+}
+
+LightCurves curves_of(const CameraOptions& options) { return {options.colour, std::nullopt}; }
+
+std::unique_ptr<Camera> open_file(std::string_view rest, const CameraOptions& options) {
+  const std::string path = absolute(rest, options);
+  const LightCurves curves = curves_of(options);
+  if (is_sequence(path)) {
+    return open_sequence(path, options, curves);
+  }
+  if (is_picture(path)) {
+    const Rational rate = options.loop ? options.picture_rate : Rational{};
+    return make_picture_camera(path, {PictureEntry{path, {}, 0, {}, {}}}, rate, options, curves);
+  }
+  return open_video_file(path, options, curves);
+}
+
+std::unique_ptr<Camera> open_replay_uri(std::string_view rest, const CameraOptions& options) {
+  return open_replay(absolute(rest, options), options, curves_of(options));
+}
+
+std::map<std::string, CameraOpener, std::less<>>& openers() {
+  static std::map<std::string, CameraOpener, std::less<>> by_scheme{{"file", open_file},
+                                                                    {"replay", open_replay_uri}};
+  return by_scheme;
+}
+
+}  // namespace
+
+void register_camera(std::string scheme, CameraOpener opener) {
+  openers()[std::move(scheme)] = std::move(opener);
+}
+
+std::unique_ptr<Camera> open_camera(std::string_view uri, const CameraOptions& options) {
+  if (options.picture_rate.num <= 0 || options.picture_rate.den <= 0) {
+    throw std::invalid_argument("pictures need a rate above 0");
+  }
+  const std::size_t colon = uri.find(':');
+  const std::string_view scheme = uri.substr(0, colon == uri.npos ? 0 : colon);
+  if (const auto opener = openers().find(scheme); opener != openers().end()) {
+    return opener->second(uri.substr(colon + 1), options);
+  }
+  // A path may have a colon in it.
+  if (scheme.empty() || scheme.find('/') != scheme.npos ||
+      std::filesystem::exists(absolute(uri, options))) {
+    return open_file(uri, options);
+  }
+  std::string known;
+  for (const auto& [name, opener] : openers()) {
+    known += (known.empty() ? "" : ", ") + name + ":";
+  }
+  throw std::runtime_error("cannot open " + std::string(uri) + ": no camera is called " +
+                           std::string(scheme) + ":; there are " + known);
+}
+
+}  // namespace capture

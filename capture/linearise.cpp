@@ -1,0 +1,79 @@
+// Light of decoded pictures.
+#include "capture/linearise.h"
+
+#include <cstddef>
+#include <utility>
+
+namespace capture {
+namespace {
+
+std::vector<float> make_table(const ValueGrid& grid, const Curve& curve) {
+  std::vector<float> table(static_cast<std::size_t>(grid.size));
+  for (int index = 0; index < grid.size; ++index) {
+    table[static_cast<std::size_t>(index)] = static_cast<float>(curve(grid.value(index)));
+  }
+  return table;
+}
+
+}  // namespace
+
+Lineariser::Lineariser(LightCurves curves, bool centred_chroma)
+    : curves_(std::move(curves)), centred_chroma_(centred_chroma) {}
+
+void Lineariser::make_tables() {
+  const ValueGrid& grid = rows_->grid();
+  if (curves_.response) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      tables_[c] = make_table(grid, (*curves_.response)[c]);
+    }
+    return;
+  }
+  const Transfer transfer =
+      rows_->transfer_tag() == TransferTag::linear ? Transfer::linear : curves_.colour.transfer;
+  tables_ = {};
+  tables_[0] = make_table(grid, [&](double value) { return decode(transfer, value); });
+}
+
+void Lineariser::linearise(const AVFrame& picture, const Crop& crop, Image& image) {
+  if (!rows_ || !rows_->fits(picture)) {
+    rows_ = std::make_unique<CodedRows>(picture, centred_chroma_);
+    make_tables();
+  }
+  image.height = crop.height;
+  image.width = crop.width;
+  image.channels = 3;
+  image.pixels.resize(static_cast<std::size_t>(crop.height) * static_cast<std::size_t>(crop.width) *
+                      3);
+  const float* const red = tables_[0].data();
+  const float* const green = tables_[1].empty() ? red : tables_[1].data();
+  const float* const blue = tables_[2].empty() ? red : tables_[2].data();
+  rows_->begin(picture);
+  for (int y = 0; y < crop.height; ++y) {
+    const CodedRow row = rows_->read(crop.y + y);
+    const std::int32_t* const r = row[0] + crop.x;
+    const std::int32_t* const g = row[1] + crop.x;
+    const std::int32_t* const b = row[2] + crop.x;
+    float* const to = image.pixels.data() + image.index(y, 0);
+    for (std::ptrdiff_t x = 0; x < crop.width; ++x) {
+      to[3 * x] = red[r[x]];
+      to[3 * x + 1] = green[g[x]];
+      to[3 * x + 2] = blue[b[x]];
+    }
+  }
+}
+
+std::string Lineariser::description() const {
+  if (!rows_) {
+    return {};
+  }
+  std::string words = rows_->description() + ", ";
+  if (curves_.response) {
+    return words + "by its response";
+  }
+  if (rows_->transfer_tag() == TransferTag::linear) {
+    return words + "linear (tagged)";
+  }
+  return words + std::string(name_of(curves_.colour.transfer));
+}
+
+}  // namespace capture

@@ -1,0 +1,53 @@
+// Containers of video and sound, through libav. For the files that wrap libav.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <string>
+
+#include "capture/libav.h"
+
+struct AVStream;
+
+namespace capture {
+
+// Throws std::runtime_error with path and reason unless it is a file that can be read and is not
+// empty.
+void check_is_file(const std::string& path);
+
+enum class Track { video, sound };
+
+// An open container: its best video stream and, if it has any, the sound that goes with it.
+// Playlists and other files that point elsewhere are refused.
+class MediaFile {
+ public:
+  // Throws std::runtime_error with path, reason and what to do.
+  explicit MediaFile(const std::string& path);
+
+  const std::string& path() const { return path_; }
+  AVFormatContext& context() const { return *context_; }
+  AVStream& video() const { return *video_; }
+  AVStream* sound() const { return sound_; }  // null if silent
+
+  // The next packet of a track; null at the end. Packets of the other track that lie before it wait
+  // in memory, up to a bound, beyond which this returns null although the file goes on.
+  libav::PacketHandle next_packet(Track track);
+  // Whether packets of the track lie in memory already.
+  bool has_packet(Track track) const { return !waiting_[index(track)].empty(); }
+
+  // Back to the beginning. Returns whether the container can.
+  bool rewind();
+
+ private:
+  static std::size_t index(Track track) { return track == Track::video ? 0 : 1; }
+  libav::PacketHandle read();
+
+  std::string path_;
+  libav::FormatContext context_;
+  AVStream* video_ = nullptr;
+  AVStream* sound_ = nullptr;
+  std::array<std::deque<libav::PacketHandle>, 2> waiting_;
+  std::int64_t waiting_bytes_ = 0;
+};
+
+}  // namespace capture

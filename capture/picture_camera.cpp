@@ -1,0 +1,215 @@
+// Cameras that show picture files one after the other.
+#include "capture/picture_camera.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include "capture/exr.h"
+#include "capture/media_file.h"
+#include "capture/rgbe.h"
+
+namespace capture {
+namespace {
+
+std::string ending_of(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return ending;
+}
+
+bool is_exr(const std::string& path) { return ending_of(path) == ".exr"; }
+
+bool is_radiance(const std::string& path) {
+  const std::string ending = ending_of(path);
+  return ending == ".hdr" || ending == ".pic";
+}
+
+// Grey is repeated, alpha left out.
+Image three_channels(Image image) {
+  if (image.channels == 3) {
+    return image;
+  }
+  Image colour = make_image(image.height, image.width);
+  const std::size_t step = image.channels < 3 ? 0 : 1;
+  const auto channels = static_cast<std::size_t>(image.channels);
+  for (std::size_t i = 0; i < colour.pixels.size(); ++i) {
+    colour.pixels[i] = image.pixels[i / 3 * channels + i % 3 * step];
+  }
+  return colour;
+}
+
+Image cut(Image image, const Crop& crop) {
+  if (crop.width == image.width && crop.height == image.height) {
+    return image;
+  }
+  Image part = make_image(crop.height, crop.width, image.channels);
+  for (int y = 0; y < crop.height; ++y) {
+    const auto from =
+        image.pixels.begin() + static_cast<std::ptrdiff_t>(image.index(crop.y + y, crop.x));
+    std::copy_n(from, crop.width * image.channels,
+                part.pixels.begin() + static_cast<std::ptrdiff_t>(part.index(y, 0)));
+  }
+  return part;
+}
+
+class PictureCamera : public Camera {
+ public:
+  PictureCamera(const std::string& name,
+                std::vector<PictureEntry> entries,
+                Rational rate,
+                const CameraOptions& options,
+                LightCurves curves);
+
+  const CameraInfo& info() const override { return info_; }
+  std::optional<Frame> next() override;
+  CameraStatistics statistics() const override { return statistics_; }
+
+ private:
+  // The picture of an entry. Throws std::runtime_error.
+  std::shared_ptr<const Image> load(std::size_t entry);
+
+  std::vector<PictureEntry> entries_;
+  LightCurves curves_;
+  bool loop_;
+  int source_width_ = 0;
+  int source_height_ = 0;
+  Crop crop_;
+  CameraInfo info_;
+  Time pass_length_{};
+
+  std::size_t loaded_entry_;  // of last_image_
+  bool shown_ = false;        // a good picture was given
+  std::shared_ptr<const Image> last_image_;
+  std::size_t entry_ = 0;  // of the next frame
+  std::int64_t number_ = 0;
+  Time pass_start_{};
+  CameraStatistics statistics_;
+};
+
+PictureCamera::PictureCamera(const std::string& name,
+                             std::vector<PictureEntry> entries,
+                             Rational rate,
+                             const CameraOptions& options,
+                             LightCurves curves)
+    : entries_(std::move(entries)),
+      curves_(std::move(curves)),
+      loop_(options.loop),
+      loaded_entry_(entries_.size()) {
+  const auto fail = [&](const std::string& why) {
+    throw std::runtime_error("cannot open " + name + why);
+  };
+  number_ = options.frame.value_or(0);
+  if (number_ < 0 || number_ >= static_cast<std::int64_t>(entries_.size())) {
+    fail(" at frame " + std::to_string(number_) + ": it has " + std::to_string(entries_.size()) +
+         (entries_.size() == 1 ? " frame" : " frames") + ", counted from 0");
+  }
+  entry_ = static_cast<std::size_t>(number_);
+  std::string reason;
+  for (std::size_t i = entry_; i < entries_.size() && !last_image_; ++i) {
+    try {
+      Still still = read_picture(entries_[i].path, curves_);
+      source_width_ = still.image.width;
+      source_height_ = still.image.height;
+      crop_ = crop_within(options.crop, source_width_, source_height_);
+      last_image_ = std::make_shared<Image>(cut(std::move(still.image), crop_));
+      loaded_entry_ = i;
+      info_.description = std::move(still.description);
+    } catch (const std::runtime_error& error) {
+      if (source_width_ > 0) {
+        fail(std::string(": ") + error.what());
+      }
+      if (reason.empty() && !entries_[i].path.empty()) {
+        reason = error.what();
+      }
+    }
+  }
+  if (!last_image_) {
+    fail(": no picture can be read" + (reason.empty() ? "" : "; " + reason));
+  }
+  info_.width = crop_.width;
+  info_.height = crop_.height;
+  info_.rate = rate;
+  info_.frames = loop_ ? 0 : static_cast<std::int64_t>(entries_.size());
+  const Time step = entries_.size() > 1 ? entries_.back().time - entries_[entries_.size() - 2].time
+                                        : time_of_frame(1, options.picture_rate);
+  pass_length_ = entries_.back().time + step;
+}
+
+std::shared_ptr<const Image> PictureCamera::load(std::size_t entry) {
+  if (entry == loaded_entry_) {
+    return last_image_;
+  }
+  Still still = read_picture(entries_[entry].path, curves_);
+  if (still.image.width != source_width_ || still.image.height != source_height_) {
+    throw std::runtime_error(entries_[entry].path + " has another size than the first picture");
+  }
+  loaded_entry_ = entry;
+  return std::make_shared<Image>(cut(std::move(still.image), crop_));
+}
+
+std::optional<Frame> PictureCamera::next() {
+  if (entry_ == entries_.size()) {
+    if (!loop_) {
+      return std::nullopt;
+    }
+    entry_ = 0;
+    pass_start_ += pass_length_;
+  }
+  const PictureEntry& entry = entries_[entry_];
+  Frame frame;
+  frame.number = number_++;
+  frame.time = pass_start_ + entry.time;
+  frame.exposure_s = entry.exposure_s;
+  frame.status = entry.status;
+  frame.note = entry.note;
+  if (!entry.path.empty() && entry.status != FrameStatus::lost) {
+    try {
+      last_image_ = load(entry_);
+      shown_ = true;
+    } catch (const std::runtime_error& error) {
+      frame.status = FrameStatus::lost;
+      frame.note = error.what();
+    }
+  }
+  // Before the first good picture there is none, although one was read ahead for its size.
+  frame.image = shown_ ? last_image_ : nullptr;
+  ++entry_;
+  ++statistics_.delivered;
+  statistics_.lost += frame.status == FrameStatus::lost ? 1 : 0;
+  statistics_.damaged += frame.status == FrameStatus::damaged ? 1 : 0;
+  return frame;
+}
+
+}  // namespace
+
+bool is_picture(const std::string& path) {
+  return is_exr(path) || is_radiance(path) || is_still(path);
+}
+
+Still read_picture(const std::string& path, const LightCurves& curves) {
+  if (!is_exr(path) && !is_radiance(path)) {
+    return read_still(path, curves);
+  }
+  check_is_file(path);
+  if (is_exr(path)) {
+    return {three_channels(read_exr(path)), "OpenEXR, linear"};
+  }
+  return {three_channels(read_rgbe(path)), "Radiance, linear"};
+}
+
+std::unique_ptr<Camera> make_picture_camera(const std::string& name,
+                                            std::vector<PictureEntry> entries,
+                                            Rational rate,
+                                            const CameraOptions& options,
+                                            const LightCurves& curves) {
+  if (entries.empty()) {
+    throw std::invalid_argument("a camera without pictures");
+  }
+  return std::make_unique<PictureCamera>(name, std::move(entries), rate, options, curves);
+}
+
+}  // namespace capture

@@ -1,0 +1,41 @@
+// Cameras that show picture files one after the other.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "capture/camera.h"
+#include "capture/linearise.h"
+#include "capture/still.h"
+
+namespace capture {
+
+// One frame of such a camera.
+struct PictureEntry {
+  std::string path;  // "" = lost
+  Time time{};
+  double exposure_s = 0;  // 0 = unknown
+  FrameStatus status = FrameStatus::good;
+  std::string note;
+};
+
+// Reads any picture file as three channels of light: OpenEXR and Radiance pictures, by their
+// endings
+// (.exr, .hdr, .pic), are light already; other stills are read by `curves`.
+// Throws std::runtime_error with path, reason and what to do.
+Still read_picture(const std::string& path, const LightCurves& curves);
+
+// Whether read_picture would know the kind of file.
+bool is_picture(const std::string& path);
+
+// Shows `entries`, which are in order of time and at least one. Pictures that are missing, damaged
+// or of another size than the first readable one are lost frames.
+// Throws std::runtime_error if none can be read, or options.frame or options.crop lie outside.
+std::unique_ptr<Camera> make_picture_camera(const std::string& name,
+                                            std::vector<PictureEntry> entries,
+                                            Rational rate,
+                                            const CameraOptions& options,
+                                            const LightCurves& curves);
+
+}  // namespace capture

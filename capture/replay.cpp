@@ -1,0 +1,152 @@
+// Recorded frames played again.
+#include "capture/replay.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "capture/files.h"
+#include "capture/picture_camera.h"
+
+namespace capture {
+namespace {
+
+constexpr std::string_view header = "file,time_s,exposure_s,status";
+constexpr std::size_t columns = 4;
+constexpr std::size_t max_list_bytes = std::size_t{64} << 20;
+
+// Times of a year and more are no recording's.
+constexpr double max_time_s = 1e8;
+
+std::array<std::string, columns> split(const std::string& line) {
+  std::array<std::string, columns> fields;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < columns; ++i) {
+    const std::size_t end = i + 1 < columns ? line.find(',', begin) : line.size();
+    if (end == std::string::npos) {
+      throw std::runtime_error("it needs four fields: " + std::string(header));
+    }
+    fields[i] = line.substr(begin, end - begin);
+    begin = end + 1;
+  }
+  return fields;
+}
+
+double number_of(const std::string& field, std::string_view column) {
+  double number = 0;
+  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), number);
+  if (error != std::errc{} || end != field.data() + field.size() || !std::isfinite(number)) {
+    throw std::runtime_error(std::string(column) + " is no number: \"" + field + "\"");
+  }
+  return number;
+}
+
+FrameStatus status_of(const std::string& field) {
+  if (field == "good") {
+    return FrameStatus::good;
+  }
+  if (field == "damaged") {
+    return FrameStatus::damaged;
+  }
+  if (field == "lost") {
+    return FrameStatus::lost;
+  }
+  throw std::runtime_error("status is none of good, damaged, lost: \"" + field + "\"");
+}
+
+std::string picture_of(const std::string& field,
+                       FrameStatus status,
+                       const std::filesystem::path& folder) {
+  if (field.empty() && status == FrameStatus::lost) {
+    return {};
+  }
+  const std::filesystem::path name(field);
+  if (field.empty() || name.has_root_path() ||
+      std::find(name.begin(), name.end(), "..") != name.end()) {
+    throw std::runtime_error("file must name a picture in this folder: \"" + field + "\"");
+  }
+  return (folder / name).string();
+}
+
+PictureEntry entry_of(const std::string& line, const std::filesystem::path& folder) {
+  const std::array<std::string, columns> fields = split(line);
+  PictureEntry entry;
+  entry.status = status_of(fields[3]);
+  entry.path = picture_of(fields[0], entry.status, folder);
+  const double time_s = number_of(fields[1], "time_s");
+  if (std::abs(time_s) > max_time_s) {
+    throw std::runtime_error("time_s is too large: " + fields[1]);
+  }
+  entry.time = Time{std::llround(time_s * std::nano::den)};
+  entry.exposure_s = number_of(fields[2], "exposure_s");
+  if (entry.exposure_s < 0) {
+    throw std::runtime_error("exposure_s is below 0: " + fields[2]);
+  }
+  if (entry.status != FrameStatus::good) {
+    entry.note = "so recorded";
+  }
+  return entry;
+}
+
+std::vector<PictureEntry> read_list(const std::filesystem::path& list) {
+  const std::vector<std::byte> bytes = read_file(list.string(), max_list_bytes);
+  std::istringstream text(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  std::vector<PictureEntry> entries;
+  std::string line;
+  for (int number = 1; std::getline(text, line); ++number) {
+    if (!line.empty() && line.back() == '\r') {
+      line.pop_back();
+    }
+    const auto fail = [&](const std::string& why) {
+      throw std::runtime_error("cannot open " + list.string() + ", line " + std::to_string(number) +
+                               ": " + why);
+    };
+    if (number == 1) {
+      if (line != header) {
+        fail("the first line must be " + std::string(header));
+      }
+      continue;
+    }
+    try {
+      entries.push_back(entry_of(line, list.parent_path()));
+    } catch (const std::runtime_error& error) {
+      fail(error.what());
+    }
+    if (entries.size() > 1 && entries.back().time <= entries[entries.size() - 2].time) {
+      fail("time_s does not rise");
+    }
+  }
+  if (entries.empty()) {
+    throw std::runtime_error("cannot open " + list.string() + ": it lists no frames");
+  }
+  const Time first = entries.front().time;
+  for (PictureEntry& entry : entries) {
+    entry.time -= first;
+  }
+  return entries;
+}
+
+}  // namespace
+
+std::unique_ptr<Camera> open_replay(const std::string& folder,
+                                    const CameraOptions& options,
+                                    const LightCurves& curves) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(folder, error)) {
+    throw std::runtime_error("cannot open replay:" + folder + ": no such folder");
+  }
+  return make_picture_camera("replay:" + folder,
+                             read_list(std::filesystem::path(folder) / "frames.csv"), Rational{},
+                             options, curves);
+}
+
+}  // namespace capture

@@ -1,0 +1,79 @@
+// From a container's time stamps to the times of frames.
+#include "capture/stamp_clock.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace capture {
+namespace {
+
+__extension__ using Wide = __int128;
+
+constexpr Rational assumed_rate{25, 1};
+
+// A jump that no recording has: such stamps are damage.
+constexpr std::chrono::hours max_step{24};
+
+}  // namespace
+
+StampClock::StampClock(Rational tick, Rational rate)
+    : tick_(tick), rate_(rate), last_step_(time_of_frame(1, rate.num > 0 ? rate : assumed_rate)) {}
+
+Time StampClock::period() const { return rate_.num > 0 ? time_of_frame(1, rate_) : last_step_; }
+
+std::int64_t StampClock::nearest_frame(Time time) const {
+  return std::llround(static_cast<double>(time.count()) / std::nano::den * rate_.value());
+}
+
+std::optional<Time> StampClock::since_first(std::int64_t stamp) const {
+  const Wide ticks = Wide{stamp} - first_stamp_.value_or(stamp);
+  const Wide wide_ns = ticks * tick_.num * std::nano::den / tick_.den;
+  const Time limit = last_.value_or(Time{}) + max_step;
+  if (wide_ns < 0 || wide_ns > limit.count()) {
+    return std::nullopt;
+  }
+  const Time stamped{static_cast<Time::rep>(wide_ns)};
+  if (rate_.num <= 0) {
+    return stamped;
+  }
+  const Time nominal = time_of_frame(nearest_frame(stamped), rate_);
+  // A tick, rounded up.
+  const Time tick{static_cast<Time::rep>(Wide{tick_.num} * std::nano::den / tick_.den) + 1};
+  const Time near = std::clamp(tick, period() / 8, period() / 3);
+  return std::chrono::abs(stamped - nominal) <= near ? nominal : stamped;
+}
+
+Time StampClock::time_of(std::optional<std::int64_t> stamp) {
+  if (stamp && !first_stamp_ && !last_) {
+    first_stamp_ = stamp;
+  }
+  std::optional<Time> time = stamp && first_stamp_ ? since_first(*stamp) : std::nullopt;
+  if (!time || (last_ && *time <= *last_)) {
+    time = end();
+  }
+  if (last_) {
+    last_step_ = *time - *last_;
+  }
+  last_ = time;
+  return *time;
+}
+
+Time StampClock::end() const {
+  if (!last_) {
+    return Time{};
+  }
+  if (rate_.num > 0) {
+    const std::int64_t n = nearest_frame(*last_);
+    if (time_of_frame(n, rate_) == *last_) {
+      return time_of_frame(n + 1, rate_);
+    }
+  }
+  return *last_ + period();
+}
+
+void StampClock::restart() {
+  first_stamp_.reset();
+  last_.reset();
+}
+
+}  // namespace capture

@@ -1,0 +1,274 @@
+// Video files as cameras.
+#include "capture/video_file.h"
+
+#include <deque>
+#include <stdexcept>
+#include <utility>
+
+#include "capture/crop.h"
+#include "capture/image_pool.h"
+#include "capture/sound_decoder.h"
+#include "capture/stamp_clock.h"
+#include "capture/video_decoder.h"
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+}
+
+namespace capture {
+namespace {
+
+// So many pictures may be lost before the first good one.
+constexpr std::size_t max_lost_at_start = 1000;
+
+// The rate that the container counts in, if its average agrees; else the average.
+Rational rate_of(const AVStream& stream) {
+  const AVRational counted = stream.r_frame_rate;
+  const AVRational average = stream.avg_frame_rate;
+  const auto rational = [](AVRational rate) {
+    return rate.num > 0 && rate.den > 0 ? Rational{rate.num, rate.den} : Rational{};
+  };
+  if (counted.num > 0 && counted.den > 0 && average.num > 0 && average.den > 0) {
+    const double ratio = av_q2d(counted) / av_q2d(average);
+    return rational(ratio > 0.98 && ratio < 1.02 ? counted : average);
+  }
+  return rational(counted.num > 0 ? counted : average);
+}
+
+bool centres_chroma(AVCodecID codec) {
+  return codec == AV_CODEC_ID_MJPEG || codec == AV_CODEC_ID_MJPEGB || codec == AV_CODEC_ID_AMV;
+}
+
+class VideoFile : public Camera {
+ public:
+  VideoFile(const std::string& path, const CameraOptions& options, const LightCurves& curves);
+
+  const CameraInfo& info() const override { return info_; }
+  std::optional<Frame> next() override;
+  std::optional<Sound> take_sound() override;
+  CameraStatistics statistics() const override { return statistics_; }
+
+ private:
+  void open();
+  void describe(const AVFrame& first);
+  void skip_to(std::int64_t frame);
+  bool start_again();
+  Frame make_frame(const DecodedPicture& picture);
+  void linearise(const DecodedPicture& picture, Frame& frame);
+  Time end_of_pass() const { return pass_start_ + clock_->end(); }
+
+  std::string path_;
+  bool loop_;
+  CameraInfo info_;
+  Crop crop_;
+  std::unique_ptr<MediaFile> file_;
+  std::unique_ptr<VideoDecoder> decoder_;
+  std::unique_ptr<SoundDecoder> sound_;
+  std::string sound_note_;
+  Lineariser lineariser_;
+  ImagePool pool_;
+  std::optional<StampClock> clock_;
+
+  std::deque<Frame> ahead_;  // made while opening
+  std::shared_ptr<const Image> last_image_;
+  std::int64_t number_ = 0;       // of the next frame
+  std::int64_t pass_frames_ = 0;  // in this pass through the file
+  Time pass_start_{};
+  Time last_time_{};  // of the last frame given
+  bool ended_ = false;
+  CameraStatistics statistics_;
+};
+
+AVCodecID codec_of(const MediaFile& file) { return file.video().codecpar->codec_id; }
+
+VideoFile::VideoFile(const std::string& path,
+                     const CameraOptions& options,
+                     const LightCurves& curves)
+    : path_(path),
+      loop_(options.loop),
+      file_(std::make_unique<MediaFile>(path)),
+      lineariser_(curves, centres_chroma(codec_of(*file_))) {
+  open();
+  info_.rate = rate_of(file_->video());
+  info_.frames = file_->video().nb_frames;
+  clock_.emplace(Rational{file_->video().time_base.num, file_->video().time_base.den}, info_.rate);
+  if (options.frame) {
+    skip_to(*options.frame);
+  }
+  for (;;) {
+    const std::optional<DecodedPicture> picture = decoder_->next();
+    if (!picture && number_ <= options.frame.value_or(-1)) {
+      throw std::runtime_error("cannot open " + path_ + " at frame " +
+                               std::to_string(*options.frame) + ": it has " +
+                               std::to_string(number_) + " frames, counted from 0");
+    }
+    if (!picture || ahead_.size() > max_lost_at_start) {
+      throw std::runtime_error("cannot open " + path_ +
+                               ": no picture in it can be decoded; is the file whole?");
+    }
+    if (picture->frame != nullptr) {
+      const AVFrame& first = *picture->frame;
+      try {
+        libav::check_size(first.width, first.height);
+        crop_ = crop_within(options.crop, first.width, first.height);
+        Image probe;
+        lineariser_.linearise(first, crop_, probe);
+      } catch (const std::runtime_error& error) {
+        throw std::runtime_error("cannot open " + path_ + ": " + error.what());
+      }
+      ahead_.push_back(make_frame(*picture));
+      describe(first);
+      break;
+    }
+    ahead_.push_back(make_frame(*picture));
+  }
+  if (sound_) {
+    sound_->skip_to(ahead_.front().time);
+  }
+}
+
+void VideoFile::open() {
+  decoder_ = std::make_unique<VideoDecoder>(*file_);
+  sound_.reset();
+  if (file_->sound() != nullptr) {
+    try {
+      sound_ = std::make_unique<SoundDecoder>(*file_);
+    } catch (const std::runtime_error& error) {
+      sound_note_ = error.what();
+    }
+  }
+}
+
+void VideoFile::describe(const AVFrame& first) {
+  info_.width = crop_.width;
+  info_.height = crop_.height;
+  info_.description =
+      std::string(avcodec_get_name(codec_of(*file_))) + ", " + lineariser_.description();
+  if (first.interlaced_frame != 0) {
+    info_.description += ", interlaced (taken as it is)";
+  }
+  if (sound_) {
+    info_.sound_channels = sound_->channels();
+    info_.sound_rate = sound_->rate();
+    info_.description +=
+        std::string("; sound ") + avcodec_get_name(file_->sound()->codecpar->codec_id);
+  } else if (!sound_note_.empty()) {
+    info_.description += "; sound left out: " + sound_note_;
+  }
+}
+
+void VideoFile::skip_to(std::int64_t frame) {
+  if (frame < 0) {
+    throw std::runtime_error("cannot open " + path_ + " at frame " + std::to_string(frame) +
+                             ": frames count from 0");
+  }
+  while (number_ < frame) {
+    const std::optional<DecodedPicture> picture = decoder_->next();
+    if (!picture) {
+      return;  // the constructor finds no picture, and says so
+    }
+    make_frame(DecodedPicture{nullptr, picture->pts, FrameStatus::good, {}});
+  }
+}
+
+Frame VideoFile::make_frame(const DecodedPicture& picture) {
+  Frame frame;
+  frame.number = number_++;
+  frame.time = pass_start_ + clock_->time_of(picture.pts);
+  frame.status = picture.status;
+  frame.note = picture.note;
+  if (pass_frames_++ == 0 && sound_) {
+    sound_->begin(clock_->first_stamp(), pass_start_);
+  }
+  if (picture.frame != nullptr) {
+    linearise(picture, frame);
+  }
+  frame.image = last_image_;
+  return frame;
+}
+
+void VideoFile::linearise(const DecodedPicture& picture, Frame& frame) {
+  const AVFrame& decoded = *picture.frame;
+  try {
+    crop_within(std::array{crop_.x, crop_.y, crop_.width, crop_.height}, decoded.width,
+                decoded.height);
+    std::shared_ptr<Image> image = pool_.lend();
+    lineariser_.linearise(decoded, crop_, *image);
+    last_image_ = std::move(image);
+  } catch (const std::runtime_error& error) {
+    // The stream turned into something else: the show goes on with what there was.
+    frame.status = FrameStatus::lost;
+    frame.note = error.what();
+  }
+}
+
+bool VideoFile::start_again() {
+  if (pass_frames_ == 0) {
+    return false;
+  }
+  const Time end = end_of_pass();
+  if (sound_) {
+    sound_->finish(end);
+  }
+  if (file_->rewind()) {
+    decoder_->restart();
+  } else {
+    try {
+      file_ = std::make_unique<MediaFile>(path_);
+      open();
+    } catch (const std::runtime_error&) {
+      return false;  // the file is gone: that is its end
+    }
+  }
+  pass_start_ = end;
+  pass_frames_ = 0;
+  clock_->restart();
+  return true;
+}
+
+std::optional<Frame> VideoFile::next() {
+  if (ended_) {
+    return std::nullopt;
+  }
+  std::optional<Frame> frame;
+  if (!ahead_.empty()) {
+    frame = std::move(ahead_.front());
+    ahead_.pop_front();
+  } else {
+    std::optional<DecodedPicture> picture = decoder_->next();
+    if (!picture && loop_ && start_again()) {
+      picture = decoder_->next();
+    }
+    if (!picture) {
+      ended_ = true;
+      return std::nullopt;
+    }
+    frame = make_frame(*picture);
+  }
+  ++statistics_.delivered;
+  statistics_.lost += frame->status == FrameStatus::lost ? 1 : 0;
+  statistics_.damaged += frame->status == FrameStatus::damaged ? 1 : 0;
+  last_time_ = frame->time;
+  if (sound_) {
+    sound_->keep_up(last_time_);
+  }
+  return frame;
+}
+
+std::optional<Sound> VideoFile::take_sound() {
+  if (!sound_ || statistics_.delivered == 0) {
+    return std::nullopt;
+  }
+  return sound_->take(ended_ ? end_of_pass() : last_time_);
+}
+
+}  // namespace
+
+std::unique_ptr<Camera> open_video_file(const std::string& path,
+                                        const CameraOptions& options,
+                                        const LightCurves& curves) {
+  return std::make_unique<VideoFile>(path, options, curves);
+}
+
+}  // namespace capture

@@ -1,0 +1,159 @@
+// The sound of video files, in step with their frames.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "capture/camera.h"
+#include "tests/independent_plate.h"
+#include "tests/made_files.h"
+
+namespace capture {
+namespace {
+
+constexpr double flash_s = 0.48;  // frame 12 at 25 fps
+
+// 1.6 s of black with one white frame, and a clap with it: 5 ms of noise.
+class Clap : public testing::Test {
+ protected:
+  std::string make(const std::string& name, const std::string& options, double sound_delay_s = 0) {
+    const std::string clip = (directory_ / name).string();
+    const std::string clap = "between(t\\," + std::to_string(flash_s - sound_delay_s) + "\\," +
+                             std::to_string(flash_s + 0.005 - sound_delay_s) + ")";
+    independent::ffmpeg(
+        "-f lavfi -i \"color=black:size=64x48:rate=25:duration=1.6,"
+        "geq=lum='if(eq(N\\,12)\\,235\\,16)':cb=128:cr=128\" -itsoffset " +
+        std::to_string(sound_delay_s) + " -f lavfi -i \"aevalsrc='(random(0)-0.5)*" + clap +
+        "':sample_rate=48000:duration=" + std::to_string(1.6 - sound_delay_s) + "\" " + options +
+        " '" + clip + "'");
+    return clip;
+  }
+  std::filesystem::path directory_ = made::make_temporary_directory();
+};
+
+struct Heard {
+  double flash_s = -1;
+  double clap_s = -1;
+  std::vector<float> samples;
+  int rate = 0;
+};
+
+// Plays to the end (or so many frames), taking the sound after every frame.
+Heard play(Camera& camera, int max_frames = 1000) {
+  Heard heard;
+  heard.rate = camera.info().sound_rate;
+  std::int64_t position = -1;
+  const auto take = [&] {
+    while (const std::optional<Sound> sound = camera.take_sound()) {
+      EXPECT_EQ(sound->channels, camera.info().sound_channels);
+      const auto start =
+          std::llround(static_cast<double>(sound->time.count()) * 1e-9 * sound->rate);
+      EXPECT_TRUE(position < 0 || position == start) << "sound must be continuous";
+      for (std::size_t i = 0; i < sound->samples.size(); ++i) {
+        const double time_s = static_cast<double>(start) / sound->rate +
+                              static_cast<double>(i) / sound->channels / sound->rate;
+        if (heard.clap_s < 0 && std::abs(sound->samples[i]) > 0.05F) heard.clap_s = time_s;
+      }
+      heard.samples.insert(heard.samples.end(), sound->samples.begin(), sound->samples.end());
+      position = start + static_cast<std::int64_t>(sound->samples.size()) / sound->channels;
+    }
+  };
+  for (int i = 0; i < max_frames; ++i) {
+    const std::optional<Frame> frame = camera.next();
+    if (!frame) break;
+    const double time_s = static_cast<double>(frame->time.count()) * 1e-9;
+    if (heard.flash_s < 0 && frame->image->at(24, 32, 1) > 0.5F) heard.flash_s = time_s;
+    take();
+    // Up to the frame's time, and no further.
+    EXPECT_NEAR(static_cast<double>(position) / heard.rate, time_s, 1.5 / heard.rate);
+  }
+  take();
+  return heard;
+}
+
+TEST_F(Clap, IsHeardWhenItIsSeen) {
+  for (const auto& [name, codecs] :
+       {std::pair{"a.mkv", "-c:v ffv1 -c:a pcm_s16le"},
+        std::pair{"a.mp4", "-c:v libx264 -pix_fmt yuv420p -c:a aac -b:a 128k"},
+        std::pair{"b.mkv", "-c:v libx264 -pix_fmt yuv420p -c:a libopus"},
+        std::pair{"a.mov", "-c:v mjpeg -c:a pcm_s24le"},
+        std::pair{"a.avi", "-c:v mpeg4 -c:a pcm_s16le"}}) {
+    const auto camera = open_camera(make(name, codecs));
+    ASSERT_GT(camera->info().sound_channels, 0) << camera->info().description;
+    const Heard heard = play(*camera);
+    EXPECT_NEAR(heard.flash_s, flash_s, 1e-9) << name;
+    EXPECT_NEAR(heard.clap_s, heard.flash_s, 0.010) << name;
+    EXPECT_NEAR(static_cast<double>(heard.samples.size()) /
+                    (camera->info().sound_channels * camera->info().sound_rate),
+                1.6, 0.001)
+        << name << ": as long as the pictures";
+  }
+}
+
+TEST_F(Clap, IsHeardInTimeThoughTheSoundBeginsLater) {
+  for (const auto& [name, codecs] :
+       {std::pair{"a.mkv", "-c:v ffv1 -c:a pcm_s16le"},
+        std::pair{"a.mp4", "-c:v libx264 -pix_fmt yuv420p -c:a aac"}}) {
+    const auto camera = open_camera(make(name, codecs, 0.25));
+    const Heard heard = play(*camera);
+    EXPECT_NEAR(heard.clap_s, heard.flash_s, 0.010) << name;
+    EXPECT_EQ(heard.samples[1000], 0) << "silence until it begins";
+  }
+}
+
+TEST_F(Clap, ComesAgainInEveryPassOfALoop) {
+  CameraOptions options;
+  options.loop = true;
+  const auto camera = open_camera(make("a.mkv", "-c:v ffv1 -c:a pcm_s16le"), options);
+  const Heard heard = play(*camera, 100);
+  const auto loud = [&](double time_s) {
+    float most = 0;
+    const auto first = static_cast<std::size_t>(time_s * heard.rate);
+    for (std::size_t i = first; i < first + 240; ++i) most = std::max(most, heard.samples[i]);
+    return most > 0.05F;
+  };
+  EXPECT_TRUE(loud(flash_s));
+  EXPECT_TRUE(loud(flash_s + 1.6));
+  EXPECT_TRUE(loud(flash_s + 3.2));
+  EXPECT_FALSE(loud(flash_s + 1.0));
+}
+
+TEST_F(Clap, IsInTimeWhenTheFileIsStartedLater) {
+  CameraOptions options;
+  options.frame = 5;
+  const auto camera = open_camera(make("a.mkv", "-c:v ffv1 -c:a pcm_s16le"), options);
+  ASSERT_TRUE(camera->next());
+  const std::optional<Sound> first = camera->take_sound();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->time, std::chrono::milliseconds(200)) << "none from before the first frame";
+  const Heard heard = play(*camera);
+  EXPECT_NEAR(heard.clap_s, heard.flash_s, 0.010);
+}
+
+TEST_F(Clap, IsBoundedInMemoryWhenNobodyListens) {
+  const std::string clip = (directory_ / "long.mkv").string();
+  independent::ffmpeg(
+      "-f lavfi -i color=black:size=16x16:rate=5:duration=20 -f lavfi -i "
+      "sine=duration=20:sample_rate=8000 -c:v ffv1 -c:a pcm_s16le '" +
+      clip + "'");
+  const auto camera = open_camera(clip);
+  while (camera->next()) {
+  }
+  const std::optional<Sound> rest = camera->take_sound();
+  ASSERT_TRUE(rest);
+  EXPECT_LE(rest->samples.size(), 8000U * 11);
+  EXPECT_GE(rest->samples.size(), 8000U * 9);
+}
+
+TEST_F(Clap, OfASilentFileIsNothing) {
+  const std::string clip = (directory_ / "silent.mkv").string();
+  independent::ffmpeg("-f lavfi -i color=black:size=16x16:rate=5:duration=1 -c:v ffv1 '" + clip +
+                      "'");
+  const auto camera = open_camera(clip);
+  EXPECT_EQ(camera->info().sound_channels, 0);
+  ASSERT_TRUE(camera->next());
+  EXPECT_FALSE(camera->take_sound());
+}
+
+}  // namespace
+}  // namespace capture
