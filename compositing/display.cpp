@@ -103,54 +103,76 @@ class Shaper {
   double brightest_;
 };
 
-// Tetrahedral interpolation in a table of (size, size, size, 4) at places 0..size - 1 on each axis.
+// Tetrahedral interpolation in a table of (size, size, size, 4).
 // Kasson, Plouffe and Nin, "Tetrahedral interpolation technique for color space conversion",
 // Proceedings of SPIE 1909, 1993.
+//
+// Works on blocks of pixels in passes, so that the choice of the tetrahedron, which is different
+// for every pixel, vectorises instead of branching.
 class Tetrahedra {
  public:
-  Tetrahedra(const std::vector<float>& nodes, int size) : nodes_(nodes.data()), last_(size - 2) {
-    strides_ = {size * size * 4, size * 4, 4};
-  }
+  static constexpr std::size_t block = 64;
 
-  std::array<float, 4> at(float r, float g, float b) const {
-    const std::array<float, 3> place{r, g, b};
-    std::array<float, 3> part;
-    const float* corner = nodes_;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const int node = std::min(static_cast<int>(place[c]), last_);
-      part[c] = place[c] - static_cast<float>(node);
-      corner += std::ptrdiff_t{node} * strides_[c];
+  Tetrahedra(const std::vector<float>& nodes, int size) : nodes_(nodes.data()), size_(size) {}
+
+  // Places 0..size - 1 on each axis; fill in before interpolate().
+  std::array<std::array<float, block>, 3> places;
+
+  // Calls take(i, value) with the 4 values at the places of pixels 0..count - 1, at most a block.
+  template <typename Take>
+  void interpolate(std::size_t count, Take take) {
+    choose();
+    for (std::size_t i = 0; i < count; ++i) {
+      const float* const corner = nodes_ + corner_[i];
+      const float* const first = corner + along_largest_[i];
+      const float* const second = corner + along_two_[i];
+      const float* const opposite = corner + (size_ * size_ + size_ + 1) * 4;
+      std::array<float, 4> value;
+      for (std::size_t c = 0; c < 4; ++c) {
+        value[c] = corner[c] * weights_[0][i] + first[c] * weights_[1][i] +
+                   second[c] * weights_[2][i] + opposite[c] * weights_[3][i];
+      }
+      take(i, value);
     }
-    // From the corner along the axis of the largest part first, of the smallest last.
-    const bool r_over_g = part[0] >= part[1];
-    const bool g_over_b = part[1] >= part[2];
-    const bool r_over_b = part[0] >= part[2];
-    const float largest = std::max({part[0], part[1], part[2]});
-    const float smallest = std::min({part[0], part[1], part[2]});
-    const float middle =
-        std::max(std::min(part[0], part[1]), std::min(std::max(part[0], part[1]), part[2]));
-    const int all = strides_[0] + strides_[1] + strides_[2];
-    const int along_largest = r_over_g && r_over_b    ? strides_[0]
-                              : g_over_b && !r_over_g ? strides_[1]
-                                                      : strides_[2];
-    const int along_smallest = r_over_b && g_over_b    ? strides_[2]
-                               : r_over_g && !g_over_b ? strides_[1]
-                                                       : strides_[0];
-    const float* first = corner + along_largest;
-    const float* second = corner + (all - along_smallest);
-    const float* opposite = corner + all;
-    std::array<float, 4> value;
-    for (std::size_t c = 0; c < 4; ++c) {
-      value[c] = corner[c] * (1.0F - largest) + first[c] * (largest - middle) +
-                 second[c] * (middle - smallest) + opposite[c] * smallest;
-    }
-    return value;
   }
 
  private:
+  // From the corner below all three places along the axis of the largest part first, of the
+  // smallest last.
+  void choose() {
+    const int r_stride = size_ * size_ * 4;
+    const int g_stride = size_ * 4;
+    const int b_stride = 4;
+    const int all = r_stride + g_stride + b_stride;
+    const int last = size_ - 2;
+    for (std::size_t i = 0; i < block; ++i) {
+      const int r_node = std::min(static_cast<int>(places[0][i]), last);
+      const int g_node = std::min(static_cast<int>(places[1][i]), last);
+      const int b_node = std::min(static_cast<int>(places[2][i]), last);
+      const float r = places[0][i] - static_cast<float>(r_node);
+      const float g = places[1][i] - static_cast<float>(g_node);
+      const float b = places[2][i] - static_cast<float>(b_node);
+      const float largest = std::max(std::max(r, g), b);
+      const float smallest = std::min(std::min(r, g), b);
+      const float middle = std::max(std::min(r, g), std::min(std::max(r, g), b));
+      const int larger_of_gb = g >= b ? g_stride : b_stride;
+      const int smaller_of_rg = r >= g ? g_stride : r_stride;
+      corner_[i] = r_node * r_stride + g_node * g_stride + b_node * b_stride;
+      along_largest_[i] = r == largest ? r_stride : larger_of_gb;
+      along_two_[i] = all - (b == smallest ? b_stride : smaller_of_rg);
+      weights_[0][i] = 1.0F - largest;
+      weights_[1][i] = largest - middle;
+      weights_[2][i] = middle - smallest;
+      weights_[3][i] = smallest;
+    }
+  }
+
   const float* nodes_;
-  int last_;
-  std::array<int, 3> strides_;
+  int size_;
+  std::array<int, block> corner_;
+  std::array<int, block> along_largest_;
+  std::array<int, block> along_two_;
+  std::array<std::array<float, block>, 4> weights_;
 };
 
 // Calls emit(pixel, r, g, b) with codes of 0..the largest Code for every pixel of the run.
@@ -167,14 +189,23 @@ void emit_exact(std::span<const capture::Half> rgba, const std::vector<Code>& ta
 template <typename Code, typename Emit>
 void emit_baked(std::span<const capture::Half> rgba,
                 const std::vector<float>& positions,
-                const Tetrahedra& table,
+                const std::vector<float>& nodes,
+                int table_size,
                 Emit emit) {
   constexpr auto top = static_cast<float>(std::numeric_limits<Code>::max());
-  for (std::size_t i = 0; i < rgba.size() / 4; ++i) {
-    const std::array<float, 4> value =
-        table.at(positions[rgba[i * 4]], positions[rgba[i * 4 + 1]], positions[rgba[i * 4 + 2]]);
-    emit(i, static_cast<Code>(value[0] * top + 0.5F), static_cast<Code>(value[1] * top + 0.5F),
-         static_cast<Code>(value[2] * top + 0.5F));
+  Tetrahedra table(nodes, table_size);
+  table.places = {};
+  const std::size_t pixels = rgba.size() / 4;
+  for (std::size_t first = 0; first < pixels; first += Tetrahedra::block) {
+    const std::size_t count = std::min(Tetrahedra::block, pixels - first);
+    const capture::Half* const source = rgba.data() + first * 4;
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t c = 0; c < 3; ++c) table.places[c][i] = positions[source[i * 4 + c]];
+    }
+    table.interpolate(count, [&](std::size_t i, const std::array<float, 4>& value) {
+      emit(first + i, static_cast<Code>(value[0] * top + 0.5F),
+           static_cast<Code>(value[1] * top + 0.5F), static_cast<Code>(value[2] * top + 0.5F));
+    });
   }
 }
 
@@ -257,7 +288,7 @@ std::int64_t Display::convert(std::span<const capture::Half> rgba,
   if (separable()) {
     emit_exact(rgba, table, emit);
   } else {
-    emit_baked<Code>(rgba, positions_, Tetrahedra(nodes_, table_size_), emit);
+    emit_baked<Code>(rgba, positions_, nodes_, table_size_, emit);
   }
   return count_pixels_with_nan(rgba);
 }

@@ -11,7 +11,7 @@
 
 namespace compositing {
 
-// Which display and view; see list_displays for the names.
+// Which display and view; see list_displays for the names. "" is the config's default.
 struct DisplaySettings {
   std::string display = "Rec.1886";     // or "sRGB"
   std::string view = "Un-tone-mapped";  // keeps the plate's own look; or "ACES SDR"

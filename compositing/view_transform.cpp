@@ -212,7 +212,11 @@ struct ViewTransform::Processor {
 
 ViewTransform::ViewTransform(const DisplaySettings& settings) {
   const ocio::ConstConfigRcPtr config = open_config(settings.config_file);
-  require_view(config, settings.display, settings.view);
+  const std::string display =
+      settings.display.empty() ? config->getDefaultDisplay() : settings.display;
+  const std::string view_name =
+      settings.view.empty() ? config->getDefaultView(display.c_str()) : settings.view;
+  require_view(config, display, view_name);
   const std::string working_space = find_working_space(config, settings.working_space);
   const auto group = ocio::GroupTransform::Create();
   if (!settings.look_file.empty()) {
@@ -224,8 +228,8 @@ ViewTransform::ViewTransform(const DisplaySettings& settings) {
   }
   const auto view = ocio::DisplayViewTransform::Create();
   view->setSrc(working_space.c_str());
-  view->setDisplay(settings.display.c_str());
-  view->setView(settings.view.c_str());
+  view->setDisplay(display.c_str());
+  view->setView(view_name.c_str());
   group->appendTransform(view);
   try {
     auto processor = std::make_unique<Processor>();
@@ -237,7 +241,7 @@ ViewTransform::ViewTransform(const DisplaySettings& settings) {
     std::string files = settings.config_file;
     if (!settings.look_file.empty()) files += (files.empty() ? "" : ", ") + settings.look_file;
     throw std::runtime_error((files.empty() ? std::string("OpenColorIO") : files) + ": view \"" +
-                             settings.view + "\" of display \"" + settings.display +
+                             view_name + "\" of display \"" + display +
                              "\" cannot be made: " + error.what());
   }
 }

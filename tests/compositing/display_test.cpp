@@ -278,6 +278,13 @@ TEST(Display, ReadsAPublishedConfig) {
   EXPECT_THROW(Display({.config_file = file}), std::invalid_argument);
 }
 
+TEST(Display, TakesTheDefaultWhereNoNameIsGiven) {
+  const capture::HalfImage image = random_colours(8, 8);
+  EXPECT_EQ(rgb8(Display({.display = "", .view = ""}), image), rgb8(Display(), image));
+  EXPECT_EQ(rgb8(Display({.display = "sRGB", .view = ""}), image),
+            rgb8(Display({.display = "sRGB"}), image));
+}
+
 TEST(ListDisplays, StartsWithTheDefault) {
   const std::vector<DisplayViews> displays = list_displays();
   ASSERT_EQ(displays.size(), 2U);
