@@ -152,10 +152,8 @@ std::uint64_t visibility_key(const FrameInputs& inputs, const FrameJob& job) {
     mix(std::bit_cast<std::uint32_t>(light.direction.y));
     mix(std::bit_cast<std::uint32_t>(light.direction.z));
   }
-  // How closely a light's penumbrae are looked at follows its weight.
-  const LightContext context = make_light_context(*inputs.scene, job.lights, job.effort);
-  for (const std::uint8_t block : context.light_block) mix(block);
   mix(job.effort.adaptive_visibility);
+  mix(static_cast<std::uint64_t>(job.effort.interleave));
   return key;
 }
 
@@ -190,7 +188,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   FrameContext context;
   context.inputs = inputs;
   context.job = &job;
-  context.light = make_light_context(*inputs.scene, job.lights, job.effort);
+  context.light = {inputs.scene, &job.lights, &job.effort};
   const auto& R = job.cam_from_set.R.m;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j)

@@ -21,8 +21,6 @@ constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 of its f
 int bit_of(int x, int y) { return (y & 3) * 16 + x; }
 int point_of(int word, int bit) { return word * 64 + bit; }
 
-float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
-
 #if defined(__AVX2__)
 using Lanes = __m256;
 constexpr std::size_t lanes = 8;
@@ -282,7 +280,7 @@ class CellVisibility {
     }
     shoot_rest(first);
     for (std::size_t i = 0; i < count; ++i) {
-      if (!skip_[i]) spread(i, block_[i]);
+      if (!skip_[i]) spread(i);
     }
   }
 
@@ -326,13 +324,11 @@ class CellVisibility {
 
   void test_first(std::uint32_t first, std::size_t i) {
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
-    block_[i] = context_.light_block[light];
-    const bool coarse = context_.effort->adaptive_visibility || block_[i] == 4;
     for (int word = 0; word < 4; ++word) {
       const auto wi = static_cast<std::size_t>(word);
       const std::uint64_t lit = w_.lit[i][wi];
       std::uint64_t rest = lit;
-      if (coarse) {
+      if (coarse_) {
         for (int bx = 0; bx < cell_size; bx += 4) {
           const std::uint64_t bits = block4 << bx;
           if ((lit & w_.same4[wi] & bits) != bits) continue;
@@ -340,15 +336,15 @@ class CellVisibility {
           rest &= ~bits;
         }
       }
-      test_pixels(first, i, word, rest, block_[i]);
+      test_pixels(first, i, word, rest);
     }
   }
 
   // Tests pixels one by one, or one of each smooth 2x2 block.
-  void test_pixels(std::uint32_t first, std::size_t i, int word, std::uint64_t pixels, int block) {
+  void test_pixels(std::uint32_t first, std::size_t i, int word, std::uint64_t pixels) {
     const auto wi = static_cast<std::size_t>(word);
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
-    if (block >= 2) {
+    if (block_ >= 2) {
       const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
       for (std::uint64_t left = pixels; left != 0;) {
         const int k = std::countr_zero(left);
@@ -366,8 +362,7 @@ class CellVisibility {
   // Where a block's pixel disagrees with those of the blocks around it, looks closer.
   void refine(std::uint32_t first, std::size_t i) {
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
-    const bool coarse = context_.effort->adaptive_visibility || block_[i] == 4;
-    if (!coarse) return;
+    if (!coarse_) return;
     // 4 x 4 flags of blocks: bit by * 4 + bx.
     unsigned whole = 0, sees = 0, tinted = 0;
     for (int by = 0; by < 4; ++by) {
@@ -393,18 +388,18 @@ class CellVisibility {
         const unsigned flag = 1U << (by * 4 + bx);
         if (!(whole & flag)) continue;
         const std::uint64_t bits = block4 << (4 * bx);
-        if (!(differ & flag) || block_[i] == 4) {
+        if (!(differ & flag) || block_ == 4) {
           if (!(sees & flag)) w_.seen[i][wi] &= ~bits;
           continue;
         }
-        test_pixels(first, i, by, bits, block_[i]);
+        test_pixels(first, i, by, bits);
       }
     }
   }
 
   // Gives a 2x2 block's answer to its four pixels.
-  void spread(std::size_t i, int block) {
-    if (block < 2) return;
+  void spread(std::size_t i) {
+    if (block_ < 2) return;
     for (std::size_t wi = 0; wi < 4; ++wi) {
       const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
       std::uint64_t left = smooth & w_.tested[i][wi] & ~w_.seen[i][wi];
@@ -421,7 +416,8 @@ class CellVisibility {
   GatherWorkspace& w_;
   RenderStatistics& statistics_;
   unsigned ray_mask_;
-  std::array<int, GatherWorkspace::group> block_{};
+  int block_ = context_.effort->interleave;
+  bool coarse_ = context_.effort->adaptive_visibility || block_ == 4;
   std::array<CellMask, GatherWorkspace::group> tinted_{};
 };
 
@@ -431,21 +427,6 @@ void clear_sums(Receivers& r) {
 }
 
 }  // namespace
-
-LightContext make_light_context(const Scene& scene, const LightTable& table, const Effort& effort) {
-  LightContext context{&scene, &table, &effort, {}};
-  float total = 0;
-  for (const DirectionalLight& light : table.lights) total += largest(light.irradiance);
-  const auto n = static_cast<float>(table.lights.size());
-  for (const DirectionalLight& light : table.lights) {
-    // A light twice as heavy as the mean is looked at twice as closely, in steps of two.
-    const float weight = total > 0 ? largest(light.irradiance) / total * n : 0;
-    const int finer = weight <= 2 ? 1 : weight <= 8 ? 2 : 4;
-    context.light_block.push_back(
-        static_cast<std::uint8_t>(std::max(1, effort.interleave / finer)));
-  }
-  return context;
-}
 
 bool gather_cell(const LightContext& context,
                  Receivers& r,

@@ -62,9 +62,7 @@ struct LightContext {
   const Scene* scene = nullptr;
   const LightTable* table = nullptr;
   const Effort* effort = nullptr;
-  std::vector<std::uint8_t> light_block;  // per light: 1, 2 or 4, how coarse its penumbrae may be
 };
-LightContext make_light_context(const Scene& scene, const LightTable& table, const Effort& effort);
 
 // Visibility of a cell from an earlier frame, and room for this one's. Either may be null.
 struct CellMemory {
@@ -75,7 +73,7 @@ struct CellMemory {
 // Adds up the light at the pixels of a cell: open and lost. Returns whether `memory.room` holds
 // this frame's visibility now (glass and real blockers are not kept). Shadow rays go to one pixel
 // of every 4x4 block of a smooth surface first, another for each light; where neighbouring blocks
-// disagree, to its 2x2 blocks or pixels as the light's weight asks.
+// disagree, to its 2x2 blocks or pixels, as the effort's interleave asks.
 bool gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,
