@@ -1,4 +1,4 @@
-// The reference: a plain path tracer, unbiased, for truth.
+// The reference: a plain path tracer, for truth.
 #pragma once
 
 #include "capture/image.h"
@@ -7,11 +7,11 @@
 namespace render {
 
 struct ReferenceSettings {
-  int samples = 1024;    // paths per pixel
-  int max_depth = 16;    // then Russian roulette has long ended them
+  int samples = 1024;  // paths per pixel
+  int max_depth = 16;  // then Russian roulette has long ended them
   std::uint32_t seed = 1;
-  // Bounces of light between surfaces. Off: virtual objects see the environment, and each other only
-  // by mirror and glass, as the live kernel does. On: everything (the photograph).
+  // Bounces of light between surfaces. Off: virtual objects see the environment, and each other
+  // only by mirror and glass, as the live kernel does. On: everything (the photograph).
   bool bounces = false;
 };
 

@@ -1,7 +1,10 @@
 // The parameter block of the shader "stand_in": how a real surface answers to virtual objects.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+
+#include "render/mesh.h"
 
 namespace render {
 
@@ -16,5 +19,24 @@ struct StandInParameters {
   std::uint32_t catches_light = 1;  // of virtual lamps
   std::uint32_t occludes = 1;       // hides virtual objects behind it
 };
+
+// The block in a material of the shader "stand_in". Throws std::invalid_argument, naming the
+// material, if it is not one, or albedo, reflectance or roughness are not 0 to 1.
+StandInParameters stand_in_parameters(const Material& material);
+
+// A plate pixel at or above this, of display white, may have been brighter than the camera could
+// say.
+inline constexpr float clipped_plate = 0.98F;
+// Below this, noise decides what albedo a plate pixel implies.
+inline constexpr float dark_plate = 0.002F;
+
+// Whether a plate pixel tells the albedo of the surface that it shows: pi plate / irradiance, at
+// most 1.
+inline bool plate_tells_albedo(Vec3f plate, Vec3f irradiance) {
+  constexpr float pi = 3.14159265F;
+  const auto tells = [](float value, float e) { return value > dark_plate && pi * value <= e; };
+  return std::max({plate.x, plate.y, plate.z}) < clipped_plate && tells(plate.x, irradiance.x) &&
+         tells(plate.y, irradiance.y) && tells(plate.z, irradiance.z);
+}
 
 }  // namespace render

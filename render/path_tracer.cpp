@@ -1,0 +1,379 @@
+// Paths of light, one at a time.
+#include "render/path_tracer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include "render/stand_in_parameters.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+constexpr float pi = std::numbers::pi_v<float>;
+constexpr float certain =
+    std::numeric_limits<float>::infinity();  // density of a mirror's direction
+constexpr int roulette_depth = 4;
+// After a diffuse bounce or a lobe of this roughness, lobes are taken as at least this rough:
+// caustics are blurred by about two degrees, and keep their light, but a small sun's no longer come
+// as single white dots.
+//
+// Kaplanyan and Dachsbacher, "Path Space Regularization for Holistic and Robust Light Transport",
+// Eurographics 2013.
+constexpr float caustic_roughness = 0.2F;
+
+Vec3f times(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
+
+Vec3f cosine_direction(Vec3f normal, std::array<float, 2> random) {
+  const float z = 1 - 2 * random[0];
+  const float r = std::sqrt(std::max(0.0F, 1 - z * z));
+  const float phi = 2 * pi * random[1];
+  const Vec3f on_sphere{r * std::cos(phi), r * std::sin(phi), z};
+  const Vec3f direction = normalize(normal + on_sphere);
+  return dot(direction, direction) > 0.5F ? direction : normal;
+}
+
+// The shares of light by which the lobes of a surface are chosen, and their densities.
+struct Lobes {
+  float diffuse = 0, coat = 0, specular = 0,
+        transmission = 0;  // chances; they sum to 1, or are all 0
+  bool coat_mirror = false, specular_mirror = false;
+
+  Lobes(const StandardSurface& surface, const StandardWeights& weights, bool with_diffuse)
+      : diffuse(with_diffuse ? mean(weights.diffuse) : 0),
+        coat(weights.coat),
+        specular(mean(weights.specular)),
+        transmission(mean(weights.transmission)),
+        coat_mirror(surface.clearcoat_roughness < mirror_roughness),
+        specular_mirror(surface.roughness < mirror_roughness) {
+    const float sum = diffuse + coat + specular + transmission;
+    if (!(sum > 0)) {
+      diffuse = coat = specular = transmission = 0;
+      return;
+    }
+    diffuse /= sum, coat /= sum, specular /= sum, transmission /= sum;
+  }
+};
+
+// `direction` mirrored at the triangle itself.
+Vec3f other_side(const HitPoint& hit, Vec3f direction) {
+  return direction - hit.geometric_normal * (2 * dot(direction, hit.geometric_normal));
+}
+
+// What the lobes that are no mirrors send from `direction` to `view`, cosine inside, and the
+// density with which scattering chooses that direction.
+struct LobeValue {
+  Vec3f value;
+  float density = 0;
+};
+LobeValue lobe_value(const StandardSurface& surface,
+                     const StandardWeights& weights,
+                     const Lobes& lobes,
+                     Vec3f view,
+                     Vec3f direction,
+                     bool with_diffuse) {
+  LobeValue result;
+  if (with_diffuse) {
+    const float d = std::max(0.0F, dot(surface.normal, direction)) / pi;
+    result.value += weights.diffuse * d;
+    result.density += lobes.diffuse * d;
+  }
+  if (weights.coat > 0 && !lobes.coat_mirror) {
+    const float d = lobe_density(surface.coat_normal, view, surface.clearcoat_roughness, direction);
+    result.value += Vec3f{weights.coat, weights.coat, weights.coat} * d;
+    result.density += lobes.coat * d;
+  }
+  if (!lobes.specular_mirror) {
+    const float d = lobe_density(surface.normal, view, surface.roughness, direction);
+    result.value += weights.specular * d;
+    result.density += lobes.specular * d;
+  }
+  return result;
+}
+
+// The same for a direction above the triangle: what a mapped or interpolated normal would send
+// below it is mirrored up again, and keeps its energy.
+LobeValue folded_lobe_value(const HitPoint& hit,
+                            const StandardSurface& surface,
+                            const StandardWeights& weights,
+                            const Lobes& lobes,
+                            Vec3f view,
+                            Vec3f direction,
+                            bool with_diffuse) {
+  LobeValue result = lobe_value(surface, weights, lobes, view, direction, with_diffuse);
+  const Vec3f below = other_side(hit, direction);
+  if (dot(surface.normal, below) > 0 || dot(surface.coat_normal, below) > 0) {
+    const LobeValue folded = lobe_value(surface, weights, lobes, view, below, with_diffuse);
+    result.value += folded.value;
+    result.density += folded.density;
+  }
+  return result;
+}
+
+}  // namespace
+
+// A path at work.
+struct PathTracer::Walk {
+  Vec3f origin, direction;
+  unsigned mask = 0;
+  RayKind kind = RayKind::camera;
+  Vec3f share{1, 1, 1};         // of the light here that reaches the start
+  float density = certain;      // with which the last scattering chose the direction
+  Vec3f glow_share{1, 1, 1};    // the same of emission: less where lamps stand for it
+  bool left_rough = false;      // was scattered by a diffuse surface
+  bool sky_straight_on = true;  // whether the sky counts before the path was scattered
+  int depth = 0;
+  bool met_virtual = false;
+  CameraPath result;
+};
+
+PathTracer::PathTracer(const Scene& scene,
+                       const EnvironmentSampler& environment,
+                       std::span<const LocalLight> lamps,
+                       const PathRules& rules)
+    : scene_(scene), environment_(environment), lamps_(lamps), rules_(rules) {
+  const SceneDescription& description = scene.description();
+  for (const Material& material : description.materials) {
+    Surfacing surfacing;
+    if (material.shader == "stand_in") {
+      const StandInParameters stand_in = stand_in_parameters(material);
+      std::copy_n(stand_in.albedo, 3, surfacing.parameters.base_color);
+      surfacing.matte = true;
+      surfacing.occludes = stand_in.occludes != 0;
+    } else {
+      surfacing.parameters = standard_parameters(material, description.textures.size());
+    }
+    materials_.push_back(surfacing);
+  }
+}
+
+StandardSurface PathTracer::surface_at(const HitPoint& hit) const {
+  return standard_surface(materials_[hit.material].parameters, scene_.description(), hit, 0);
+}
+
+void PathTracer::add_sky(const Walk& w, Vec3f& radiance) const {
+  if (!w.sky_straight_on) return;
+  float weight = 1;
+  if (w.density != certain) weight = w.density / (w.density + environment_.density(w.direction));
+  radiance += times(w.share, environment_.radiance(w.direction)) * weight;
+}
+
+Vec3f PathTracer::lamp_irradiance(const HitPoint& hit, Vec3f normal) const {
+  Vec3f sum;
+  for (const LocalLight& lamp : lamps_) {
+    const Vec3f origin = offset_origin(hit, hit.geometric_normal);
+    const Vec3f to = lamp.position - origin;
+    const float distance = length(to);
+    if (!(distance > 1e-6F)) continue;
+    const Vec3f l = to / distance;
+    const float cosine = dot(normal, l);
+    const float facing = lamp.normal == Vec3f{} ? 1.0F : -dot(lamp.normal, l);
+    if (!(cosine > 0) || !(facing > 0) || !(dot(hit.geometric_normal, l) > 0)) continue;
+    const Vec3f passing =
+        transmittance(scene_, origin, l, 0, distance * (1 - 1e-3F), rules_.diffuse_blockers);
+    sum += times(lamp.intensity, passing) * (cosine * facing / (distance * distance));
+  }
+  return sum;
+}
+
+Vec3f PathTracer::environment_light(const HitPoint& hit,
+                                    const StandardSurface& surface,
+                                    const StandardWeights& weights,
+                                    Vec3f view,
+                                    SampleSequence& numbers) const {
+  const auto sky = environment_.sample(numbers.next_pair());
+  if (!sky) return {};
+  const Vec3f l = sky->direction;
+  if (!(dot(hit.geometric_normal, l) > 0)) return {};
+  const float cosine = dot(surface.normal, l);
+  const Lobes lobes(surface, weights, rules_.diffuse_bounces);
+  const LobeValue lobe =
+      folded_lobe_value(hit, surface, weights, lobes, view, l, rules_.diffuse_bounces);
+  Vec3f value = lobe.value * (1 / (sky->density + lobe.density));
+  // Diffuse light that is not followed comes from here alone.
+  const Vec3f plain = rules_.diffuse_bounces || !(cosine > 0)
+                          ? Vec3f{}
+                          : weights.diffuse * (cosine / pi / sky->density);
+  if (value == Vec3f{} && plain == Vec3f{}) return {};
+  const Vec3f origin = offset_origin(hit, l);
+  const Vec3f passing = transmittance(scene_, origin, l, 0, ray_far, rules_.lobe_blockers);
+  if (passing == Vec3f{}) return {};
+  if (plain != Vec3f{}) {
+    const unsigned further = rules_.diffuse_blockers & ~rules_.lobe_blockers;
+    const bool blocked = (further & mask_real_blocker) != 0 && scene_.has_real_blockers() &&
+                         transmittance(scene_, origin, l, 0, ray_far, further) == Vec3f{};
+    if (!blocked) value += plain;
+  }
+  return times(times(value, sky->radiance), passing);
+}
+
+// Chooses how the path goes on. False if it ends here.
+bool PathTracer::scatter(Walk& w,
+                         const HitPoint& hit,
+                         const StandardSurface& surface,
+                         const StandardWeights& weights,
+                         SampleSequence& numbers) const {
+  const Lobes lobes(surface, weights, rules_.diffuse_bounces);
+  const Vec3f view = -w.direction;
+  float choice = numbers.next();
+  const auto chosen = [&choice](float chance) {
+    if (chance > 0 && choice < chance) return true;
+    choice -= chance;
+    return false;
+  };
+  if (chosen(lobes.transmission)) {
+    // Straight through: the direction keeps the density that it was chosen with.
+    const Vec3f passed = weights.transmission * (1 / lobes.transmission);
+    w.share = times(w.share, passed);
+    w.glow_share = times(w.glow_share, passed);
+    w.origin = offset_origin(hit, w.direction);
+    return true;
+  }
+  w.kind = RayKind::reflection;
+  w.mask = rules_.scattered_mask;
+  w.sky_straight_on = true;
+  const auto leave = [&](Vec3f direction) {
+    w.direction = direction;
+    w.origin = offset_origin(hit, direction);
+  };
+  const auto above = [&hit](Vec3f direction) {
+    return dot(direction, hit.geometric_normal) < 0 ? normalize(other_side(hit, direction))
+                                                    : direction;
+  };
+  const bool coat = chosen(lobes.coat);
+  if (coat && lobes.coat_mirror) {
+    w.share *= weights.coat / lobes.coat;
+    w.glow_share = w.share;
+    w.density = certain;
+    leave(above(normalize(mirrored(view, surface.coat_normal))));
+    return true;
+  }
+  const bool specular = !coat && chosen(lobes.specular);
+  if (specular && lobes.specular_mirror) {
+    w.share = times(w.share, weights.specular) * (1 / lobes.specular);
+    w.glow_share = w.share;
+    w.density = certain;
+    leave(above(normalize(mirrored(view, surface.normal))));
+    return true;
+  }
+  const auto random = numbers.next_pair();
+  Vec3f direction;
+  if (coat)
+    direction = sample_lobe(surface.coat_normal, view, surface.clearcoat_roughness, random);
+  else if (specular)
+    direction = sample_lobe(surface.normal, view, surface.roughness, random);
+  else if (lobes.diffuse > 0)
+    direction = cosine_direction(surface.normal, random);
+  else
+    return false;
+  const float roughness = coat ? surface.clearcoat_roughness : specular ? surface.roughness : 1.0F;
+  w.left_rough = w.left_rough || roughness >= caustic_roughness;
+  direction = above(direction);
+  const LobeValue lobe =
+      folded_lobe_value(hit, surface, weights, lobes, view, direction, rules_.diffuse_bounces);
+  if (!(lobe.density > 0)) return false;
+  Vec3f glow = lobe.value;
+  if (!lamps_.empty() && rules_.diffuse_bounces)
+    glow = folded_lobe_value(hit, surface, weights, lobes, view, direction, false).value;
+  w.glow_share = times(w.share, glow) * (1 / lobe.density);
+  w.share = times(w.share, lobe.value) * (1 / lobe.density);
+  w.density = lobe.density;
+  leave(direction);
+  return true;
+}
+
+void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
+  for (; w.depth < rules_.max_depth; ++w.depth) {
+    const auto met = closest_hit(scene_, w.origin, w.direction, 0, w.mask, w.kind);
+    const bool sees_plate = w.kind == RayKind::camera && !rules_.sees_background;
+    if (!met) {
+      if (sees_plate)
+        w.result.end = CameraPath::End::background;
+      else
+        add_sky(w, w.result.radiance);
+      break;
+    }
+    const HitPoint hit =
+        scene_.hit_point(met->geom_id, met->prim_id, met->inst_id, met->u, met->v, w.direction);
+    const bool real = scene_.description().instances[hit.instance].kind == ObjectKind::stand_in;
+    if (real && sees_plate) {
+      if (!materials_[hit.material].occludes &&
+          closest_hit(scene_, w.origin, w.direction, 0, mask_virtual, w.kind)) {
+        w.mask = mask_virtual;
+        continue;
+      }
+      w.result.end = CameraPath::End::stand_in;
+      w.result.hit = hit;
+      break;
+    }
+    w.met_virtual = w.met_virtual || !real;
+    StandardSurface surface = surface_at(hit);
+    if (w.left_rough) {
+      surface.roughness = std::max(surface.roughness, caustic_roughness);
+      surface.clearcoat_roughness = std::max(surface.clearcoat_roughness, caustic_roughness);
+    }
+    const Vec3f view = -w.direction;
+    const StandardWeights weights = materials_[hit.material].matte
+                                        ? StandardWeights{.diffuse = surface.base}
+                                        : standard_weights(surface, view);
+    w.result.radiance += times(w.glow_share, surface.emission);
+    Vec3f light = environment_light(hit, surface, weights, view, numbers);
+    if (!lamps_.empty() && weights.diffuse != Vec3f{})
+      light += times(weights.diffuse, lamp_irradiance(hit, surface.normal)) * (1 / pi);
+    w.result.radiance += times(w.share, light);
+    if (!scatter(w, hit, surface, weights, numbers)) break;
+    if (w.depth + 1 < roulette_depth) continue;
+    const float survival = std::min(1.0F, largest(w.share));
+    if (!(numbers.next() < survival)) break;
+    w.share *= 1 / survival;
+    w.glow_share *= 1 / survival;
+  }
+  w.result.through = w.share;
+  w.result.incoming = w.direction;
+}
+
+CameraPath PathTracer::camera_path(Vec3f origin, Vec3f direction, SampleSequence& numbers) const {
+  Walk w;
+  w.origin = origin;
+  w.direction = direction;
+  w.mask = rules_.camera_mask;
+  walk(w, numbers);
+  return std::move(w.result);
+}
+
+PathTracer::Scattered PathTracer::scattered_path(Vec3f origin,
+                                                 Vec3f direction,
+                                                 unsigned mask,
+                                                 SampleSequence& numbers) const {
+  Walk w;
+  w.origin = origin;
+  w.direction = direction;
+  w.mask = mask;
+  w.kind = RayKind::reflection;
+  walk(w, numbers);
+  return {w.result.radiance, w.met_virtual};
+}
+
+Vec3f PathTracer::virtual_irradiance(const HitPoint& hit, SampleSequence& numbers) const {
+  const Vec3f direction = cosine_direction(hit.normal, numbers.next_pair());
+  if (!(dot(direction, hit.geometric_normal) > 0)) return {};
+  Walk w;
+  w.origin = offset_origin(hit, direction);
+  w.direction = direction;
+  w.mask = mask_virtual;
+  w.kind = RayKind::reflection;
+  w.left_rough = true;
+  w.sky_straight_on = false;
+  if (!lamps_.empty()) w.glow_share = {};
+  walk(w, numbers);
+  return w.result.radiance * pi;
+}
+
+}  // namespace render

@@ -1,0 +1,100 @@
+// Paths of light, one at a time: the inside of the reference.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/environment_sampler.h"
+#include "render/light_table.h"
+#include "render/sample_sequence.h"
+#include "render/scene.h"
+#include "render/standard.h"
+
+namespace render {
+
+// What paths meet and follow. The masks are Embree's, of scene.h.
+struct PathRules {
+  bool diffuse_bounces = false;  // follow light between diffuse surfaces
+  bool sees_background = false;  // a camera path that leaves the scene sees the environment
+  unsigned camera_mask = mask_virtual | mask_stand_in;
+  unsigned scattered_mask = mask_virtual;  // rays mirrored or scattered at a surface
+  unsigned diffuse_blockers = mask_virtual | mask_real_blocker;  // of the environment and lamps
+  unsigned lobe_blockers = mask_virtual;                         // of the environment in the lobes
+  int max_depth = 16;
+};
+
+// A camera path's end: what it gathered, and what it sees straight on.
+struct CameraPath {
+  enum class End { nothing, background, stand_in };
+  Vec3f radiance;
+  Vec3f through{1, 1, 1};  // share of the light at the end that reaches the camera
+  End end = End::nothing;
+  HitPoint hit;  // of the stand-in
+  Vec3f incoming;
+};
+
+// Traces through one scene under one environment. Safe from any thread; all arguments must outlive
+// it. Unbiased, but for caustics of smooth surfaces on diffuse ones, which are blurred.
+//
+// The environment is sampled at every surface in proportion to its light, and the lobes in
+// proportion to theirs, both weighted by the balance heuristic (Veach and Guibas, "Optimally
+// Combining Sampling Techniques for Monte Carlo Rendering", SIGGRAPH 1995). Lamps light diffuse
+// surfaces; in mirrors and lobes they are seen as the glowing surface that they are samples of.
+// Without lamps, and with diffuse bounces, glowing surfaces light others where paths meet them.
+class PathTracer {
+ public:
+  // Throws std::invalid_argument if a material is neither "standard" nor "stand_in".
+  PathTracer(const Scene& scene,
+             const EnvironmentSampler& environment,
+             std::span<const LocalLight> lamps,
+             const PathRules& rules);
+
+  CameraPath camera_path(Vec3f origin, Vec3f direction, SampleSequence& numbers) const;
+  // Radiance along a ray that left a real surface, and whether it met a virtual object.
+  struct Scattered {
+    Vec3f radiance;
+    bool met = false;
+  };
+  Scattered scattered_path(Vec3f origin,
+                           Vec3f direction,
+                           unsigned mask,
+                           SampleSequence& numbers) const;
+
+  // Irradiance of the lamps on a point, as it arrives.
+  Vec3f lamp_irradiance(const HitPoint& hit, Vec3f normal) const;
+  // One sample of the irradiance that virtual objects send to a point, what they let pass left out.
+  Vec3f virtual_irradiance(const HitPoint& hit, SampleSequence& numbers) const;
+
+  const Scene& scene() const { return scene_; }
+  const EnvironmentSampler& environment() const { return environment_; }
+
+ private:
+  struct Walk;
+  void walk(Walk& w, SampleSequence& numbers) const;
+  void add_sky(const Walk& w, Vec3f& radiance) const;
+  Vec3f environment_light(const HitPoint& hit,
+                          const StandardSurface& surface,
+                          const StandardWeights& weights,
+                          Vec3f view,
+                          SampleSequence& numbers) const;
+  bool scatter(Walk& w,
+               const HitPoint& hit,
+               const StandardSurface& surface,
+               const StandardWeights& weights,
+               SampleSequence& numbers) const;
+  StandardSurface surface_at(const HitPoint& hit) const;
+
+  const Scene& scene_;
+  const EnvironmentSampler& environment_;
+  std::span<const LocalLight> lamps_;
+  PathRules rules_;
+  struct Surfacing {
+    StandardParameters parameters;
+    bool matte = false;    // a stand-in: all its light is diffuse
+    bool occludes = true;  // stand-ins only
+  };
+  std::vector<Surfacing> materials_;
+};
+
+}  // namespace render

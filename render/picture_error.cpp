@@ -1,0 +1,85 @@
+// The design's error of a picture.
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "render/reference.h"
+
+namespace render {
+namespace {
+
+struct Lab {
+  double l, a, b;
+};
+
+// OK Lab of linear Rec.709 light, clamped to what a display shows.
+//
+// Ottosson, "A perceptual color space for image processing", 2020 (matrices of 2021-01-25).
+Lab ok_lab(const float* rgb) {
+  const auto shown = [](float value) { return value > 0 ? std::min<double>(value, 1) : 0.0; };
+  const double r = shown(rgb[0]), g = shown(rgb[1]), b = shown(rgb[2]);
+  const double l = std::cbrt(0.4122214708 * r + 0.5363325363 * g + 0.0514459929 * b);
+  const double m = std::cbrt(0.2119034982 * r + 0.6806995451 * g + 0.1073969566 * b);
+  const double s = std::cbrt(0.0883024619 * r + 0.2817188376 * g + 0.6299787005 * b);
+  return {0.2104542553 * l + 0.7936177850 * m - 0.0040720468 * s,
+          1.9779984951 * l - 2.4285922050 * m + 0.4505937099 * s,
+          0.0259040371 * l + 0.7827717662 * m - 0.8086757660 * s};
+}
+
+double percentile(std::vector<double>& values, double share) {
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+void check(const capture::Image& image, const capture::Image& mask, int channels) {
+  if (image.width != mask.width || image.height != mask.height || image.channels < channels)
+    throw std::invalid_argument("picture_error: pictures and mask must be of one size");
+}
+
+}  // namespace
+
+PictureError picture_error(const capture::Image& x,
+                           const capture::Image& r,
+                           const capture::Image& mask,
+                           float clamp) {
+  check(x, mask, 3);
+  check(r, mask, 3);
+  PictureError error;
+  std::vector<double> differences;
+  std::vector<double> delta_es;
+  double squares = 0, reference_squares = 0, unclamped_squares = 0;
+  for (int row = 0; row < mask.height; ++row) {
+    for (int column = 0; column < mask.width; ++column) {
+      if (!(mask.at(row, column) > 0)) continue;
+      ++error.pixels;
+      for (int c = 0; c < 3; ++c) {
+        const double value = x.at(row, column, c);
+        const double truth = r.at(row, column, c);
+        const double difference = std::min<double>(value, clamp) - std::min<double>(truth, clamp);
+        squares += difference * difference;
+        reference_squares += std::min<double>(truth, clamp) * std::min<double>(truth, clamp);
+        unclamped_squares += truth * truth;
+        const double plain = std::abs(value - truth);
+        differences.push_back(std::isnan(plain) ? HUGE_VAL : plain);
+      }
+      const Lab a = ok_lab(&x.pixels[x.index(row, column)]);
+      const Lab b = ok_lab(&r.pixels[r.index(row, column)]);
+      delta_es.push_back(100 * std::hypot(a.l - b.l, a.a - b.a, a.b - b.b));
+    }
+  }
+  if (error.pixels == 0) return error;
+  // Where the reference is black, any light is an infinite error.
+  const auto relative = [](double value, double unit) { return value == 0 ? 0 : value / unit; };
+  error.relative_rms = relative(std::sqrt(squares), std::sqrt(reference_squares));
+  error.p99 = relative(percentile(differences, 0.99),
+                       std::sqrt(unclamped_squares / static_cast<double>(differences.size())));
+  for (const double e : delta_es) error.delta_e_mean += e;
+  error.delta_e_mean /= static_cast<double>(delta_es.size());
+  error.delta_e_p95 = percentile(delta_es, 0.95);
+  error.delta_e_p99 = percentile(delta_es, 0.99);
+  return error;
+}
+
+}  // namespace render

@@ -1,0 +1,313 @@
+// The reference's pictures: samples of every pixel, put together.
+#include "render/reference.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <vector>
+
+#include "render/environment_sampler.h"
+#include "render/path_tracer.h"
+#include "render/sample_sequence.h"
+#include "render/stand_in_parameters.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+using calibrate::DirectionTable;
+using calibrate::Mat3;
+using calibrate::Pose;
+
+constexpr float pi = std::numbers::pi_v<float>;
+
+Vec3f times(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
+
+// Sums over the samples of a pixel, in double, so that a thousand of them keep their digits.
+class Sum {
+ public:
+  void add(Vec3f v) { x_ += v.x, y_ += v.y, z_ += v.z; }
+  Vec3f over(double count) const {
+    return {static_cast<float>(x_ / count), static_cast<float>(y_ / count),
+            static_cast<float>(z_ / count)};
+  }
+  double x() const { return x_; }
+  double y() const { return y_; }
+  double z() const { return z_; }
+
+ private:
+  double x_ = 0, y_ = 0, z_ = 0;
+};
+
+class PixelRays {
+ public:
+  PixelRays(const DirectionTable& directions, const Pose& cam_from_set)
+      : directions_(directions),
+        set_from_cam_(cam_from_set.R.transposed()),
+        origin_(to_float(calibrate::position_of(cam_from_set))) {}
+
+  Vec3f origin() const { return origin_; }
+
+  // Direction in the set through (x + dx, y + dy), -.5 <= dx, dy <= .5; nothing where the lens does
+  // not see.
+  std::optional<Vec3f> direction(int x, int y, float dx, float dy) const {
+    const int x0 = dx < 0 ? x - 1 : x;
+    const int y0 = dy < 0 ? y - 1 : y;
+    const float fx = dx < 0 ? dx + 1 : dx;
+    const float fy = dy < 0 ? dy + 1 : dy;
+    const Vec3f here = at(x, y);
+    if (here == Vec3f{}) return std::nullopt;
+    const Vec3f a = at(x0, y0), b = at(x0 + 1, y0), c = at(x0, y0 + 1), d = at(x0 + 1, y0 + 1);
+    const bool whole = a != Vec3f{} && b != Vec3f{} && c != Vec3f{} && d != Vec3f{};
+    const Vec3f v_cam =
+        whole ? (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy : here;
+    return normalize(to_float(set_from_cam_ * to_double(v_cam)));
+  }
+
+ private:
+  Vec3f at(int x, int y) const {
+    const std::size_t i = directions_.index(y, x);
+    return {directions_.x[i], directions_.y[i], directions_.z[i]};
+  }
+
+  const DirectionTable& directions_;
+  Mat3 set_from_cam_;
+  Vec3f origin_;
+};
+
+// What the samples of a pixel say about one stand-in.
+struct StandInSums {
+  std::uint32_t instance = 0;
+  StandInParameters parameters;
+  int count = 0;
+  Sum through;        // share of the pixel
+  Sum open, lost;     // irradiance of the environment, and what virtual objects take; times share
+  Sum irradiance;     // open, not times share
+  Sum virtual_light;  // irradiance of lamps (and virtual objects); times share
+};
+
+// The composite, pixel by pixel.
+class Composite {
+ public:
+  Composite(const PathTracer& tracer, bool bounces) : tracer_(tracer), bounces_(bounces) {
+    const SceneDescription& scene = tracer.scene().description();
+    if (scene.background != "plate" && scene.background != "environment")
+      throw std::invalid_argument(
+          "the reference knows the backgrounds plate and environment, not '" + scene.background +
+          "'");
+    environment_behind_ = scene.background == "environment";
+    for (const Material& material : scene.materials)
+      stand_ins_.push_back(material.shader == "stand_in" ? stand_in_parameters(material)
+                                                         : StandInParameters{});
+  }
+
+  struct Pixel {
+    Sum added, background;
+    double seen = 0;  // share of the plate's own things
+    std::vector<StandInSums> stand_ins;
+  };
+
+  void sample(Vec3f origin,
+              std::optional<Vec3f> direction,
+              SampleSequence& numbers,
+              Pixel& p) const {
+    if (!direction) {
+      p.background.add({1, 1, 1});
+      p.seen += 1;
+      return;
+    }
+    const CameraPath path = tracer_.camera_path(origin, *direction, numbers);
+    p.added.add(path.radiance);
+    if (path.end == CameraPath::End::nothing) return;
+    p.seen += mean(path.through);
+    if (path.end == CameraPath::End::stand_in)
+      sample_stand_in(path, numbers, p);
+    else if (environment_behind_)
+      p.added.add(times(path.through, tracer_.environment().radiance(path.incoming)));
+    else
+      p.background.add(path.through);
+  }
+
+  // (R, G, B, coverage) of a pixel from its `count` samples.
+  std::array<float, 4> finish(const Pixel& p, Vec3f plate, int count) const {
+    const auto n = static_cast<double>(count);
+    Vec3f rgb = p.added.over(n) + times(plate, p.background.over(n));
+    for (const StandInSums& s : p.stand_ins) {
+      Vec3f share{1, 1, 1};
+      if (s.parameters.catches_shadow != 0)
+        share = {passing(s.lost.x(), s.open.x()), passing(s.lost.y(), s.open.y()),
+                 passing(s.lost.z(), s.open.z())};
+      rgb += times(plate, times(s.through.over(n), share));
+      if (s.parameters.catches_light == 0) continue;
+      const Vec3f light = s.virtual_light.over(n);
+      if (light == Vec3f{}) continue;
+      const Vec3f irradiance = s.irradiance.over(s.count);
+      const Vec3f albedo{s.parameters.albedo[0], s.parameters.albedo[1], s.parameters.albedo[2]};
+      if (plate_tells_albedo(plate, irradiance))
+        rgb +=
+            times(plate, {light.x / irradiance.x, light.y / irradiance.y, light.z / irradiance.z});
+      else
+        rgb += times(albedo, light) * (1 / pi);
+    }
+    return {rgb.x, rgb.y, rgb.z, static_cast<float>(1 - p.seen / n)};
+  }
+
+ private:
+  static float passing(double lost, double open) {
+    return lost > 0 && open > 0 ? static_cast<float>(std::max(0.0, 1 - lost / open)) : 1.0F;
+  }
+
+  void sample_stand_in(const CameraPath& path, SampleSequence& numbers, Pixel& p) const {
+    auto sums = std::find_if(p.stand_ins.begin(), p.stand_ins.end(),
+                             [&](const StandInSums& s) { return s.instance == path.hit.instance; });
+    if (sums == p.stand_ins.end()) {
+      sums = p.stand_ins.emplace(p.stand_ins.end());
+      sums->instance = path.hit.instance;
+      sums->parameters = stand_ins_[path.hit.material];
+    }
+    ++sums->count;
+    sums->through.add(path.through);
+    sample_irradiance(path, numbers, *sums);
+    if (sums->parameters.catches_light != 0) {
+      Vec3f light = tracer_.lamp_irradiance(path.hit, path.hit.normal);
+      if (bounces_) light += tracer_.virtual_irradiance(path.hit, numbers);
+      sums->virtual_light.add(times(path.through, light));
+    }
+    if (sums->parameters.catches_reflection != 0 && sums->parameters.reflectance > 0)
+      p.added.add(times(path.through, reflection(path, sums->parameters, numbers)));
+  }
+
+  void sample_irradiance(const CameraPath& path, SampleSequence& numbers, StandInSums& sums) const {
+    const auto sky = tracer_.environment().sample(numbers.next_pair());
+    if (!sky) return;
+    const HitPoint& hit = path.hit;
+    const float cosine = dot(hit.normal, sky->direction);
+    if (!(cosine > 0) || !(dot(hit.geometric_normal, sky->direction) > 0)) return;
+    const Vec3f origin = offset_origin(hit, hit.geometric_normal);
+    const Scene& scene = tracer_.scene();
+    const bool real_shadow =
+        scene.has_real_blockers() &&
+        transmittance(scene, origin, sky->direction, 0, ray_far, mask_real_blocker) == Vec3f{};
+    if (real_shadow) return;
+    const Vec3f open = sky->radiance * (cosine / sky->density);
+    const Vec3f passed = transmittance(scene, origin, sky->direction, 0, ray_far, mask_virtual);
+    sums.irradiance.add(open);
+    sums.open.add(times(path.through, open));
+    sums.lost.add(times(path.through, times(open, Vec3f{1, 1, 1} - passed)));
+  }
+
+  // F (L_hit - L_env) where the mirrored ray meets a virtual object.
+  Vec3f reflection(const CameraPath& path,
+                   const StandInParameters& parameters,
+                   SampleSequence& numbers) const {
+    const HitPoint& hit = path.hit;
+    const Vec3f view = -path.incoming;
+    const float f = schlick(parameters.reflectance, std::abs(dot(hit.normal, view)));
+    const Vec3f direction =
+        parameters.roughness < mirror_roughness
+            ? normalize(mirrored(view, hit.normal))
+            : sample_lobe(hit.normal, view, parameters.roughness, numbers.next_pair());
+    if (!(dot(direction, hit.geometric_normal) > 0)) return {};
+    const auto seen =
+        tracer_.scattered_path(offset_origin(hit, direction), direction, mask_virtual, numbers);
+    if (!seen.met) return {};
+    return (seen.radiance - tracer_.environment().radiance(direction)) * f;
+  }
+
+  const PathTracer& tracer_;
+  bool bounces_;
+  bool environment_behind_ = false;
+  std::vector<StandInParameters> stand_ins_;
+};
+
+void check(const FrameInputs& inputs, const ReferenceSettings& settings) {
+  if (inputs.scene == nullptr || inputs.directions == nullptr || inputs.environment == nullptr)
+    throw std::invalid_argument("the reference needs a scene, directions and an environment");
+  if (inputs.directions->width < 1 || inputs.directions->height < 1)
+    throw std::invalid_argument("the reference needs a picture of at least one pixel");
+  if (settings.samples < 1 || settings.max_depth < 1)
+    throw std::invalid_argument("the reference needs at least one sample, and a depth of one");
+}
+
+// Calls pixel(x, y, sample numbers' maker) for every pixel, rows in parallel.
+template <class F>
+void for_each_pixel(const DirectionTable& directions, F&& pixel) {
+  tbb::parallel_for(0, directions.height, [&](int y) {
+    prepare_thread();
+    for (int x = 0; x < directions.width; ++x) pixel(x, y);
+  });
+}
+
+}  // namespace
+
+capture::Image render_reference(const FrameInputs& inputs,
+                                const FrameJob& job,
+                                const capture::Image& plate,
+                                const ReferenceSettings& settings) {
+  check(inputs, settings);
+  const DirectionTable& directions = *inputs.directions;
+  if (plate.width != directions.width || plate.height != directions.height || plate.channels != 3)
+    throw std::invalid_argument("the plate must have three channels and the lens's size");
+  PathRules rules;
+  rules.max_depth = settings.max_depth;
+  if (settings.bounces) {
+    rules.diffuse_bounces = true;
+    rules.scattered_mask = rules.lobe_blockers = mask_virtual | mask_real_blocker;
+  }
+  const EnvironmentSampler environment(*inputs.environment);
+  const PathTracer tracer(*inputs.scene, environment, job.lights.lamps, rules);
+  const Composite composite(tracer, settings.bounces);
+  const PixelRays rays(directions, job.cam_from_set);
+  capture::Image picture = capture::make_image(directions.height, directions.width, 4);
+  for_each_pixel(directions, [&](int x, int y) {
+    Composite::Pixel pixel;
+    const auto index = static_cast<std::uint32_t>(y * directions.width + x);
+    for (int i = 0; i < settings.samples; ++i) {
+      SampleSequence numbers(settings.seed, index, static_cast<std::uint32_t>(i));
+      const auto [dx, dy] = numbers.next_pair();
+      composite.sample(rays.origin(), rays.direction(x, y, dx - 0.5F, dy - 0.5F), numbers, pixel);
+    }
+    const Vec3f behind{plate.at(y, x, 0), plate.at(y, x, 1), plate.at(y, x, 2)};
+    const auto rgba = composite.finish(pixel, behind, settings.samples);
+    std::copy(rgba.begin(), rgba.end(), &picture.at(y, x));
+  });
+  return picture;
+}
+
+capture::Image photograph(const FrameInputs& inputs,
+                          const calibrate::Pose& cam_from_set,
+                          const ReferenceSettings& settings) {
+  check(inputs, settings);
+  const DirectionTable& directions = *inputs.directions;
+  PathRules rules;
+  rules.max_depth = settings.max_depth;
+  rules.diffuse_bounces = rules.sees_background = true;
+  rules.scattered_mask = rules.lobe_blockers = rules.diffuse_blockers =
+      mask_virtual | mask_stand_in;
+  const EnvironmentSampler environment(*inputs.environment);
+  const PathTracer tracer(*inputs.scene, environment, {}, rules);
+  const PixelRays rays(directions, cam_from_set);
+  capture::Image picture = capture::make_image(directions.height, directions.width, 3);
+  for_each_pixel(directions, [&](int x, int y) {
+    Sum sum;
+    const auto index = static_cast<std::uint32_t>(y * directions.width + x);
+    for (int i = 0; i < settings.samples; ++i) {
+      SampleSequence numbers(settings.seed, index, static_cast<std::uint32_t>(i));
+      const auto [dx, dy] = numbers.next_pair();
+      const auto direction = rays.direction(x, y, dx - 0.5F, dy - 0.5F);
+      if (direction) sum.add(tracer.camera_path(rays.origin(), *direction, numbers).radiance);
+    }
+    const Vec3f rgb = sum.over(settings.samples);
+    picture.at(y, x, 0) = rgb.x;
+    picture.at(y, x, 1) = rgb.y;
+    picture.at(y, x, 2) = rgb.z;
+  });
+  return picture;
+}
+
+}  // namespace render
