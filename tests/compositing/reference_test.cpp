@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "../render/made_sky.h"
+#include "../render/sun_and_sky.h"
 #include "../render/plain_shapes.h"
 #include "compositing/stand_in.h"
 

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "made_sky.h"
+#include "sun_and_sky.h"
 #include "render/sample_sequence.h"
 
 namespace render {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <string>
 
-#include "made_sky.h"
+#include "sun_and_sky.h"
 #include "plain_shapes.h"
 
 namespace render {
