@@ -1,6 +1,8 @@
 // Cameras by URI.
 #include "capture/camera.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <stdexcept>
@@ -9,6 +11,7 @@
 #include "capture/linearise.h"
 #include "capture/picture_camera.h"
 #include "capture/replay.h"
+#include "capture/response.h"
 #include "capture/sequence.h"
 #include "capture/video_file.h"
 
@@ -23,7 +26,25 @@ std::string absolute(std::string_view path, const CameraOptions& options) {
       .string();
 }
 
-LightCurves curves_of(const CameraOptions& options) { return {options.colour, std::nullopt}; }
+// Light between the codes on straight lines, which go on beyond the first and last code.
+Curve curve_of(const std::array<double, Response::codes>& light) {
+  return [light](double value) {
+    constexpr int last_step = Response::codes - 2;
+    const double code = value * (Response::codes - 1);
+    const int below = std::clamp(static_cast<int>(std::floor(code)), 0, last_step);
+    const auto i = static_cast<std::size_t>(below);
+    return light[i] + (code - below) * (light[i + 1] - light[i]);
+  };
+}
+
+LightCurves curves_of(const CameraOptions& options) {
+  if (options.response.empty()) {
+    return {options.colour, std::nullopt};
+  }
+  const Response response = read_rsp(absolute(options.response, options));
+  return {options.colour, std::array{curve_of(response.light[0]), curve_of(response.light[1]),
+                                     curve_of(response.light[2])}};
+}
 
 std::unique_ptr<Camera> open_file(std::string_view rest, const CameraOptions& options) {
   const std::string path = absolute(rest, options);
@@ -33,7 +54,8 @@ std::unique_ptr<Camera> open_file(std::string_view rest, const CameraOptions& op
   }
   if (is_picture(path)) {
     const Rational rate = options.loop ? options.picture_rate : Rational{};
-    return make_picture_camera(path, {PictureEntry{path, {}, 0, {}, {}}}, rate, options, curves);
+    return make_picture_camera(path, {PictureEntry{path, {}, exposure_in(path), {}, {}}}, rate,
+                               options, curves);
   }
   return open_video_file(path, options, curves);
 }

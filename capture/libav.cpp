@@ -67,6 +67,9 @@ std::string Complaints::take() {
 
 CodecContext make_decoder(int codec_id, int threads, Complaints* complaints) {
   gather_log();
+  if (codec_id == AV_CODEC_ID_NONE) {
+    throw std::runtime_error("what is in it is of no known kind; is the file whole?");
+  }
   const AVCodec* codec = avcodec_find_decoder(static_cast<AVCodecID>(codec_id));
   if (codec == nullptr) {
     throw std::runtime_error(std::string("this libavcodec has no decoder for ") +

@@ -7,7 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "capture/exif.h"
 #include "capture/exr.h"
+#include "capture/files.h"
 #include "capture/media_file.h"
 #include "capture/rgbe.h"
 
@@ -188,6 +190,14 @@ std::optional<Frame> PictureCamera::next() {
 
 bool is_picture(const std::string& path) {
   return is_exr(path) || is_radiance(path) || is_still(path);
+}
+
+double exposure_in(const std::string& path) {
+  if (is_exr(path) || is_radiance(path)) {
+    return 0;
+  }
+  const double marked_s = shot_settings(read_file(path)).exposure_s;
+  return marked_s > 0 ? snapped_exposure_s(marked_s) : 0;
 }
 
 Still read_picture(const std::string& path, const LightCurves& curves) {

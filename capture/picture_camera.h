@@ -29,6 +29,9 @@ Still read_picture(const std::string& path, const LightCurves& curves);
 // Whether read_picture would know the kind of file.
 bool is_picture(const std::string& path);
 
+// The exposure time that the picture's EXIF data tell, snapped (see exif.h); 0 if they tell none.
+double exposure_in(const std::string& path);
+
 // Shows `entries`, which are in order of time and at least one. Pictures that are missing, damaged
 // or of another size than the first readable one are lost frames.
 // Throws std::runtime_error if none can be read, or options.frame or options.crop lie outside.

@@ -135,6 +135,27 @@ std::vector<PictureEntry> read_list(const std::filesystem::path& list) {
   return entries;
 }
 
+// The pictures in a folder, in the order of their names.
+std::vector<PictureEntry> read_bracket(const std::filesystem::path& folder, Rational rate) {
+  std::vector<std::string> pictures;
+  for (const auto& file : std::filesystem::directory_iterator(folder)) {
+    if (file.is_regular_file() && is_picture(file.path().string())) {
+      pictures.push_back(file.path().string());
+    }
+  }
+  if (pictures.empty()) {
+    throw std::runtime_error("cannot open replay:" + folder.string() +
+                             ": there is neither frames.csv nor a picture in it");
+  }
+  std::sort(pictures.begin(), pictures.end());
+  std::vector<PictureEntry> entries;
+  for (const std::string& picture : pictures) {
+    const Time time = time_of_frame(static_cast<std::int64_t>(entries.size()), rate);
+    entries.push_back({picture, time, exposure_in(picture), FrameStatus::good, {}});
+  }
+  return entries;
+}
+
 }  // namespace
 
 std::unique_ptr<Camera> open_replay(const std::string& folder,
@@ -144,9 +165,11 @@ std::unique_ptr<Camera> open_replay(const std::string& folder,
   if (!std::filesystem::is_directory(folder, error)) {
     throw std::runtime_error("cannot open replay:" + folder + ": no such folder");
   }
-  return make_picture_camera("replay:" + folder,
-                             read_list(std::filesystem::path(folder) / "frames.csv"), Rational{},
-                             options, curves);
+  const std::filesystem::path list = std::filesystem::path(folder) / "frames.csv";
+  const bool recorded = std::filesystem::exists(list, error);
+  return make_picture_camera(
+      "replay:" + folder, recorded ? read_list(list) : read_bracket(folder, options.picture_rate),
+      recorded ? Rational{} : options.picture_rate, options, curves);
 }
 
 }  // namespace capture

@@ -106,7 +106,10 @@ libav::FrameHandle decode(AVCodecID codec,
   try {
     libav::Complaints complaints;
     const libav::CodecContext context = libav::make_decoder(codec, 1, &complaints);
-    context->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;
+    if (codec == AV_CODEC_ID_PNG || codec == AV_CODEC_ID_MJPEG) {
+      // Others take a tag that they do not know for an error.
+      context->err_recognition = AV_EF_CRCCHECK | AV_EF_EXPLODE;
+    }
     if (const int error = avcodec_open2(context.get(), context->codec, nullptr); error < 0) {
       fail(name, libav::reason(error));
     }

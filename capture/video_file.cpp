@@ -104,8 +104,9 @@ VideoFile::VideoFile(const std::string& path,
                                std::to_string(number_) + " frames, counted from 0");
     }
     if (!picture || ahead_.size() > max_lost_at_start) {
-      throw std::runtime_error("cannot open " + path_ +
-                               ": no picture in it can be decoded; is the file whole?");
+      const std::string why = ahead_.empty() ? "" : ": the last one " + ahead_.back().note;
+      throw std::runtime_error("cannot open " + path_ + ": no picture in it can be decoded" + why +
+                               "; is the file whole?");
     }
     if (picture->frame != nullptr) {
       const AVFrame& first = *picture->frame;

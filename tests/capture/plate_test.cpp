@@ -87,6 +87,13 @@ TEST_F(Plate, IsExactForMotionJpeg) {
       {.width = 75, .height = 53, .share_x = 2, .share_y = 2, .full = true, .centred = true});
 }
 
+TEST_F(Plate, IsExactForAJpegStill) {
+  const auto clip =
+      make("still.jpg", "pc", "-c:v mjpeg -q:v 3 -pix_fmt yuvj422p -frames:v 1 -update 1");
+  expect_same_plate(clip, "yuvj422p",
+                    {.width = 75, .height = 53, .share_x = 2, .full = true, .centred = true});
+}
+
 TEST_F(Plate, IsExactForFullRangeH264) {
   const std::filesystem::path clip = directory_ / "full.mp4";
   independent::ffmpeg(

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <fstream>
 #include <stdexcept>
 
@@ -113,6 +114,63 @@ TEST_F(Replay, RefusesAFolderThatIsNotThereOrHasNoPictures) {
   write_list("a.png,0,0,good\n");
   EXPECT_THAT([&] { open(); }, testing::ThrowsMessage<std::runtime_error>(testing::AllOf(
                                    HasSubstr("no picture can be read"), HasSubstr("a.png"))));
+}
+
+TEST_F(Replay, TakesAFolderWithoutAListInTheOrderOfNames) {
+  write_picture("b.png", 20);
+  write_picture("a.png", 10);
+  std::ofstream(directory_ / "readme.txt") << "no picture";
+  const auto camera = open();
+  EXPECT_EQ(camera->info().frames, 2);
+  EXPECT_EQ(camera->next()->image->at(0, 0, 0),
+            static_cast<float>(decode(Transfer::rec1886, 10 / 255.0)));
+  const auto second = camera->next();
+  EXPECT_EQ(second->time, milliseconds(40));
+  EXPECT_EQ(second->exposure_s, 0);
+}
+
+TEST_F(Replay, RefusesAFolderWithoutAnyPicture) {
+  EXPECT_THAT([&] { open(); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("neither frames.csv nor")));
+}
+
+TEST_F(Replay, ReadsCodesByTheCamerasResponse) {
+  // code 128 alone, so that the curve is asked at one point per channel
+  write_picture("a.png", 128);
+  std::ofstream(directory_ / "camera.rsp") << "2 1 0 0\n1 1 0\n3 1 0 0 0\n";
+  CameraOptions options;
+  options.base_dir = directory_.string();
+  options.response = "camera.rsp";
+  const auto frame = open(options)->next();
+  const double v = 128 / 255.0;
+  EXPECT_FLOAT_EQ(frame->image->at(0, 0, 0), static_cast<float>(v * v));
+  EXPECT_FLOAT_EQ(frame->image->at(0, 0, 1), static_cast<float>(v));
+  EXPECT_FLOAT_EQ(frame->image->at(0, 0, 2), static_cast<float>(v * v * v));
+  options.response = "missing.rsp";
+  EXPECT_THROW(open(options), std::runtime_error);
+}
+
+TEST(ReplayOnRealData, HasTheExposuresOfTheBracket) {
+  const std::filesystem::path bracket = made::real_data() / "brackets/fisheye8mm";
+  if (!std::filesystem::exists(bracket)) GTEST_SKIP() << "no real data";
+  CameraOptions options;
+  options.crop = {{1000, 900, 16, 16}};
+  options.response = (bracket / "Response_function.rsp").string();
+  const auto camera = open_camera("replay:" + bracket.string(), options);
+  EXPECT_EQ(camera->info().frames, 9);
+  double exposure_s = 0;
+  double light = 0;
+  int brighter = 0;
+  while (const auto frame = camera->next()) {
+    EXPECT_GT(frame->exposure_s, 0);
+    if (exposure_s > 0) {
+      EXPECT_NEAR(std::abs(std::log2(frame->exposure_s / exposure_s)), 2, 0.01);
+      brighter += (frame->image->at(8, 8, 1) > light) == (frame->exposure_s > exposure_s) ? 1 : 0;
+    }
+    exposure_s = frame->exposure_s;
+    light = frame->image->at(8, 8, 1);
+  }
+  EXPECT_GE(brighter, 7) << "longer exposures are brighter, until they clip";
 }
 
 }  // namespace

@@ -223,6 +223,18 @@ TEST_F(VideoFile, RefusesWhatIsNoVideo) {
   expect_refusal("/dev/zero", "not a plain file");
 }
 
+TEST(OpenVideoFile, RefusesEveryBadFile) {
+  const auto open = [](const std::string& path) { open_camera("file:" + path); };
+  made::expect_refusals("", ".mp4",
+                        {{"empty.mp4", "it is empty"},
+                         {"text.mp4", "is the file whole"},
+                         {"index_cut.mp4", "cannot open"},
+                         {"index_missing.mp4", "moov atom not found"}},
+                        open);
+  made::expect_refusals("", ".mkv", {{"only_sound.mkv", "there is no video in it"}}, open);
+  made::expect_refusals("", ".avi", {{"side_of_100000.avi", "cannot open"}}, open);
+}
+
 TEST_F(VideoFile, RefusesSoundWithoutPictures) {
   const std::string clip = make("a.wav", "sine=duration=0.2", "");
   expect_refusal(clip, "no video in it");
