@@ -7,7 +7,10 @@ namespace capture {
 namespace {
 
 template <int factor>
-void widen(const ChromaSteps& steps, int samples, const std::int32_t* padded, std::int32_t* to) {
+void widen(const ChromaSteps& steps,
+           int samples,
+           const std::int32_t* padded,
+           std::int32_t* __restrict to) {
   const std::int32_t* a[factor];
   std::int32_t weight[factor];
   for (int phase = 0; phase < factor; ++phase) {
@@ -39,6 +42,17 @@ ChromaSteps::ChromaSteps(int factor, Siting siting)
     const int distance = factor == 1 ? 0 : 2 * phase - site;
     const int before = distance < 0 ? -1 : 0;
     steps_.push_back({before, distance - before * units_});
+  }
+}
+
+// Rows do not overlap, here and below.
+void blend_chroma(int samples,
+                  std::int32_t* __restrict a,
+                  int a_weight,
+                  const std::int32_t* __restrict b,
+                  int b_weight) {
+  for (int i = 0; i < samples; ++i) {
+    a[i] = a_weight * a[i] + b_weight * b[i];
   }
 }
 

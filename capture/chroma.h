@@ -31,6 +31,9 @@ class ChromaSteps {
   std::vector<Step> steps_;
 };
 
+// a * a_weight + b * b_weight, sample by sample, into `a`.
+void blend_chroma(int samples, std::int32_t* a, int a_weight, const std::int32_t* b, int b_weight);
+
 // A row of chroma, one sample more on either side than `samples`, to luma's width, in units of
 // 1 / steps.units(). `padded` holds samples + 2 values; `to` has room for factor * samples.
 void widen_chroma(const ChromaSteps& steps,

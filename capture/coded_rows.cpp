@@ -217,10 +217,7 @@ struct Ycbcr : RowReader {
     read_samples(*picture, *its, component, row_at(first), chroma_width, upper.data() + 1);
     if (down.units() > 1) {
       read_samples(*picture, *its, component, row_at(first + 1), chroma_width, lower.data() + 1);
-      for (int x = 1; x <= chroma_width; ++x) {
-        const auto i = static_cast<std::size_t>(x);
-        upper[i] = (down.units() - weight) * upper[i] + weight * lower[i];
-      }
+      blend_chroma(chroma_width, upper.data() + 1, down.units() - weight, lower.data() + 1, weight);
     }
     upper.front() = upper[1];
     upper.back() = upper[static_cast<std::size_t>(chroma_width)];

@@ -150,10 +150,13 @@ libav::PacketHandle MediaFile::next_packet(Track track) {
 }
 
 bool MediaFile::rewind() {
+  return seek(video_->start_time == AV_NOPTS_VALUE ? 0 : video_->start_time);
+}
+
+bool MediaFile::seek(std::int64_t pts) {
   waiting_ = {};
   waiting_bytes_ = 0;
-  const std::int64_t start = video_->start_time == AV_NOPTS_VALUE ? 0 : video_->start_time;
-  return avformat_seek_file(context_.get(), video_->index, INT64_MIN, start, start, 0) >= 0;
+  return avformat_seek_file(context_.get(), video_->index, INT64_MIN, pts, pts, 0) >= 0;
 }
 
 }  // namespace capture

@@ -35,8 +35,10 @@ class MediaFile {
   // Whether packets of the track lie in memory already.
   bool has_packet(Track track) const { return !waiting_[index(track)].empty(); }
 
-  // Back to the beginning. Returns whether the container can.
+  // Back to the beginning, or to the last picture at or before `pts` (the video's time base) from
+  // which decoding can start. Returns whether the container can.
   bool rewind();
+  bool seek(std::int64_t pts);
 
  private:
   static std::size_t index(Track track) { return track == Track::video ? 0 : 1; }

@@ -62,17 +62,20 @@ Time StampClock::end() const {
   if (!last_) {
     return Time{};
   }
-  if (rate_.num > 0) {
-    const std::int64_t n = nearest_frame(*last_);
-    if (time_of_frame(n, rate_) == *last_) {
-      return time_of_frame(n + 1, rate_);
-    }
-  }
-  return *last_ + period();
+  const std::optional<std::int64_t> last_frame = frame_at(*last_);
+  return last_frame ? time_of_frame(*last_frame + 1, rate_) : *last_ + period();
 }
 
-void StampClock::restart() {
-  first_stamp_.reset();
+std::optional<std::int64_t> StampClock::frame_at(Time time) const {
+  if (rate_.num <= 0) {
+    return std::nullopt;
+  }
+  const std::int64_t n = nearest_frame(time);
+  return time_of_frame(n, rate_) == time ? std::optional(n) : std::nullopt;
+}
+
+void StampClock::restart(std::optional<std::int64_t> first_stamp) {
+  first_stamp_ = first_stamp;
   last_.reset();
 }
 

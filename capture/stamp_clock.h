@@ -21,10 +21,14 @@ class StampClock {
   Time time_of(std::optional<std::int64_t> stamp);
   // The stamp that time 0 stands for; 0 before the first frame.
   std::int64_t first_stamp() const { return first_stamp_.value_or(0); }
+  // Of the last frame; 0 before the first.
+  Time last() const { return last_.value_or(Time{}); }
   // Where the frame after the last one would be.
   Time end() const;
-  // From time 0 again.
-  void restart();
+  // The number of the frame at exactly this time; nothing if there is none, or no rate.
+  std::optional<std::int64_t> frame_at(Time time) const;
+  // From time 0 again, which the next frame's stamp, or this one, stands for.
+  void restart(std::optional<std::int64_t> first_stamp = std::nullopt);
 
  private:
   std::optional<Time> since_first(std::int64_t stamp) const;

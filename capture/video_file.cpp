@@ -1,6 +1,7 @@
 // Video files as cameras.
 #include "capture/video_file.h"
 
+#include <cmath>
 #include <deque>
 #include <stdexcept>
 #include <utility>
@@ -21,6 +22,10 @@ namespace {
 
 // So many pictures may be lost before the first good one.
 constexpr std::size_t max_lost_at_start = 1000;
+
+// Frames nearer than this are counted from the start; and so far before a frame the decoder starts,
+// so that pictures which it cannot yet build are behind it.
+constexpr std::int64_t min_jump = 50;
 
 // The rate that the container counts in, if its average agrees; else the average.
 Rational rate_of(const AVStream& stream) {
@@ -53,6 +58,7 @@ class VideoFile : public Camera {
   void open();
   void describe(const AVFrame& first);
   void skip_to(std::int64_t frame);
+  bool jump_before(std::int64_t frame);
   bool start_again();
   Frame make_frame(const DecodedPicture& picture);
   void linearise(const DecodedPicture& picture, Frame& frame);
@@ -164,6 +170,13 @@ void VideoFile::skip_to(std::int64_t frame) {
     throw std::runtime_error("cannot open " + path_ + " at frame " + std::to_string(frame) +
                              ": frames count from 0");
   }
+  if (frame > min_jump && !jump_before(frame)) {
+    number_ = 0;
+    pass_frames_ = 0;
+    clock_->restart();
+    file_ = std::make_unique<MediaFile>(path_);
+    open();
+  }
   while (number_ < frame) {
     const std::optional<DecodedPicture> picture = decoder_->next();
     if (!picture) {
@@ -171,6 +184,33 @@ void VideoFile::skip_to(std::int64_t frame) {
     }
     make_frame(DecodedPicture{nullptr, picture->pts, FrameStatus::good, {}});
   }
+}
+
+// Jumps by the container's index, which is right if its frames lie at the rate without a gap: then
+// a picture's time is its number. Returns whether that went well.
+bool VideoFile::jump_before(std::int64_t frame) {
+  const AVStream& video = file_->video();
+  if (info_.rate.num <= 0 || video.start_time == AV_NOPTS_VALUE ||
+      video.duration == AV_NOPTS_VALUE) {
+    return false;
+  }
+  const double length_s = static_cast<double>(video.duration) * av_q2d(video.time_base);
+  const Time wanted = time_of_frame(frame - min_jump, info_.rate);
+  const std::int64_t wanted_pts =
+      video.start_time + av_rescale_q(wanted.count(), {1, std::nano::den}, video.time_base);
+  if (std::llround(length_s * info_.rate.value()) != video.nb_frames || !file_->seek(wanted_pts)) {
+    return false;
+  }
+  decoder_->restart();
+  const std::optional<DecodedPicture> picture = decoder_->next();
+  if (!picture || !picture->pts) {
+    return false;
+  }
+  clock_->restart(video.start_time);
+  make_frame(DecodedPicture{nullptr, picture->pts, FrameStatus::good, {}});
+  const std::optional<std::int64_t> its_number = clock_->frame_at(clock_->last());
+  number_ = its_number.value_or(frame) + 1;
+  return number_ <= frame;
 }
 
 Frame VideoFile::make_frame(const DecodedPicture& picture) {

@@ -86,6 +86,39 @@ TEST_F(VideoFile, StartsAtTheFrameThatIsAskedFor) {
   }
 }
 
+TEST_F(VideoFile, FindsFarFramesExactlyWhereverItMayJump) {
+  for (const auto& [name, codec] :
+       {std::pair{"a.mp4", "-c:v libx264 -bf 2 -g 40 -preset ultrafast -c:a aac"},
+        std::pair{"b.mp4", "-c:v libx264 -x264-params open-gop=1:bframes=3:keyint=30 -c:a aac"},
+        std::pair{"a.mkv", "-c:v libx264 -bf 2 -g 40 -preset ultrafast -c:a pcm_s16le"},
+        std::pair{"a.avi", "-c:v mpeg4 -g 30 -c:a pcm_s16le"}}) {
+    const std::string clip = make(
+        name, "testsrc2=size=32x24:rate=30000/1001:duration=9,noise=alls=30:allf=t,format=yuv420p",
+        std::string("-f lavfi -i aevalsrc=t/10:duration=9:sample_rate=8000 ") + codec);
+    const std::vector<Frame> frames = all_frames(*open_camera(clip));
+    for (const std::int64_t start : {51, 90, 171, 269}) {
+      CameraOptions options;
+      options.frame = start;
+      const auto camera = open_camera(clip, options);
+      const std::optional<Frame> first = camera->next();
+      ASSERT_TRUE(first) << name;
+      EXPECT_EQ(first->number, start);
+      EXPECT_EQ(first->time, frames[static_cast<std::size_t>(start)].time);
+      EXPECT_EQ(first->image->pixels, frames[static_cast<std::size_t>(start)].image->pixels)
+          << name << " at " << start;
+      ASSERT_TRUE(start == 269 || camera->next());
+      const std::optional<Sound> sound = camera->take_sound();
+      ASSERT_TRUE(sound);
+      const std::size_t middle = sound->samples.size() / 2;
+      const double middle_s = static_cast<double>(sound->time.count()) * 1e-9 +
+                              static_cast<double>(middle) / sound->rate;
+      if (std::string(codec).find("pcm") != std::string::npos) {
+        EXPECT_NEAR(10 * sound->samples[middle], middle_s, 0.002) << "the sound tells its time";
+      }
+    }
+  }
+}
+
 TEST_F(VideoFile, RefusesAFrameThatItDoesNotHave) {
   const std::string clip = make_clip("a.mp4", "-c:v libx264");
   CameraOptions options;
