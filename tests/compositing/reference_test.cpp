@@ -69,7 +69,7 @@ struct Floor {
 
 TEST(RenderReference, LeavesThePlateBitForBitWhereNothingVirtualIs) {
   Floor floor(64);
-  const Environment sky = make_sky({}, 32);
+  const Environment sky = make_sun_and_sky({}, 32);
   for (const int samples : {1, 7, 32}) {
     const capture::Image picture = floor.render(sky, samples);
     for (int y = 0; y < 64; ++y)

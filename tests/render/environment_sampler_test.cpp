@@ -13,9 +13,9 @@ namespace {
 
 TEST(EnvironmentSampler, EstimatesIrradianceWithoutBiasWhateverTheSun) {
   for (const float radius : {0.005F, 0.05F, 0.5F}) {
-    MadeSky made;
+    SunAndSky made;
     made.sun_radius_rad = radius;
-    const Environment sky = make_sky(made, 64);
+    const Environment sky = make_sun_and_sky(made, 64);
     const EnvironmentSampler sampler(sky);
     const int count = 1 << 16;
     Vec3f sum;
@@ -44,7 +44,7 @@ TEST(EnvironmentSampler, EstimatesIrradianceWithoutBiasWhateverTheSun) {
 }
 
 TEST(EnvironmentSampler, StatesTheDensityThatItSamplesWith) {
-  const Environment sky = make_sky({}, 32);
+  const Environment sky = make_sun_and_sky({}, 32);
   const EnvironmentSampler sampler(sky);
   double total = 0;
   constexpr int rows = 512;

@@ -112,9 +112,9 @@ TEST(RenderReference, KeepsAWhiteFurnaceWhite) {
 }
 
 TEST(RenderReference, ShadesAPlaneAsItsIntegralSays) {
-  MadeSky made;
+  SunAndSky made;
   made.sun_radius_rad = 0.1F;
-  const Environment sky = make_sky(made, 128);
+  const Environment sky = make_sun_and_sky(made, 128);
   StandardParameters p;
   p.base_color[0] = 0.6F;
   p.base_color[1] = 0.3F;
@@ -137,11 +137,11 @@ TEST(RenderReference, ShadesAPlaneAsItsIntegralSays) {
 }
 
 TEST(RenderReference, GathersALobeAsItsIntegralSays) {
-  MadeSky made;
+  SunAndSky made;
   made.sun_radius_rad = 0.06F;
   made.sun_azimuth_rad = pi;  // before the camera, so that its reflection is near
   made.sun_elevation_rad = 0.9F;
-  const Environment sky = make_sky(made, 128);
+  const Environment sky = make_sun_and_sky(made, 128);
   for (const float roughness : {0.15F, 0.3F, 0.7F}) {
     StandardParameters p;
     p.metallic = 1;
@@ -164,7 +164,7 @@ TEST(RenderReference, GathersALobeAsItsIntegralSays) {
 }
 
 TEST(RenderReference, IsTheSameForAnyNumberOfThreadsAndDiffersBySeed) {
-  const Environment sky = make_sky({}, 32);
+  const Environment sky = make_sun_and_sky({}, 32);
   const Scene scene(make_scene(make_sphere(1, 16), {}));
   const Shot shot(16, 12, 20, {0, -4, 1}, {0, 0, 0});
   const ReferenceSettings settings = with_samples(4, true);
@@ -186,9 +186,9 @@ double rms_difference(const capture::Image& a, const capture::Image& b) {
 }
 
 TEST(RenderReference, ConvergesAtLeastWithTheRootOfItsSamplesToOnePictureOfAllSeeds) {
-  MadeSky made;
+  SunAndSky made;
   made.sun_radius_rad = 0.4F;  // a smaller one's rare reflections would ask for many more samples
-  const Environment sky = make_sky(made, 64);
+  const Environment sky = make_sun_and_sky(made, 64);
   StandardParameters paint;
   paint.clearcoat = 1;
   paint.roughness = 0.4F;
@@ -235,8 +235,8 @@ TEST(Photograph, BouncesLightWhereTheReferenceWithoutBouncesIsBlack) {
   description.meshes.push_back(make_square(3, 1));
   description.instances.emplace_back().mesh = 1;
   const Scene scene(description);
-  MadeSky made;
-  const Environment sky = make_sky(made, 32);
+  SunAndSky made;
+  const Environment sky = make_sun_and_sky(made, 32);
   const Shot shot(4, 4, 40, {0, -1, 0.5}, {0, 0, 0});
   EXPECT_GT(mean_of(shot.photo(scene, sky, with_samples(256))).value,
             1.5 * mean_of(shot.reference(scene, sky, with_samples(256))).value);
