@@ -36,7 +36,6 @@ capture::ExrCompression compression_from_name(const std::string& name) {
 
 ExrSequence::ExrSequence(const ExrSequenceSettings& settings) : settings_(settings) {
   compression_from_name(settings.compression);
-  timecode_base(settings.rate);
   std::error_code error;
   std::filesystem::create_directories(settings.dir, error);
   if (error) {
@@ -58,14 +57,14 @@ std::string ExrSequence::path_of(std::int64_t number) const {
 void ExrSequence::write(std::int64_t number,
                         const capture::HalfImage& rgba,
                         const capture::HalfImage& matte,
-                        const Timecode& timecode) const {
+                        const std::optional<Timecode>& timecode) const {
   constexpr int most_frames_per_second = 40;  // the attribute counts frames 0..39
   capture::ExrOptions options;
   options.compression = compression_from_name(settings_.compression);
   options.frames_per_second = settings_.rate;
-  if (timecode_base(settings_.rate) <= most_frames_per_second) {
-    options.timecode = capture::ExrTimecode{timecode.hours, timecode.minutes, timecode.seconds,
-                                            timecode.frames, timecode.drop_frame};
+  if (timecode && timecode_base(settings_.rate) <= most_frames_per_second) {
+    options.timecode = capture::ExrTimecode{timecode->hours, timecode->minutes, timecode->seconds,
+                                            timecode->frames, timecode->drop_frame};
   }
   const std::array<capture::ExrPlanes, 2> planes{capture::ExrPlanes{rgba, {"R", "G", "B", "A"}},
                                                  capture::ExrPlanes{matte, {"matte"}}};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "capture/frame.h"
@@ -29,7 +30,7 @@ class ExrSequence {
   void write(std::int64_t number,
              const capture::HalfImage& rgba,
              const capture::HalfImage& matte,
-             const Timecode& timecode) const;
+             const std::optional<Timecode>& timecode) const;
 
   std::string path_of(std::int64_t number) const;
 

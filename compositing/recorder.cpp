@@ -22,7 +22,14 @@ constexpr std::size_t most_waiting_sounds = 1024;
 // Sound may lie this far ahead of its picture; what lies further has a damaged time.
 constexpr capture::Time most_sound_ahead = std::chrono::seconds(10);
 
+// The first frame's label, if there is timecode at this rate.
+std::optional<Timecode> first_label(const RecorderSettings& settings) {
+  if (settings.start || !allows_timecode(settings.rate)) return settings.start;
+  return Timecode{};
+}
+
 VideoSettings video_settings(const RecorderSettings& settings) {
+  const std::optional<Timecode> first = first_label(settings);
   return {.file = settings.file,
           .rate = settings.rate,
           .width = settings.width,
@@ -30,7 +37,7 @@ VideoSettings video_settings(const RecorderSettings& settings) {
           .codec = settings.codec,
           .crf = settings.crf,
           .transfer = settings.transfer,
-          .timecode = to_string(settings.start),
+          .timecode = first ? to_string(*first) : std::string(),
           .sound_channels = settings.sound_channels,
           .sound_rate = settings.sound_rate};
 }
@@ -57,7 +64,8 @@ void validate(const RecorderSettings& settings) {
           "a take has at least one row and column, not " + std::to_string(settings.width) + " x " +
               std::to_string(settings.height));
   if (!settings.file.empty()) validate(video_settings(settings));
-  frames_since_midnight(settings.start, settings.rate);
+  require(settings.rate.num > 0 && settings.rate.den > 0, "a take needs a positive frame rate");
+  if (settings.start) frames_since_midnight(*settings.start, settings.rate);
 }
 
 }  // namespace
@@ -234,8 +242,9 @@ void Recorder::Take::write(const Item& item) {
     write_sounds(item.sounds, latest_sound_);
   }
   if (exr_) {
+    const std::optional<Timecode> first = first_label(settings_);
     exr_->write(frame.number, *frame.rgba, *frame.matte,
-                advance(settings_.start, index, settings_.rate));
+                first ? std::optional(advance(*first, index, settings_.rate)) : std::nullopt);
   }
 }
 
@@ -266,7 +275,13 @@ void Recorder::Take::write_sounds(const std::vector<capture::Sound>& sounds, cap
 }
 
 void Recorder::Take::stop(const std::string& error) {
-  if (video_) video_->salvage();
+  if (video_) {
+    try {
+      video_->close();  // it may be the EXR frames that failed
+    } catch (const std::exception&) {
+      video_->salvage();  // the first error is the one to tell
+    }
+  }
   {
     const std::lock_guard lock(mutex_);
     status_.error = error;

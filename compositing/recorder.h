@@ -25,8 +25,8 @@ struct RecorderSettings {
   int crf = 18;                                             // H.264's constant rate factor
   capture::Transfer transfer = capture::Transfer::rec1886;  // of display_rgb8: for the file's tags
   std::string exr_compression = "none";                     // or "rle", "zip", "piz"
-  Timecode start;                                           // label of the first frame
-  int sound_channels = 0;                                   // 0 = silent
+  std::optional<Timecode> start;  // label of the first frame; none: 00:00:00:00 if the rate has it
+  int sound_channels = 0;         // 0 = silent
   int sound_rate = 0;
   int queue_frames = 32;  // frames that may wait, at least 1
 };

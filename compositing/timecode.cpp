@@ -8,6 +8,13 @@
 namespace compositing {
 namespace {
 
+constexpr int most_frames = 99;  // two digits
+
+std::int64_t rounded(capture::Rational rate) {
+  const std::int64_t rest = rate.num % rate.den;
+  return rate.num / rate.den + (rest >= rate.den - rest ? 1 : 0);
+}
+
 // Labels left out at the start of each minute that is not a tenth one.
 int dropped_per_minute(int base) { return base / 15; }
 
@@ -32,14 +39,16 @@ int timecode_base(capture::Rational rate) {
   if (rate.num <= 0 || rate.den <= 0) {
     throw std::invalid_argument("a frame rate must be positive, not " + rate_text(rate));
   }
-  const std::int64_t whole = rate.num / rate.den;
-  const std::int64_t rest = rate.num % rate.den;
-  const std::int64_t base = whole + (rest >= rate.den - rest ? 1 : 0);
-  if (base < 1 || base > 99) {
+  const std::int64_t base = rounded(rate);
+  if (base < 1 || base > most_frames) {
     throw std::invalid_argument("timecode counts 1 to 99 frames per second, not " +
                                 rate_text(rate));
   }
   return static_cast<int>(base);
+}
+
+bool allows_timecode(capture::Rational rate) {
+  return rate.num > 0 && rate.den > 0 && rounded(rate) >= 1 && rounded(rate) <= most_frames;
 }
 
 bool allows_drop_frame(capture::Rational rate) {

@@ -24,6 +24,9 @@ struct Timecode {
 // 13 at 12.5). Throws std::invalid_argument unless the result lies in 1..99, the two digits' range.
 int timecode_base(capture::Rational rate);
 
+// Whether there is timecode at this rate: from 1 to 99 frames in a second of it.
+bool allows_timecode(capture::Rational rate);
+
 // Whether labels may be dropped: only at 30000/1001 and 60000/1001.
 bool allows_drop_frame(capture::Rational rate);
 

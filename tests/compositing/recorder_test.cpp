@@ -125,7 +125,7 @@ TEST_F(RecorderTest, WritesEveryFrameAtTheRateWithItsTimecode) {
   const std::string file = path("take.mkv");
   RecorderSettings settings = small_take(file);
   settings.rate = {30000, 1001};
-  settings.start = {1, 0, 59, 28, true};
+  settings.start = Timecode{1, 0, 59, 28, true};
   std::vector<RecordedFrame> frames;
   for (int n = 0; n < 45; ++n) frames.push_back(picture(n, textured(64, 48, n)));
   const RecorderStatus status = record(settings, std::move(frames));
@@ -471,7 +471,7 @@ TEST_F(RecorderTest, WritesExrFramesBitForBitForOtherPrograms) {
   settings.rate = {30000, 1001};
   settings.width = 37;
   settings.height = 21;
-  settings.start = {0, 0, 59, 28, true};
+  settings.start = Timecode{0, 0, 59, 28, true};
   std::mt19937 random(9);
   std::vector<std::shared_ptr<const capture::HalfImage>> pictures;
   std::vector<std::shared_ptr<const capture::HalfImage>> mattes;
@@ -522,6 +522,41 @@ TEST_F(RecorderTest, WritesExrFramesBitForBitForOtherPrograms) {
   }
 }
 
+TEST_F(RecorderTest, RecordsWithoutTimecodeWhereTheRateHasNone) {
+  RecorderSettings settings = small_take(path("take.mkv"));
+  settings.rate = {120, 1};
+  std::vector<RecordedFrame> frames;
+  for (int n = 0; n < 5; ++n) frames.push_back(picture(n, textured(64, 48, n)));
+  EXPECT_EQ(record(settings, std::move(frames)).written, 5);
+  EXPECT_EQ(probe(settings.file, "stream=r_frame_rate"), "120/1");
+  EXPECT_EQ(probe(settings.file, "stream_tags=timecode"), "");
+  settings.start = Timecode{};
+  EXPECT_THROW(Recorder{settings}, std::invalid_argument);
+}
+
+TEST_F(RecorderTest, ClosesTheVideoWholeWhenItIsTheExrFramesThatFail) {
+  RecorderSettings settings = small_take(path("take.mkv"));
+  settings.exr_dir = path("take");
+  Recorder recorder(settings);
+  RecordedFrame frame = picture(0, flat(64, 48, 100));
+  frame.rgba = std::make_shared<capture::HalfImage>(
+      capture::HalfImage{48, 64, std::vector<capture::Half>(48 * 64 * 4), 4});
+  frame.matte = std::make_shared<capture::HalfImage>(
+      capture::HalfImage{48, 64, std::vector<capture::Half>(48 * 64), 1});
+  for (; frame.number < 5; ++frame.number) EXPECT_TRUE(recorder.push(frame));
+  while (recorder.status().written < 5) std::this_thread::yield();
+  fs::remove_all(settings.exr_dir);
+  EXPECT_TRUE(recorder.push(frame));
+  recorder.wait_for_room();
+  recorder.close();
+  const RecorderStatus status = recorder.status();
+  EXPECT_NE(status.error.find("frame.000005.exr"), std::string::npos) << status.error;
+  EXPECT_EQ(status.written, 5);
+  EXPECT_EQ(status.dropped, 1);
+  EXPECT_EQ(picture_times_s(settings.file).size(), 6U);
+  EXPECT_NEAR(std::stod(probe(settings.file, "format=duration", "")), 0.24, 0.001);
+}
+
 TEST_F(RecorderTest, RefusesWhatCannotBeWrittenAtOnceWithPathAndReason) {
   const auto reason = [](const RecorderSettings& settings) -> std::string {
     try {
@@ -570,8 +605,8 @@ TEST_F(RecorderTest, RefusesHostileSettings) {
   refused([](RecorderSettings& s) { s.queue_frames = 1'000'000; });
   refused([](RecorderSettings& s) { s.sound_channels = -1; });
   refused([](RecorderSettings& s) { s.sound_channels = 1; });
-  refused([](RecorderSettings& s) { s.start = {24, 0, 0, 0, false}; });
-  refused([](RecorderSettings& s) { s.start = {0, 0, 0, 0, true}; });
+  refused([](RecorderSettings& s) { s.start = Timecode{24, 0, 0, 0, false}; });
+  refused([](RecorderSettings& s) { s.start = Timecode{0, 0, 0, 0, true}; });
   refused([this](RecorderSettings& s) {
     s.exr_dir = path("take");
     s.exr_compression = "jpeg";

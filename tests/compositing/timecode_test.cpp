@@ -78,6 +78,16 @@ TEST(TimecodeBase, RoundsTheRateToAWholeNumber) {
   EXPECT_THROW(timecode_base({1, 1000}), std::invalid_argument);
 }
 
+TEST(AllowsTimecode, AgreesWithTimecodeBase) {
+  for (const capture::Rational rate : {capture::Rational{25, 1}, {1, 2}, {199, 2}, {30000, 1001}}) {
+    EXPECT_EQ(allows_timecode(rate), rate.value() < 99.5) << rate.num;
+  }
+  for (const capture::Rational rate : {capture::Rational{0, 1}, {1, 0}, {1, 3}, {120, 1}}) {
+    EXPECT_FALSE(allows_timecode(rate)) << rate.num;
+    EXPECT_THROW(timecode_base(rate), std::invalid_argument);
+  }
+}
+
 TEST(ParseTimecode, ReadsWhatToStringWrites) {
   EXPECT_EQ(parse_timecode("01:02:03;04", ntsc), (Timecode{1, 2, 3, 4, true}));
   EXPECT_EQ(parse_timecode("23:59:59:24", {25, 1}), (Timecode{23, 59, 59, 24, false}));
