@@ -12,10 +12,11 @@ namespace capture {
 namespace {
 
 constexpr int codes = Response::codes;
-constexpr int flat_difference = 3;  // codes between neighbours
-constexpr int least_count = 25;     // pixels behind a mean
-constexpr int mode_radius = 8;      // codes around the median that count into a mean
-constexpr int lowest = 3;           // codes beyond these bounds are bent by clipping
+constexpr int flat_difference = 3;       // codes between neighbours
+constexpr int least_count = 25;          // pixels behind a mean
+constexpr int mode_radius = 8;           // codes around the median that count into a mean
+constexpr double least_majority = 0.75;  // of a code's pixels that must be near the median
+constexpr int lowest = 3;                // codes beyond these bounds are bent by clipping
 constexpr int highest = 247;
 constexpr int code_step = 5;         // between codes that give a match: curves are smooth
 constexpr double systematic = 0.25;  // codes: what rounding and compression leave in any mean
@@ -81,7 +82,10 @@ Mode mode_of(std::span<const std::uint32_t> counts, std::size_t stride) {
     sum += static_cast<double>(count) * z;
     squares += static_cast<double>(count) * z * z;
   }
-  if (mode.count < least_count) return {};
+  if (mode.count < least_count ||
+      static_cast<double>(mode.count) < least_majority * static_cast<double>(total)) {
+    return {};
+  }
   const auto n = static_cast<double>(mode.count);
   mode.mean = sum / n;
   const double variance = std::max(0.0, squares / n - mode.mean * mode.mean);

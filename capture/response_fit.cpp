@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <future>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include <Eigen/Dense>
@@ -212,33 +213,46 @@ NormalEquations equations_at(const Problem& problem, const Parameters& p, double
 constexpr int steps_from_afar = 60;
 constexpr int steps_from_near = 4;  // where a few matches more or less are all that differs
 
-// Levenberg and Marquardt's damping; the spread is renewed as the fit gets better.
+struct Step {
+  Parameters p;
+  double cost = 0;
+};
+
+// The next parameters of lesser cost, by Levenberg and Marquardt's damping, which is raised until
+// there are any; nothing if there are none.
+std::optional<Step> next_step(const Problem& problem,
+                              const Parameters& p,
+                              double spread,
+                              const NormalEquations& now,
+                              double& damping) {
+  constexpr double hopeless = 1e9;
+  for (; damping < hopeless; damping *= 10) {
+    Eigen::MatrixXd damped = now.matrix;
+    damped.diagonal() *= 1 + damping;
+    damped.diagonal().array() += 1e-12;  // parameters that nothing depends on
+    Step step{p - damped.ldlt().solve(now.gradient), 0};
+    step.cost = equations_at(problem, step.p, spread).cost;
+    if (step.cost < now.cost) return step;
+  }
+  return std::nullopt;
+}
+
+// The spread is renewed as the fit gets better.
 Parameters solve(const Problem& problem, Parameters p, int most_steps) {
   constexpr double converged = 1e-4;
   double damping = 1e-3;
-  for (int step = 0; step < most_steps; ++step) {
+  for (int i = 0; i < most_steps; ++i) {
     const double spread = spread_of(problem, p);
     const NormalEquations now = equations_at(problem, p, spread);
-    bool better = false;
-    for (; !better && damping < 1e9; damping *= 10) {
-      Eigen::MatrixXd damped = now.matrix;
-      damped.diagonal() *= 1 + damping;
-      damped.diagonal().array() += 1e-12;
-      const Parameters next = p - damped.ldlt().solve(now.gradient);
-      const double cost = equations_at(problem, next, spread).cost;
-      if (!(cost < now.cost)) continue;
-      better = now.cost - cost > converged * now.cost;
-      p = next;
-      break;
-    }
-    if (!better) break;
-    damping = std::max(1e-9, damping / 5);
+    std::optional<Step> step = next_step(problem, p, spread, now, damping);
+    if (!step) break;
+    p = std::move(step->p);
+    if (now.cost - step->cost < converged * now.cost) break;
+    damping /= 10;
   }
   return p;
 }
 
-// Each shot's logarithm of exposure is settled by its matches with the others, whose parameters
-// took no look at it; the rest of the disagreement is the curve's.
 struct Judgement {
   double squares = 0;
   std::size_t count = 0;
@@ -248,6 +262,8 @@ struct Judgement {
   }
 };
 
+// Each shot in turn is left out of the fit. What is then free is its exposure, taken from its
+// matches' median; the disagreement that stays is the curve's.
 double heldout_error(const CurveFamily& family,
                      std::span<const CodeMatch> matches,
                      const std::vector<double>& claimed) {
@@ -311,6 +327,12 @@ std::vector<double> claimed_exposures(std::span<const CodedShot> shots) {
   return claimed;
 }
 
+std::runtime_error too_little_shared() {
+  return std::runtime_error(
+      "the shots share too few flat, unclipped places at different exposures to tell the response; "
+      "state it instead (a .rsp file, or sRGB)");
+}
+
 std::vector<CodeMatch> enough_matches(std::span<const CodedShot> shots,
                                       const std::vector<double>& claimed) {
   std::vector<CodeMatch> matches = match_codes(shots);
@@ -321,12 +343,7 @@ std::vector<CodeMatch> enough_matches(std::span<const CodedShot> shots,
            different;
   });
   constexpr std::ptrdiff_t least = 100;
-  if (useful < least) {
-    throw std::runtime_error(
-        "the shots share too few flat, unclipped places at different exposures to tell the "
-        "camera's "
-        "response; state it instead (a .rsp file, or sRGB)");
-  }
+  if (useful < least) throw too_little_shared();
   return matches;
 }
 
@@ -359,6 +376,7 @@ ResponseFit recover_response(std::span<const CodedShot> shots) {
     fit.candidates.push_back({families[i].name(), channels * families[i].parameters(), error});
     best = std::min(best, error);
   }
+  if (!std::isfinite(best)) throw too_little_shared();
   constexpr double as_good = 1.1;
   const auto chosen = std::find_if(fit.candidates.begin(), fit.candidates.end(),
                                    [&](const ResponseCandidate& candidate) {

@@ -168,6 +168,17 @@ TEST(RecoverResponse, ForetellsHeldOutRealShotsWithin3PercentAndBetterThanTheirR
   }
 }
 
+TEST(RecoverResponse, CopesWithARealBracketOfUnevenStepsAndAFlickeringScreen) {
+  const auto directory = made::real_data() / "brackets" / "room";
+  if (!std::filesystem::exists(directory)) GTEST_SKIP() << "no real data at " << directory;
+  std::vector<CodedShot> shots;
+  for (int number = 0; number < 7; ++number) {
+    const std::string path = directory / ("stack_room_exp_" + std::to_string(number) + ".jpg");
+    shots.push_back({decode_still8(read_file(path), path), exposure_s_of(path)});
+  }
+  EXPECT_LT(recover_response(shots).heldout_error, 0.06);
+}
+
 TEST(ReadRsp, GivesTheCurveThatWasWritten) {
   const std::string path = made::make_temporary_directory() / "a.rsp";
   Response response;
