@@ -170,4 +170,32 @@ void smooth_for_reflections(Environment& env, int levels) {
   }
 }
 
+Environment environment_from_map(const capture::Image& map, double yaw_rad, int height) {
+  Environment env;
+  env.radiance = map;
+  check(env);
+  if (height < 1 || height > 4096 || !std::isfinite(yaw_rad)) {
+    throw std::invalid_argument("an environment's height must be from 1 to 4096");
+  }
+  const capture::Image level = area_averaged(map, height);
+  env.radiance = capture::make_image(height, 2 * height);
+  env.seen.assign(env.radiance.pixels.size() / 3, 1);
+  // Turned to the left by yaw, the map's columns move left; what lies between two is shared.
+  const int width = 2 * height;
+  const double turns = yaw_rad / (2 * std::numbers::pi);
+  const double moved = (turns - std::floor(turns)) * width;
+  const int whole = static_cast<int>(moved) % width;
+  const auto part = static_cast<float>(moved - std::floor(moved));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const int from = (x + whole) % width;
+      const int next = (from + 1) % width;
+      for (int c = 0; c < 3; ++c) {
+        env.radiance.at(y, x, c) = level.at(y, from, c) * (1 - part) + level.at(y, next, c) * part;
+      }
+    }
+  }
+  return env;
+}
+
 }  // namespace render

@@ -59,6 +59,12 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal);
 // Throws std::invalid_argument as check(), or if levels is below 2.
 void smooth_for_reflections(Environment& env, int levels = 6);
 
+// The environment of a whole latitude-longitude map (any height, twice as wide, 3 channels), row 0
+// up and its middle column towards azimuth yaw_rad, averaged or interpolated to `height` rows. All
+// of it counts as seen. Throws std::invalid_argument as check(), or unless height is from 1 to
+// 4096.
+Environment environment_from_map(const capture::Image& map, double yaw_rad, int height = 256);
+
 // How directions that the probe did not see are filled.
 enum class Unseen { floor, mirror, mean };
 

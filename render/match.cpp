@@ -1,0 +1,198 @@
+// The gain that brings the lightprobe's radiance to the plate's units.
+#include "render/match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <vector>
+
+namespace render {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+// Turns a median absolute deviation into a standard deviation.
+constexpr double deviation_of_median = 1.4826;
+// Fewer plate pixels than this in a texel are its rim.
+constexpr int least_pixels_per_texel = 4;
+// Above this spread, the two cameras do not look at the same things.
+constexpr double doubtful_spread = 0.3;
+
+using Colour = std::array<float, 3>;
+
+double median(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Median per channel, and the largest channel's relative robust deviation from it.
+struct Robust {
+  std::array<double, 3> median{};
+  double spread = 0;
+};
+
+Robust robust_mean(const std::vector<Colour>& values) {
+  Robust result;
+  std::vector<float> channel(values.size());
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::ranges::transform(values, channel.begin(), [c](const Colour& v) { return v[c]; });
+    const double m = median(channel);
+    std::ranges::transform(values, channel.begin(), [c, m](const Colour& v) {
+      return static_cast<float>(std::abs(v[c] - m));
+    });
+    result.median[c] = m;
+    if (m > 0) result.spread = std::max(result.spread, deviation_of_median * median(channel) / m);
+  }
+  return result;
+}
+
+bool usable(const float* p, const MatchSettings& settings) {
+  return std::all_of(p, p + 3,
+                     [&](float v) { return v >= settings.darkest && v < settings.clipped; });
+}
+
+// The usable pixels of a patch.
+std::vector<Colour> patch_pixels(const capture::Image& plate,
+                                 const Patch& patch,
+                                 const MatchSettings& settings) {
+  if (plate.channels != 3 || patch.x < 0 || patch.y < 0 || patch.width < 1 || patch.height < 1 ||
+      patch.width > plate.width - patch.x || patch.height > plate.height - patch.y) {
+    throw std::invalid_argument("the patch to match by does not lie in the plate");
+  }
+  std::vector<Colour> pixels;
+  for (int y = patch.y; y < patch.y + patch.height; ++y) {
+    for (int x = patch.x; x < patch.x + patch.width; ++x) {
+      const float* p = &plate.pixels[plate.index(y, x)];
+      if (usable(p, settings)) pixels.push_back({p[0], p[1], p[2]});
+    }
+  }
+  return pixels;
+}
+
+bool is_lit(Vec3f irradiance) {
+  return irradiance.x > 0 && irradiance.y > 0 && irradiance.z > 0 &&
+         std::isfinite(irradiance.x + irradiance.y + irradiance.z);
+}
+
+}  // namespace
+
+MatchResult match_by_overlap(const capture::Image& plate,
+                             const calibrate::DirectionTable& plate_directions,
+                             const calibrate::Pose& cam_from_set,
+                             const Environment& env,
+                             const MatchSettings& settings) {
+  check(env);
+  if (plate.width != plate_directions.width || plate.height != plate_directions.height ||
+      plate.channels != 3) {
+    throw std::invalid_argument("the plate is not of its lens's size");
+  }
+  // The plate, averaged over the environment's texels.
+  struct Texel {
+    std::array<double, 3> sum{};
+    int pixels = 0;
+    bool usable = true;
+  };
+  const int width = env.radiance.width;
+  const int height = env.radiance.height;
+  std::vector<Texel> texels(env.radiance.pixels.size() / 3);
+  const calibrate::Mat3 set_from_cam = cam_from_set.R.transposed();
+  for (int y = 0; y < plate.height; ++y) {
+    for (int x = 0; x < plate.width; ++x) {
+      const std::size_t i = plate_directions.index(y, x);
+      const calibrate::Vec3 v_cam{plate_directions.x[i], plate_directions.y[i],
+                                  plate_directions.z[i]};
+      if (dot(v_cam, v_cam) == 0) continue;
+      const auto at = texel_of_direction(to_float(set_from_cam * v_cam), width, height);
+      const int column = std::clamp(static_cast<int>(std::lround(at[0])), 0, width - 1);
+      const int row = std::clamp(static_cast<int>(std::lround(at[1])), 0, height - 1);
+      Texel& texel = texels[static_cast<std::size_t>(row * width + column)];
+      const float* p = &plate.pixels[plate.index(y, x)];
+      texel.usable = texel.usable && usable(p, settings);
+      for (std::size_t c = 0; c < 3; ++c) texel.sum[c] += p[c];
+      ++texel.pixels;
+    }
+  }
+  MatchResult result;
+  std::vector<Colour> ratios;
+  for (std::size_t t = 0; t < texels.size(); ++t) {
+    const Texel& texel = texels[t];
+    const bool seen = env.seen.empty() || env.seen[t] != 0;
+    if (!seen || !texel.usable || texel.pixels < least_pixels_per_texel) continue;
+    Colour ratio{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      ratio[c] = static_cast<float>(texel.sum[c] / texel.pixels /
+                                    counted_radiance(env.radiance.pixels[3 * t + c]));
+    }
+    if (!std::isfinite(ratio[0] + ratio[1] + ratio[2])) continue;
+    ratios.push_back(ratio);
+    result.pixels += texel.pixels;
+  }
+  if (ratios.empty()) {
+    result.note =
+        "no direction is seen by both cameras, unclipped and not dark: gain left at 1; state "
+        "a patch of known albedo, or a gain";
+    return result;
+  }
+  const Robust robust = robust_mean(ratios);
+  for (std::size_t c = 0; c < 3; ++c) result.gain[c] = static_cast<float>(robust.median[c]);
+  result.spread = robust.spread;
+  result.note =
+      "median over " + std::to_string(ratios.size()) + " directions that both cameras see";
+  if (result.spread > doubtful_spread) {
+    result.note +=
+        "; doubtful: they disagree, so things may be near, poses wrong, or the plate not linear";
+  }
+  return result;
+}
+
+MatchResult match_by_patch(const capture::Image& plate,
+                           const Patch& patch,
+                           std::array<float, 3> albedo,
+                           Vec3f irradiance,
+                           const MatchSettings& settings) {
+  for (const float a : albedo) {
+    if (!(a > 0 && a <= 1)) throw std::invalid_argument("an albedo must be above 0 and at most 1");
+  }
+  const std::vector<Colour> pixels = patch_pixels(plate, patch, settings);
+  MatchResult result;
+  if (pixels.empty() || !is_lit(irradiance)) {
+    result.note = pixels.empty() ? "the patch is clipped or dark: gain left at 1"
+                                 : "the lightprobe puts no light on the patch: gain left at 1";
+    return result;
+  }
+  const Robust robust = robust_mean(pixels);
+  const std::array light{irradiance.x, irradiance.y, irradiance.z};
+  for (std::size_t c = 0; c < 3; ++c) {
+    result.gain[c] = static_cast<float>(pi * robust.median[c] / (albedo[c] * light[c]));
+  }
+  result.implied_albedo = albedo;
+  result.pixels = static_cast<int>(pixels.size());
+  result.spread = robust.spread;
+  result.note = "a patch of stated albedo";
+  return result;
+}
+
+MatchResult match_given(std::array<float, 3> gain) {
+  MatchResult result;
+  result.gain = gain;
+  result.note = "given";
+  return result;
+}
+
+void imply_albedo(const capture::Image& plate,
+                  const Patch& patch,
+                  Vec3f irradiance,
+                  MatchResult& result,
+                  const MatchSettings& settings) {
+  const std::vector<Colour> pixels = patch_pixels(plate, patch, settings);
+  if (pixels.empty() || !is_lit(irradiance)) return;
+  const Robust robust = robust_mean(pixels);
+  const std::array light{irradiance.x, irradiance.y, irradiance.z};
+  for (std::size_t c = 0; c < 3; ++c) {
+    result.implied_albedo[c] =
+        static_cast<float>(pi * robust.median[c] / (result.gain[c] * light[c]));
+  }
+}
+
+}  // namespace render

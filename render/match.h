@@ -1,0 +1,63 @@
+// The gain that brings the lightprobe's radiance to the plate's units.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "calibrate/lens.h"
+#include "calibrate/pose.h"
+#include "render/environment.h"
+
+namespace render {
+
+struct MatchResult {
+  std::array<float, 3> gain{1, 1, 1};            // plate = gain * probe, per channel
+  std::array<float, 3> implied_albedo{0, 0, 0};  // of the patch that was looked at; 0 = none was
+  int pixels = 0;                                // of the plate that the gain rests on; 0 = on none
+  double spread = 0;  // relative robust standard deviation of what was averaged
+  std::string note;   // what was done, or why not, in words
+};
+
+struct MatchSettings {
+  float clipped = 0.98F;   // plate values from here on say nothing
+  float darkest = 0.005F;  // neither do plate values below this
+};
+
+// From the directions that both cameras see: the median over the environment's texels of plate over
+// probe, where a whole texel of the plate is neither clipped nor dark. Both are taken to look at
+// things far away. `env` is the probe's at gain 1. Without a common direction, gain stays 1 and the
+// note says so. Throws std::invalid_argument if the plate is not of the table's size with 3
+// channels.
+MatchResult match_by_overlap(const capture::Image& plate,
+                             const calibrate::DirectionTable& plate_directions,
+                             const calibrate::Pose& cam_from_set,
+                             const Environment& env,
+                             const MatchSettings& settings = {});
+
+// A part of the plate, in its pixels.
+struct Patch {
+  int x = 0, y = 0, width = 1, height = 1;
+};
+
+// From a matt patch of stated albedo per channel, lit by `irradiance` (irradiance_of() with the
+// patch's normal, at gain 1): gain = pi * plate / (albedo * irradiance). Throws
+// std::invalid_argument if the patch leaves the plate or an albedo is not above 0 and at most 1. A
+// patch that is clipped, dark or unlit leaves the gain at 1, and the note says so.
+MatchResult match_by_patch(const capture::Image& plate,
+                           const Patch& patch,
+                           std::array<float, 3> albedo,
+                           Vec3f irradiance,
+                           const MatchSettings& settings = {});
+
+// A given gain.
+MatchResult match_given(std::array<float, 3> gain);
+
+// Sets the result's implied albedo of a patch: pi * plate / (gain * irradiance), irradiance at
+// gain 1. Throws as match_by_patch.
+void imply_albedo(const capture::Image& plate,
+                  const Patch& patch,
+                  Vec3f irradiance,
+                  MatchResult& result,
+                  const MatchSettings& settings = {});
+
+}  // namespace render

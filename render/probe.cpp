@@ -1,0 +1,257 @@
+// From the picture of a lightprobe camera to the light of the set.
+#include "render/probe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+namespace render {
+namespace {
+
+using calibrate::Lens;
+using calibrate::Pose;
+using calibrate::Vec3;
+
+constexpr double pi = std::numbers::pi;
+constexpr int least_height = 8;
+constexpr int largest_height = 4096;
+// Below this sensitivity, a correction would show noise only.
+constexpr double least_sensitivity = 0.05;
+// Rows per task of oneTBB.
+constexpr int rows_per_task = 8;
+
+// Cosine times solid angle of a texel above the horizon, of a row, on a surface that faces up.
+double upward_weight(int row, int height) {
+  const double top = std::sin(row * pi / height);
+  const double bottom = std::sin((row + 1) * pi / height);
+  return std::max(bottom * bottom - top * top, 0.0) / 2 * pi / height;
+}
+
+double sensitivity(const std::vector<double>& vignetting, double angle_rad) {
+  const double squared = angle_rad * angle_rad;
+  double sum = 0;
+  for (std::size_t i = vignetting.size(); i > 0; --i) sum = (sum + vignetting[i - 1]) * squared;
+  return 1 + sum;
+}
+
+void check(const ProbeSettings& settings, double max_angle_rad) {
+  if (settings.height < least_height || settings.height > largest_height) {
+    throw std::invalid_argument("an environment's height must be from 8 to 4096, not " +
+                                std::to_string(settings.height));
+  }
+  if (!(settings.floor_albedo >= 0 && settings.floor_albedo <= 1)) {
+    throw std::invalid_argument("the albedo of the floor must be from 0 to 1");
+  }
+  constexpr int steps = 100;
+  for (int i = 0; i <= steps; ++i) {
+    if (!(sensitivity(settings.vignetting, max_angle_rad * i / steps) > least_sensitivity)) {
+      throw std::invalid_argument("a lightprobe's vignetting must stay above 0.05 up to its rim");
+    }
+  }
+}
+
+}  // namespace
+
+ProbeMapper::ProbeMapper(const Lens& lens,
+                         const Pose& probe_from_set,
+                         const ProbeSettings& settings)
+    : width_(lens.width), height_(lens.height), settings_(settings) {
+  check(lens);
+  check(settings, lens.max_angle_rad);
+  gather_ = make_probe_gather(lens, probe_from_set, settings.height);
+  if (gather_.pixel.empty()) throw std::invalid_argument("a lightprobe's lens sees nothing");
+  if (gather_.shrink > 1) shrunk_ = capture::make_image(gather_.height, gather_.width);
+  correct_vignetting(lens);
+  const int width = 2 * settings.height;
+  seen_.resize(gather_.first.size() - 1);
+  seen_in_row_.assign(static_cast<std::size_t>(settings.height), 0);
+  for (std::size_t t = 0; t < seen_.size(); ++t) {
+    seen_[t] = gather_.first[t + 1] > gather_.first[t];
+    seen_in_row_[t / static_cast<std::size_t>(width)] += seen_[t];
+  }
+  row_sums_.resize(seen_in_row_.size());
+  if (settings.unseen == Unseen::mirror) find_mirrored(probe_from_set);
+}
+
+void ProbeMapper::correct_vignetting(const Lens& lens) {
+  if (settings_.vignetting.empty()) return;
+  // Per pixel; 0 = not looked up yet.
+  std::vector<float> correction(static_cast<std::size_t>(gather_.width * gather_.height));
+  const double to_middle = 0.5 * (gather_.shrink - 1);
+  for (std::size_t i = 0; i < gather_.pixel.size(); ++i) {
+    float& factor = correction[gather_.pixel[i]];
+    if (factor == 0) {
+      const auto pixel = static_cast<int>(gather_.pixel[i]);
+      const calibrate::Vec2 q{pixel % gather_.width * gather_.shrink + to_middle,
+                              pixel / gather_.width * gather_.shrink + to_middle};
+      const Vec3 v = calibrate::unproject(lens, q).value_or(Vec3{0, 0, 1});
+      const double angle_rad = std::atan2(std::hypot(v.x, v.y), v.z);
+      factor = static_cast<float>(1 / sensitivity(settings_.vignetting, angle_rad));
+    }
+    gather_.weight[i] *= factor;
+  }
+}
+
+void ProbeMapper::find_mirrored(const Pose& probe_from_set) {
+  const int height = settings_.height;
+  const int width = 2 * height;
+  const Vec3 axis = probe_from_set.R.transposed() * Vec3{0, 0, 1};
+  mirrored_.assign(seen_.size(), -1);
+  for (std::size_t t = 0; t < seen_.size(); ++t) {
+    if (seen_[t] != 0) continue;
+    const Vec3 v = to_double(direction_of_texel(static_cast<float>(static_cast<int>(t) % width),
+                                                static_cast<float>(static_cast<int>(t) / width),
+                                                width, height));
+    const Vec3f other = to_float(v - axis * (2 * dot(v, axis)));
+    const auto [x, y] = texel_of_direction(other, width, height);
+    const int column = static_cast<int>(std::lround(x)) % width;
+    const int row = std::clamp(static_cast<int>(std::lround(y)), 0, height - 1);
+    const int there = row * width + std::max(column, 0);
+    if (seen_[static_cast<std::size_t>(there)] != 0) mirrored_[t] = there;
+  }
+}
+
+double ProbeMapper::seen_part() const {
+  double sum = 0;
+  for (int y = 0; y < settings_.height; ++y) {
+    sum += seen_in_row_[static_cast<std::size_t>(y)] *
+           texel_solid_angle(y, 2 * settings_.height, settings_.height);
+  }
+  return sum / (4 * pi);
+}
+
+void ProbeMapper::map(const capture::Image& probe, const ProbeFrame& frame, Environment& out) {
+  if (probe.width != width_ || probe.height != height_ || probe.channels != 3) {
+    throw std::invalid_argument("the lightprobe's picture is " + std::to_string(probe.width) + "x" +
+                                std::to_string(probe.height) + ", but its lens is for " +
+                                std::to_string(width_) + "x" + std::to_string(height_));
+  }
+  const int rows = settings_.height;
+  out.radiance.height = rows;
+  out.radiance.width = 2 * rows;
+  out.radiance.channels = 3;
+  out.radiance.pixels.resize(3 * seen_.size());
+  out.seen = seen_;
+  if (gather_.shrink > 1) shrink(probe);
+  const capture::Image& source = gather_.shrink > 1 ? shrunk_ : probe;
+  const tbb::blocked_range<int> all(0, rows, rows_per_task);
+  tbb::parallel_for(all, [&](const auto& range) {
+    for (int y = range.begin(); y != range.end(); ++y) gather_row(y, source, frame, out);
+  });
+  const Vec3f fill = fill_radiance(frame);
+  tbb::parallel_for(all, [&](const auto& range) {
+    for (int y = range.begin(); y != range.end(); ++y) fill_row(y, fill, out);
+  });
+  out.unseen_share = unseen_share();
+}
+
+void ProbeMapper::shrink(const capture::Image& probe) {
+  const int n = gather_.shrink;
+  const float part = 1.0F / static_cast<float>(n * n);
+  tbb::parallel_for(tbb::blocked_range<int>(0, shrunk_.height, rows_per_task),
+                    [&](const auto& rows) {
+                      for (int y = rows.begin(); y != rows.end(); ++y) {
+                        float* to = &shrunk_.pixels[shrunk_.index(y, 0)];
+                        std::fill(to, to + 3 * shrunk_.width, 0.0F);
+                        for (int dy = 0; dy < n; ++dy) {
+                          const float* from = &probe.pixels[probe.index(y * n + dy, 0)];
+                          for (int x = 0; x < shrunk_.width; ++x) {
+                            for (int dx = 0; dx < n; ++dx, from += 3) {
+                              for (int c = 0; c < 3; ++c)
+                                to[3 * x + c] += part * counted_radiance(from[c]);
+                            }
+                          }
+                        }
+                      }
+                    });
+}
+
+void ProbeMapper::gather_row(int row,
+                             const capture::Image& source,
+                             const ProbeFrame& frame,
+                             Environment& out) {
+  const auto width = static_cast<std::size_t>(2 * settings_.height);
+  const std::size_t begin = static_cast<std::size_t>(row) * width;
+  std::array<double, 3> sum{};
+  for (std::size_t t = begin; t < begin + width; ++t) {
+    std::array<float, 3> radiance{};
+    for (std::uint32_t i = gather_.first[t]; i < gather_.first[t + 1]; ++i) {
+      const float* p = &source.pixels[3 * static_cast<std::size_t>(gather_.pixel[i])];
+      for (std::size_t c = 0; c < 3; ++c) radiance[c] += gather_.weight[i] * counted_radiance(p[c]);
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.radiance.pixels[3 * t + c] = radiance[c] * frame.gain[c];
+      sum[c] += out.radiance.pixels[3 * t + c];
+    }
+  }
+  row_sums_[static_cast<std::size_t>(row)].seen = sum;
+}
+
+Vec3f ProbeMapper::fill_radiance(const ProbeFrame& frame) const {
+  const int rows = settings_.height;
+  const int width = 2 * rows;
+  if (settings_.unseen == Unseen::floor && frame.floor_radiance) return *frame.floor_radiance;
+  const bool floor = settings_.unseen == Unseen::floor;
+  // Either way, the sum of the seen radiance over weights: those of irradiance, or solid angles.
+  std::array<double, 3> sum{};
+  double seen_weight = 0;
+  double unseen_weight = 0;
+  for (int y = 0; y < rows; ++y) {
+    const auto row = static_cast<std::size_t>(y);
+    const double weight = floor ? upward_weight(y, rows) : texel_solid_angle(y, width, rows);
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += weight * row_sums_[row].seen[c];
+    seen_weight += weight * seen_in_row_[row];
+    unseen_weight += weight * (width - seen_in_row_[row]);
+  }
+  // The floor's radiance is albedo / pi times irradiance, in which the filled part above the
+  // horizon has a share itself.
+  const double reflectance = settings_.floor_albedo / pi;
+  const double scale = floor ? reflectance / (1 - reflectance * unseen_weight) : 1 / seen_weight;
+  return {static_cast<float>(sum[0] * scale), static_cast<float>(sum[1] * scale),
+          static_cast<float>(sum[2] * scale)};
+}
+
+void ProbeMapper::fill_row(int row, Vec3f fill, Environment& out) {
+  const auto width = static_cast<std::size_t>(2 * settings_.height);
+  const std::size_t begin = static_cast<std::size_t>(row) * width;
+  std::array<double, 3> sum{};
+  for (std::size_t t = begin; t < begin + width; ++t) {
+    if (seen_[t] != 0) continue;
+    float* p = &out.radiance.pixels[3 * t];
+    const std::int32_t from = mirrored_.empty() ? -1 : mirrored_[t];
+    if (from >= 0) {
+      std::copy_n(&out.radiance.pixels[3 * static_cast<std::size_t>(from)], 3, p);
+    } else {
+      p[0] = fill.x;
+      p[1] = fill.y;
+      p[2] = fill.z;
+    }
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += p[c];
+  }
+  row_sums_[static_cast<std::size_t>(row)].filled = sum;
+}
+
+float ProbeMapper::unseen_share() const {
+  std::array<double, 3> seen{};
+  std::array<double, 3> filled{};
+  for (int y = 0; y < settings_.height; ++y) {
+    const double weight = upward_weight(y, settings_.height);
+    const RowSum& row = row_sums_[static_cast<std::size_t>(y)];
+    for (std::size_t c = 0; c < 3; ++c) {
+      seen[c] += weight * row.seen[c];
+      filled[c] += weight * row.filled[c];
+    }
+  }
+  const auto luminance_of = [](const std::array<double, 3>& v) {
+    return .2126 * v[0] + .7152 * v[1] + .0722 * v[2];
+  };
+  const double all = luminance_of(seen) + luminance_of(filled);
+  return all > 0 ? static_cast<float>(luminance_of(filled) / all) : 0.0F;
+}
+
+}  // namespace render

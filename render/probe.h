@@ -1,0 +1,82 @@
+// From the picture of a lightprobe camera to the light of the set.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "calibrate/lens.h"
+#include "calibrate/pose.h"
+#include "render/environment.h"
+#include "render/probe_gather.h"
+
+namespace render {
+
+struct ProbeSettings {
+  int height = 256;  // of the environment
+  Unseen unseen = Unseen::floor;
+  float floor_albedo = 0.2F;  // of Unseen::floor
+  // The sensitivity of the lens at an angle off its axis: 1 + v1 angle^2 + v2 angle^4 + ..., in
+  // radians. Empty = even. Radiance is divided by it; it must stay above 0.05 up to the largest
+  // angle.
+  std::vector<double> vignetting{};
+};
+
+// What belongs to one frame.
+struct ProbeFrame {
+  std::array<float, 3> gain{1, 1, 1};  // probe radiance to plate units
+  std::optional<Vec3f>
+      floor_radiance;  // Unseen::floor: the plate's mean colour instead of an albedo
+};
+
+// Maps pictures of one probe camera to environments. Made once per camera. Not thread-safe; uses
+// oneTBB.
+//
+// Each texel takes the mean of the probe's pixels over its solid angle, and each pixel gives its
+// light times its solid angle, so that an even picture stays even, and a sun keeps its energy
+// however few pixels it has. Texels that are seen by less than half are filled:
+//   floor   as a floor that the seen light from above shines on
+//   mirror  as the seen directions mirrored at the plane through the lens's rim, else as `mean`
+//   mean    as the mean of all that is seen
+class ProbeMapper {
+ public:
+  // Throws std::invalid_argument: a lens that is none, a height that is not from 8 to 4096, a
+  // vignetting that reaches 0, an albedo outside 0..1, or a lens that sees nothing.
+  ProbeMapper(const calibrate::Lens& lens,
+              const calibrate::Pose& probe_from_set,
+              const ProbeSettings& settings);
+
+  // `probe` is scene-linear, (lens.height, lens.width, 3); NaN and negative values count as 0.
+  // Fills radiance, seen and unseen_share of `out`; smooth_for_reflections() comes after. Allocates
+  // nothing if `out` came from here before. Throws std::invalid_argument for a picture of another
+  // size.
+  void map(const capture::Image& probe, const ProbeFrame& frame, Environment& out);
+
+  // The part of the sphere that the probe sees, 0..1.
+  double seen_part() const;
+
+ private:
+  // What a row of one frame adds up to: radiance of seen and of filled texels.
+  struct RowSum {
+    std::array<double, 3> seen{}, filled{};
+  };
+
+  void correct_vignetting(const calibrate::Lens& lens);
+  void find_mirrored(const calibrate::Pose& probe_from_set);
+  void shrink(const capture::Image& probe);
+  void gather_row(int row, const capture::Image& source, const ProbeFrame& frame, Environment& out);
+  void fill_row(int row, Vec3f fill, Environment& out);
+  Vec3f fill_radiance(const ProbeFrame& frame) const;
+  float unseen_share() const;
+
+  int width_, height_;  // of the probe's picture
+  ProbeSettings settings_;
+  ProbeGather gather_;     // weights divided by the vignetting
+  capture::Image shrunk_;  // the picture, if gather_ shrinks it
+  std::vector<std::uint8_t> seen_;
+  std::vector<std::int32_t> mirrored_;  // Unseen::mirror: per texel, the seen texel to copy, or -1
+  std::vector<int> seen_in_row_;
+  std::vector<RowSum> row_sums_;
+};
+
+}  // namespace render
