@@ -1,38 +1,26 @@
-// Small text files, whole.
+// Text files, whole, and numbers in them.
 #include "calibrate/text_file.h"
 
 #include <array>
-#include <cerrno>
 #include <charconv>
-#include <cstring>
-#include <fstream>
-#include <iterator>
-#include <stdexcept>
+#include <span>
+
+#include "capture/files.h"
 
 namespace calibrate {
 namespace {
 
-constexpr std::size_t largest_file = 64U << 20U;
+constexpr std::size_t largest_file = std::size_t{64} << 20U;
 
 }  // namespace
 
 std::string read_text_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path + ": cannot be opened: " + std::strerror(errno));
-  std::string text;
-  std::array<char, 1 << 16> chunk;
-  while (file.read(chunk.data(), chunk.size()) || file.gcount() > 0) {
-    text.append(chunk.data(), static_cast<std::size_t>(file.gcount()));
-    if (text.size() > largest_file) throw std::runtime_error(path + ": larger than 64 MB");
-  }
-  if (file.bad()) throw std::runtime_error(path + ": cannot be read: " + std::strerror(errno));
-  return text;
+  const std::vector<std::byte> bytes = capture::read_file(path, largest_file);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 void write_text_file(const std::string& path, std::string_view text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text << std::flush;
-  if (!file) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
+  capture::write_file(path, std::as_bytes(std::span(text)));
 }
 
 std::string to_text(double value) {

@@ -1,4 +1,4 @@
-// Small text files, whole.
+// Text files, whole, and numbers in them.
 #pragma once
 
 #include <string>

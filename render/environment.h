@@ -65,7 +65,7 @@ void smooth_for_reflections(Environment& env, int levels = 6);
 // 4096.
 Environment environment_from_map(const capture::Image& map, double yaw_rad, int height = 256);
 
-// How directions that the probe did not see are filled.
+// How directions that the probe did not see are filled: see ProbeMapper.
 enum class Unseen { floor, mirror, mean };
 
 }  // namespace render

@@ -37,7 +37,9 @@ struct ProbeFrame {
 // however few pixels it has. Texels that are seen by less than half are filled:
 //   floor   as a floor that the seen light from above shines on
 //   mirror  as the seen directions mirrored at the plane through the lens's rim, else as `mean`
-//   mean    as the mean of all that is seen
+//   mean    as the mean of all that is seen, without what is more than 4 times as bright as the
+//   mean:
+//           the unseen side has walls and sky too, but hardly a second sun or window
 class ProbeMapper {
  public:
   // Throws std::invalid_argument: a lens that is none, a height that is not from 8 to 4096, a
@@ -64,15 +66,16 @@ class ProbeMapper {
   void correct_vignetting(const calibrate::Lens& lens);
   void find_mirrored(const calibrate::Pose& probe_from_set);
   void shrink(const capture::Image& probe);
-  void gather_row(int row, const capture::Image& source, const ProbeFrame& frame, Environment& out);
+  void gather_row(int row, const ProbeFrame& frame, Environment& out);
+  Vec3f mean_without_sources(const Environment& env) const;
+  Vec3f floor_of_light_from_above() const;
   void fill_row(int row, Vec3f fill, Environment& out);
-  Vec3f fill_radiance(const ProbeFrame& frame) const;
   float unseen_share() const;
 
   int width_, height_;  // of the probe's picture
   ProbeSettings settings_;
   ProbeGather gather_;     // weights divided by the vignetting
-  capture::Image shrunk_;  // the picture, if gather_ shrinks it
+  capture::Image shrunk_;  // the picture as it counts, shrunk, 4 channels to load at once
   std::vector<std::uint8_t> seen_;
   std::vector<std::int32_t> mirrored_;  // Unseen::mirror: per texel, the seen texel to copy, or -1
   std::vector<int> seen_in_row_;

@@ -26,6 +26,8 @@ constexpr double pixels_per_texel = 2;
 // Directions per shrunk pixel, along each side, that a texel is sampled by.
 constexpr double samples_per_pixel = 2;
 constexpr int most_samples = 8;
+// Pixels with less of a texel than this are left out; balancing makes up for it.
+constexpr float least_part = 0.01F;
 // Rounds of balancing, and how far a pixel's light may be off before them. Rims lose more for good.
 constexpr int balance_rounds = 4;
 constexpr float largest_correction = 1.5F;
@@ -137,6 +139,7 @@ class TexelSampler {
     return seen > 0.5;
   }
 
+  // One entry per pixel, the largest ones that make up nearly all.
   static std::vector<Entry> merged(std::vector<Entry>& entries) {
     std::ranges::sort(entries, {}, &Entry::pixel);
     std::vector<Entry> result;
@@ -146,6 +149,9 @@ class TexelSampler {
       result.back().weight += entry.weight;
       sum += entry.weight;
     }
+    std::erase_if(result, [sum](const Entry& entry) { return entry.weight < least_part * sum; });
+    sum = 0;
+    for (const Entry& entry : result) sum += entry.weight;
     for (Entry& entry : result) entry.weight /= sum;
     return result;
   }

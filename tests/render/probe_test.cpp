@@ -176,12 +176,17 @@ TEST(ProbeMapper, MirrorsTheUnseenHalfAtItsRim) {
   EXPECT_NEAR(env.unseen_share, 0.5F, 0.02F);
 }
 
-TEST(ProbeMapper, FillsByTheMeanOfWhatIsSeen) {
+TEST(ProbeMapper, FillsByTheMeanOfWhatIsSeenWithoutItsSun) {
   const Lens lens = fisheye(400, 90);
   ProbeMapper mapper(lens, looking_up(), {.height = 64, .unseen = Unseen::mean});
   Environment env;
   mapper.map(photograph_sky(lens, looking_up(), [](Vec3f d) { return Vec3f{d.z, 1, 1}; }), {}, env);
   EXPECT_NEAR(env.radiance.at(60, 5, 0), 0.5F, 0.01F);
+  const auto with_sun = [](Vec3f d) {
+    return d.z > 0.99F ? Vec3f{1e4F, 1e4F, 1e4F} : Vec3f{d.z, 1, 1};
+  };
+  mapper.map(photograph_sky(lens, looking_up(), with_sun), {}, env);
+  EXPECT_NEAR(env.radiance.at(60, 5, 0), 0.5F, 0.02F);
 }
 
 TEST(ProbeMapper, CountsNotANumberAndNegativeValuesAsZero) {
