@@ -64,6 +64,7 @@ struct MatchSettings {
   std::array<float, 3> gains{1, 1, 1};  // of `gains`
   std::array<int, 4> patch{};           // of `patch`: x, y, width, height in the show's picture
   std::array<float, 3> albedo{};        // of `patch`: what it is painted
+  calibrate::Vec3 normal{0, 0, 1};      // of `patch`: where it faces in the set
 };
 
 struct ProbeSettings {
@@ -79,6 +80,7 @@ struct ProbeSettings {
   std::vector<double> exposures_s;  // empty = as the source tells
   render::Unseen unseen = render::Unseen::floor;
   MatchSettings match;
+  std::optional<std::array<int, 4>> albedo_patch;  // a level spot whose implied albedo is reported
   std::vector<double> vignetting;  // 1 + v1 theta^2 + v2 theta^4 + ... divides the radiance
   std::string response;            // .rsp file of the shots; "" = recovered where needed
   capture::Transfer colour = capture::Transfer::linear;

@@ -64,15 +64,22 @@ void read_camera_pose(Section table, const fs::path& base, PoseSettings& pose) {
   table.finish();
 }
 
-bool read_crop(Section& section, std::optional<std::array<int, 4>>& crop) {
+// A rectangle [x, y, width, height] of a picture; its size is 0 where it is not known here.
+void read_rectangle(Section& section,
+                    std::string_view key,
+                    std::array<int, 2> picture,
+                    std::optional<std::array<int, 4>>& rectangle) {
   std::array<int, 4> given{};
-  if (!section.integers("crop", given, 0, 65535)) return false;
+  if (!section.integers(key, given, 0, 65535)) return;
   if (given[2] < 1 || given[3] < 1) {
-    section.fault("crop", "must be [x, y, width, height] with width and height at least 1");
-    return false;
+    section.fault(key, "must be [x, y, width, height] with width and height at least 1");
+    return;
   }
-  crop = given;
-  return true;
+  if (picture[0] > 0 && (given[0] + given[2] > picture[0] || given[1] + given[3] > picture[1])) {
+    section.fault(key, fmt::format("reaches beyond the picture of {}x{}", picture[0], picture[1]));
+    return;
+  }
+  rectangle = given;
 }
 
 // The lens of the show's picture from the lens of the source's: cropped, then resized.
@@ -106,7 +113,7 @@ void read_colour(Section& section, capture::Transfer& colour) {
   }
 }
 
-void read_match(Section& section, MatchSettings& match) {
+void read_match(Section& section, std::array<int, 2> picture, MatchSettings& match) {
   const TomlValue* given = section.value("match");
   if (given == nullptr) return;
   if (given->kind == TomlValue::Kind::array) {
@@ -117,11 +124,12 @@ void read_match(Section& section, MatchSettings& match) {
     auto table = section.table("match");
     table->need("patch", "[x, y, width, height] of a painted spot in the picture");
     table->need("albedo", "what the spot reflects, 0 to 1");
-    table->integers("patch", match.patch, 0, largest_picture_side);
-    if (table->has("patch") && (match.patch[2] < 1 || match.patch[3] < 1)) {
-      table->fault("patch", "must be [x, y, width, height] with width and height at least 1");
-    }
+    std::optional<std::array<int, 4>> patch;
+    read_rectangle(*table, "patch", picture, patch);
+    if (patch) match.patch = *patch;
     table->colour("albedo", match.albedo, {0.001, 1});
+    table->vector("normal", match.normal, {-1, 1});
+    if (calibrate::length(match.normal) < 0.5) table->fault("normal", "must be about of length 1");
     table->finish();
   } else {
     std::string word;
@@ -227,7 +235,7 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
   camera.source_place = section.place_of("source");
   read_source_key(section, "source", context.base, camera.source);
   const bool cropped = section.has("crop");
-  read_crop(section, camera.crop);
+  read_rectangle(section, "crop", {0, 0}, camera.crop);
   std::int64_t frame = 0;
   if (section.integer("frame", frame, std::int64_t{0}, std::int64_t{1} << 40)) camera.frame = frame;
   read_colour(section, camera.colour);
@@ -281,7 +289,9 @@ ProbeSettings read_probe_section(Section section, const SetContext& context) {
   probe.unseen = unseen == "mirror" ? render::Unseen::mirror
                  : unseen == "mean" ? render::Unseen::mean
                                     : render::Unseen::floor;
-  read_match(section, probe.match);
+  const std::array picture{context.show.width, context.show.height};
+  read_match(section, picture, probe.match);
+  read_rectangle(section, "albedo_patch", picture, probe.albedo_patch);
   section.numbers("vignetting", probe.vignetting, {1, 2, 3, 4}, {-1e3, 1e3});
   section.file("response", context.base, probe.response);
   read_colour(section, probe.colour);

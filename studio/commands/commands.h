@@ -5,6 +5,10 @@
 
 namespace studio {
 
+Command chart_command();
 Command check_command();
+Command hdr_command();
+Command run_command();
+Command still_command();
 
 }  // namespace studio

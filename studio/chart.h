@@ -1,0 +1,68 @@
+// Charts of error against time: what each setting of a stage costs, and what it buys.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace studio {
+
+using ChartValue = std::variant<bool, double, std::string>;
+
+// One measured setting of one method.
+struct ChartPoint {
+  std::string method;  // "split", "median cut": one colour and one legend line each
+  bool peer = false;   // another tool's
+  std::vector<std::pair<std::string, ChartValue>> settings;  // in the order to show
+  double time_ms = 0;                                        // > 0
+  double error = 0;  // as the chart's `error_name` says; >= 0
+  double error_p99 = 0;
+  std::vector<std::pair<std::string, double>> figures;  // what else was measured: flicker, memory
+  std::string label;      // a few characters beside the mark: "N 64"; "" = none
+  bool on_front = false;  // mark_front() sets it
+};
+
+struct StressorSample {
+  double value = 0;
+  double error = 0;
+  std::optional<double> reported_error;  // what the method expected of itself
+  std::string status;                    // "ok", "refused", "failed"
+};
+
+// Error while one circumstance gets worse and worse.
+struct Stressor {
+  std::string stressor;  // "angular radius of the sun"
+  std::string unit;      // "degrees"; "" = none
+  bool logarithmic = true;
+  std::vector<StressorSample> samples;  // by rising value
+};
+
+struct Chart {
+  std::string stage;  // file name: "lights"
+  std::string title;
+  std::string subtitle;                          // scene, size, threads
+  std::string time_name = "time per frame, ms";  // of the axes
+  std::string error_name = "relative RMS error";
+  std::vector<ChartPoint> points;
+  std::vector<Stressor> stressors;
+};
+
+// Marks the points of our own that no other of our own beats in both time and error.
+void mark_front(Chart& chart);
+
+// The chart as scripts read it, with the machine that measured it: design's `chart STAGE --json`.
+std::string chart_json(const Chart& chart);
+// One row a point: method, peer, every setting and figure that any point has, time, errors, front.
+std::string chart_csv(const Chart& chart);
+// The picture: error against time on logarithmic axes, then one panel for each stressor. The same
+// chart always gives the same text.
+std::string chart_svg(const Chart& chart);
+
+// Writes STAGE.json, .csv, .svg and .png into a directory, which is made if need be. Throws
+// std::invalid_argument if a time is not > 0 or a value is not finite; std::runtime_error naming
+// the file that cannot be written.
+void write_chart(const Chart& chart, const std::string& directory);
+
+}  // namespace studio

@@ -1,0 +1,67 @@
+// platelight hdr: from bracketed shots, or one HDR picture, to an EXR file.
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "capture/exr.h"
+#include "capture/make_hdr.h"
+#include "studio/commands/commands.h"
+
+namespace studio {
+namespace {
+
+struct HdrCommandOptions {
+  std::vector<std::string> shots;
+  std::string out;
+  std::string response = "auto";
+};
+
+nlohmann::ordered_json to_json(const capture::HdrResult& result) {
+  auto candidates = nlohmann::ordered_json::array();
+  for (const capture::ResponseCandidate& c : result.candidates) {
+    candidates.push_back(
+        {{"name", c.name}, {"parameters", c.parameters}, {"heldout_error", c.heldout_error}});
+  }
+  return {{"exposures_s", result.exposures_s},
+          {"response",
+           {{"name", result.response.name},
+            {"coefficients", result.response.coefficients},
+            {"heldout_error", result.heldout_error},
+            {"candidates", candidates}}},
+          {"stops", result.stops},
+          {"time_ms", result.time_ms}};
+}
+
+void hdr(const HdrCommandOptions& options, Console& console) {
+  if (!options.out.ends_with(".exr")) throw UsageError("-o must name an .exr file");
+  const capture::HdrResult result = capture::make_hdr(options.shots, {{}, options.response});
+  capture::write_exr(options.out, result.radiance);
+  console.figures(to_json(result).dump(2));
+  console.say(fmt::format("{}: {}x{}, {:.1f} stops from {} files, response {}", options.out,
+                          result.radiance.width, result.radiance.height, result.stops,
+                          options.shots.size(), result.response.name));
+}
+
+}  // namespace
+
+Command hdr_command() {
+  return {"hdr", "Merge bracketed shots to an HDR picture, or convert one",
+          "platelight hdr bracket/*.JPG -o light.exr --json light.json",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto o = std::make_shared<HdrCommandOptions>();
+            arguments.positionals("SHOTS", o->shots,
+                                  "shots with EXIF times, or one HDR or EXR file");
+            arguments.option("-o,--out", o->out, "EXR file");
+            arguments.required("--out");
+            arguments.option("--response", o->response,
+                             "auto (recovered), sRGB, linear, or a .rsp file");
+            return [o](Console& console) { hdr(*o, console); };
+          }};
+}
+
+}  // namespace studio

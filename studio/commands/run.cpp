@@ -1,0 +1,128 @@
+// platelight run: puts a set on air.
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "studio/commands/commands.h"
+#include "studio/figures.h"
+#include "studio/picture_error.h"
+#include "studio/set_watch.h"
+#include "studio/show.h"
+
+namespace studio {
+namespace {
+
+struct RunOptions {
+  std::string set;
+  bool live = false;
+  bool watch = false;
+  std::optional<std::int64_t> frames;
+  std::optional<double> fps;
+  std::optional<std::int64_t> check_error;
+  std::string record;
+  std::string exr;
+};
+
+std::string absolute(const std::string& path) { return std::filesystem::absolute(path).string(); }
+
+void apply_options(const RunOptions& options, Set& set) {
+  if (!options.record.empty()) set.record.file = absolute(options.record);
+  if (!options.exr.empty()) set.record.exr = absolute(options.exr);
+}
+
+void report_progress(const ShowStatus& status,
+                     std::optional<std::int64_t> planned,
+                     Console& console) {
+  const double share =
+      planned ? static_cast<double>(status.frames) / static_cast<double>(*planned) : 0;
+  std::string text = fmt::format("frame {}", status.frames);
+  if (planned) text += fmt::format(" of {}", *planned);
+  text += fmt::format("  {:.1f} fps  delay {:.1f}", status.fps, status.delay_frames);
+  if (status.dropped > 0) text += fmt::format("  dropped {}", status.dropped);
+  console.progress(share, text);
+}
+
+void report_end(const ShowStatus& status, const Set& set, Console& console) {
+  console.say(
+      fmt::format("{} frames at {:.2f} fps, {} dropped, {} lost in the plate; frame time "
+                  "{:.1f} ms (p99 {:.1f}), delay {:.1f} frames",
+                  status.frames, status.fps, status.dropped, status.lost_plate_frames,
+                  status.frame_ms_p50, status.frame_ms_p99, status.delay_frames));
+  console.say(fmt::format("match {:.4g} {:.4g} {:.4g}, {} lights, {:.1f} % of the light unseen",
+                          status.match.gain[0], status.match.gain[1], status.match.gain[2],
+                          status.lights, status.unseen_share * 100));
+  if (!status.match.note.empty()) console.say(status.match.note);
+  if (!set.record.file.empty()) {
+    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, set.record.file));
+  }
+  if (!set.record.exr.empty()) {
+    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, set.record.exr));
+  }
+  for (const std::string& note : status.notes) console.warn(note);
+}
+
+void run(const RunOptions& options, Console& console) {
+  Set set = read_set(options.set);
+  apply_options(options, set);
+  ShowOptions show_options;
+  show_options.live = options.live;
+  show_options.frames = options.frames;
+  Show show(set, show_options);
+  const std::optional<std::int64_t> planned = show.planned_frames();
+
+  std::unique_ptr<SetWatch> watch;
+  if (options.watch) {
+    watch = std::make_unique<SetWatch>(
+        options.set,
+        [&](Set changed) {
+          apply_options(options, changed);
+          console.say(fmt::format("{} has changed: on air", options.set));
+          show.post(ChangeSet{std::move(changed)});
+        },
+        [&](const SetError& error) { console.warn(error.what()); });
+  }
+
+  ShownFrame last;
+  show.run([&](const ShownFrame& shown) {
+    report_progress(*show.status(), planned, console);
+    last = shown;
+  });
+  watch.reset();
+
+  const ShowStatus status = *show.status();
+  report_end(status, set, console);
+  std::optional<render::PictureError> error;
+  if (options.check_error && last.result) {
+    error = error_of(last, static_cast<int>(*options.check_error));
+    console.say(fmt::format("error {:.3f} % (p99 {:.3f} %, delta E {:.2f}) over {} pixels",
+                            error->relative_rms * 100, error->p99 * 100, error->delta_e_mean,
+                            error->pixels));
+  }
+  console.figures(show_figures(set, status, error));
+  if (!status.recorder.error.empty()) throw std::runtime_error(status.recorder.error);
+}
+
+}  // namespace
+
+Command run_command() {
+  return {"run", "Put a set on air, and record it",
+          "platelight run studio/sets/real_car.toml --frames 50 --record take.mkv --json run.json",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto o = std::make_shared<RunOptions>();
+            arguments.positional("SET", o->set, "set file");
+            arguments.flag("--live", o->live, "keep to the clock: leave late frames out");
+            arguments.option("--frames", o->frames, 1, 100'000'000, "show so many frames");
+            arguments.option("--record", o->record, "record video to this .mkv file");
+            arguments.option("--exr", o->exr, "record EXR frames to this directory");
+            arguments.flag("--watch", o->watch, "take the set file over whenever it changes");
+            arguments.option("--check-error", o->check_error, 1, 1 << 20,
+                             "render the reference of the last frame with so many samples and "
+                             "report the error");
+            return [o](Console& console) { run(*o, console); };
+          }};
+}
+
+}  // namespace studio

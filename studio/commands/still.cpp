@@ -1,0 +1,58 @@
+// platelight still: one frame as a picture, with what helps to pose a set by eye.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "capture/png.h"
+#include "studio/commands/commands.h"
+#include "studio/figures.h"
+#include "studio/overlay.h"
+#include "studio/show.h"
+
+namespace studio {
+namespace {
+
+struct StillOptions {
+  std::string set;
+  std::string out;
+  std::optional<std::int64_t> frame;
+  std::vector<std::string> overlays;
+};
+
+void still(const StillOptions& options, Console& console) {
+  Set set = read_set(options.set);
+  if (options.frame) set.camera.frame = set.camera.frame.value_or(0) + *options.frame;
+  ShowOptions show_options;
+  show_options.frames = 1;
+  show_options.record = false;
+  Show show(set, show_options);
+  ShownFrame shown;
+  show.run([&](const ShownFrame& frame) { shown = frame; });
+  if (!shown.rgb8) throw std::runtime_error(set.path + ": the plate has no such frame");
+
+  std::vector<std::uint8_t> picture = *shown.rgb8;
+  draw_overlays(set, shown, options.overlays, picture);
+  capture::write_png(options.out, set.show.width, set.show.height, 3, picture);
+  console.figures(show_figures(set, *show.status(), {}));
+  console.say(fmt::format("{}: {}x{}", options.out, set.show.width, set.show.height));
+}
+
+}  // namespace
+
+Command still_command() {
+  return {"still", "Render one frame of a set to a PNG file",
+          "platelight still studio/sets/desk_car.toml -o desk.png --overlay grid,axes,stand_in",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto o = std::make_shared<StillOptions>();
+            arguments.positional("SET", o->set, "set file");
+            arguments.option("-o,--out", o->out, "PNG file");
+            arguments.required("--out");
+            arguments.option("--frame", o->frame, 0, 100'000'000, "which frame of the set");
+            arguments.choices("--overlay", o->overlays, overlay_names(), "what to draw over it");
+            return [o](Console& console) { still(*o, console); };
+          }};
+}
+
+}  // namespace studio

@@ -1,0 +1,90 @@
+// Figures of shows.
+#include "studio/figures.h"
+
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+
+namespace studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json effort_json(const render::Effort& effort) {
+  return {{"aa_samples", effort.aa_samples},   {"light_samples", effort.light_samples},
+          {"interleave", effort.interleave},   {"adaptive_visibility", effort.adaptive_visibility},
+          {"cull_lights", effort.cull_lights}, {"accuracy", effort.accuracy},
+          {"max_depth", effort.max_depth},     {"tile_size", effort.tile_size}};
+}
+
+Json record_json(const compositing::RecorderStatus& recorder) {
+  Json json{{"written", recorder.written},
+            {"dropped", recorder.dropped},
+            {"worst_write_ms", recorder.worst_write_s * 1000},
+            {"write_ms", recorder.write_s * 1000}};
+  if (!recorder.error.empty()) json["error"] = recorder.error;
+  return json;
+}
+
+}  // namespace
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+std::string show_figures(const Set& set,
+                         const ShowStatus& s,
+                         const std::optional<render::PictureError>& error) {
+  Json stage_ms;
+  for (std::size_t i = 0; i < stages; ++i) {
+    stage_ms[std::string(name_of(static_cast<Stage>(i)))] = s.stage_ms[i];
+  }
+  Json json{{"set", set.path},
+            {"width", set.show.width},
+            {"height", set.show.height},
+            {"frames", s.frames},
+            {"dropped", s.dropped},
+            {"fps", s.fps},
+            {"frame_ms", {{"p50", s.frame_ms_p50}, {"p99", s.frame_ms_p99}}},
+            {"first_frame_ms", s.first_frame_ms},
+            {"stage_ms", stage_ms},
+            {"rays",
+             {{"primary", s.statistics.primary_rays},
+              {"shadow", s.statistics.shadow_rays},
+              {"secondary", s.statistics.secondary_rays}}},
+            {"delay_frames", s.delay_frames},
+            {"delay_frames_p99", s.delay_frames_p99},
+            {"match", s.match.gain},
+            {"match_note", s.match.note},
+            {"match_pixels", s.match.pixels},
+            {"match_spread", s.match.spread},
+            {"implied_albedo", s.match.implied_albedo},
+            {"lights", s.lights},
+            {"light_error_estimate", s.light_error_estimate},
+            {"unseen_share", s.unseen_share},
+            {"lost_plate_frames", s.lost_plate_frames},
+            {"damaged_plate_frames", s.damaged_plate_frames},
+            {"clamped_values", s.statistics.clamped_values},
+            {"depth_limit_hits", s.statistics.depth_limit_hits},
+            {"clipped_plate_pixels", s.statistics.clipped_plate},
+            {"virtual_pixels", s.statistics.virtual_pixels},
+            {"affected_pixels", s.statistics.affected_pixels},
+            {"display_nan", s.display_nan},
+            {"effort", effort_json(s.effort)},
+            {"recorder", record_json(s.recorder)},
+            {"peak_memory_mb", peak_memory_mb()},
+            {"notes", s.notes}};
+  if (error) {
+    json["error"] = {
+        {"relative_rms", error->relative_rms},
+        {"p99", error->p99},
+        {"delta_e",
+         {{"mean", error->delta_e_mean}, {"p95", error->delta_e_p95}, {"p99", error->delta_e_p99}}},
+        {"pixels", error->pixels}};
+  }
+  return json.dump(2);
+}
+
+}  // namespace studio

@@ -1,0 +1,234 @@
+// Inputs of frames.
+#include "studio/frame_maker.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "studio/set_scene.h"
+
+namespace studio {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr capture::Rational rate_of_stills{25, 1};
+
+// Measures a stage from its making to its end.
+class StageTimer {
+ public:
+  StageTimer(PreparedFrame& frame, Stage stage)
+      : ms_(&frame.stage_ms[static_cast<std::size_t>(stage)]), start_(Clock::now()) {}
+  ~StageTimer() { *ms_ = std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  double* ms_;
+  Clock::time_point start_;
+};
+
+[[noreturn]] void fail(const Set& set, Place place, const std::string& message) {
+  throw SetError({{set.path, place.line, place.column, message}});
+}
+
+std::unique_ptr<Source> open_plate(const Set& set) {
+  const CameraSettings& camera = set.camera;
+  capture::CameraOptions options;
+  options.colour.transfer = camera.colour;
+  options.frame = camera.frame;
+  options.crop = camera.crop;
+  options.loop = camera.loop;
+  options.response = camera.response;
+  if (set.show.fps) options.picture_rate = *set.show.fps;
+  std::unique_ptr<Source> source;
+  try {
+    source = std::make_unique<Source>(capture::open_camera(camera.source, options));
+  } catch (const std::runtime_error& error) {
+    fail(set, camera.source_place, error.what());
+  } catch (const std::invalid_argument& error) {
+    fail(set, camera.source_place, error.what());
+  }
+  const capture::CameraInfo& info = source->info();
+  if (info.width != set.show.width || info.height != set.show.height) {
+    fail(set, camera.source_place,
+         fmt::format("the plate's picture is {}x{}, but the show is {}x{}: set show.width and "
+                     "show.height, or camera.crop",
+                     info.width, info.height, set.show.width, set.show.height));
+  }
+  return source;
+}
+
+// Whether a plate that is open serves another set as well.
+bool same_plate(const Set& a, const Set& b) {
+  return a.camera.source == b.camera.source && a.camera.frame == b.camera.frame &&
+         a.camera.crop == b.camera.crop && a.camera.colour == b.camera.colour &&
+         a.camera.response == b.camera.response && a.camera.loop == b.camera.loop;
+}
+
+calibrate::Lens lens_of(const Set& set) {
+  if (set.camera.lens.width > 0) return set.camera.lens;
+  // A set without objects needs no lens; the kernel wants directions all the same.
+  const auto [width, height] = std::pair(set.show.width, set.show.height);
+  return {"pinhole",
+          width,
+          height,
+          {static_cast<double>(width), static_cast<double>(width), (width - 1) / 2.0,
+           (height - 1) / 2.0}};
+}
+
+std::optional<calibrate::Track> track_of(const Set& set) {
+  if (set.camera.pose.track.empty()) return std::nullopt;
+  try {
+    return calibrate::read_track(set.camera.pose.track);
+  } catch (const std::runtime_error& error) {
+    fail(set, set.camera.pose_place, error.what());
+  }
+}
+
+double seconds(capture::Time time) { return std::chrono::duration<double>(time).count(); }
+
+}  // namespace
+
+std::string_view name_of(Stage stage) {
+  switch (stage) {
+    case Stage::capture:
+      return "capture";
+    case Stage::probe:
+      return "probe";
+    case Stage::job:
+      return "job";
+    case Stage::render:
+      return "render";
+    case Stage::display:
+      return "display";
+    case Stage::record:
+      return "record";
+  }
+  return "";
+}
+
+FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate)
+    : set_(std::move(set)),
+      plate_(open_plate(set_)),
+      light_(std::make_unique<LightFeed>(set_)),
+      track_(track_of(set_)),
+      directions_(std::make_shared<calibrate::DirectionTable>(
+          calibrate::make_direction_table(lens_of(set_)))) {
+  const capture::Rational plate_rate = plate_->info().rate;
+  const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
+  rate_ = rate.value_or(set_.show.fps.value_or(own));
+  build_scene();
+}
+
+void FrameMaker::build_scene() {
+  render::SceneDescription description = describe_scene(set_);
+  description.version = ++scene_version_;
+  try {
+    scene_ = std::make_shared<render::Scene>(std::move(description));
+  } catch (const std::invalid_argument& error) {
+    fail(set_, {}, error.what());
+  }
+  lamps_ = describe_lamps(set_);
+}
+
+bool FrameMaker::is_endless() const { return plate_->is_still() || set_.camera.loop; }
+
+capture::Time FrameMaker::time_of(std::int64_t frame) const {
+  return plate_->first().time + capture::time_of_frame(frame, rate_);
+}
+
+std::shared_ptr<const capture::HalfImage> FrameMaker::half_plate(const capture::Frame& frame) {
+  if (frame.image == last_image_ && last_plate_ != nullptr) return last_plate_;
+  auto plate = std::make_shared<capture::HalfImage>();
+  if (frame.image != nullptr) {
+    *plate = capture::to_half(*frame.image);
+  } else {  // nothing has ever arrived
+    *plate = capture::to_half(capture::make_image(set_.show.height, set_.show.width));
+  }
+  last_image_ = frame.image;
+  last_plate_ = std::move(plate);
+  return last_plate_;
+}
+
+std::optional<PreparedFrame> FrameMaker::make(std::int64_t number) {
+  PreparedFrame prepared;
+  const capture::Time time = time_of(number);
+  prepared.arrived = Clock::now();
+
+  std::optional<capture::Frame> frame;
+  {
+    const StageTimer timer(prepared, Stage::capture);
+    frame = plate_->at(time);
+    if (!frame) return std::nullopt;
+    prepared.plate = half_plate(*frame);
+    prepared.plate_status = frame->status;
+    prepared.sound = plate_->take_sound();
+  }
+
+  render::FrameJob& job = prepared.job;
+  job.cam_from_set = track_ ? calibrate::pose_at(*track_, seconds(frame->time)).cam_from_set
+                            : set_.camera.pose.cam_from_set;
+  Light light;
+  {
+    const StageTimer timer(prepared, Stage::probe);
+    light = light_->at(
+        {time, frame->image.get(), directions_.get(), job.cam_from_set, set_.effort.light_samples});
+  }
+
+  {
+    const StageTimer timer(prepared, Stage::job);
+    job.frame = number;
+    job.time = time;
+    job.scene_version = scene_version_;
+    job.effort = set_.effort;
+    job.textures = {{0, frame->time}, {1, light.time}};
+    job.lights = std::move(light.table);
+    job.lights.lamps.insert(job.lights.lamps.end(), lamps_.begin(), lamps_.end());
+    job.match = light.match.gain;
+    prepared.match = std::move(light.match);
+    prepared.environment = std::move(light.environment);
+    prepared.scene = scene_;
+    prepared.directions = directions_;
+  }
+  return prepared;
+}
+
+void FrameMaker::move_object(const std::string& name, const PlacementSettings& pose) {
+  const auto object = std::ranges::find(set_.objects, name, &ObjectSettings::name);
+  if (object == set_.objects.end()) {
+    throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
+  }
+  object->pose = pose;
+  build_scene();
+}
+
+void FrameMaker::change_set(Set set) {
+  const bool same_picture = set.show.width == set_.show.width &&
+                            set.show.height == set_.show.height && set.show.fps == set_.show.fps;
+  if (!same_picture) {
+    throw std::invalid_argument("the picture's size and rate cannot change on air: start anew");
+  }
+  if (!same_plate(set, set_)) {
+    throw std::invalid_argument("the plate's source cannot change on air: start anew");
+  }
+  // All that may fail comes before anything is taken over.
+  auto light = std::make_unique<LightFeed>(set);
+  auto track = track_of(set);
+  auto directions =
+      std::make_shared<calibrate::DirectionTable>(calibrate::make_direction_table(lens_of(set)));
+  Set before = std::exchange(set_, std::move(set));
+  try {
+    build_scene();
+  } catch (const SetError&) {
+    set_ = std::move(before);
+    throw;
+  }
+  light_ = std::move(light);
+  track_ = std::move(track);
+  directions_ = std::move(directions);
+}
+
+}  // namespace studio

@@ -1,0 +1,87 @@
+// Makes what each frame is rendered from: the show's side before the kernel.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibrate/lens.h"
+#include "calibrate/track.h"
+#include "capture/image.h"
+#include "render/renderer.h"
+#include "studio/light_feed.h"
+#include "studio/set.h"
+#include "studio/source.h"
+
+namespace studio {
+
+// Stages of a frame, in their order.
+enum class Stage { capture, probe, job, render, display, record };
+inline constexpr std::size_t stages = 6;
+std::string_view name_of(Stage stage);
+
+// All that a frame is rendered from, and its way so far. Immutable once made.
+struct PreparedFrame {
+  render::FrameJob job;
+  std::shared_ptr<const capture::HalfImage> plate;
+  std::shared_ptr<const render::Environment> environment;
+  std::shared_ptr<const render::Scene> scene;
+  std::shared_ptr<const calibrate::DirectionTable> directions;
+  std::vector<capture::Sound> sound;
+  std::chrono::steady_clock::time_point arrived;  // of the plate
+  render::MatchResult match;
+  capture::FrameStatus plate_status = capture::FrameStatus::good;
+  std::array<double, stages> stage_ms{};  // capture, probe and job are set
+
+  render::FrameInputs inputs() const { return {scene.get(), directions.get(), environment.get()}; }
+};
+
+// One thread uses it. All memory across frames (sources, followed light, match) lives here, so the
+// frames depend on the set and the commands, and not on timing.
+class FrameMaker {
+ public:
+  // Opens the set's sources and builds its scene. `rate` replaces the set's. Throws SetError with
+  // all faults that only opening shows, each at its place.
+  explicit FrameMaker(Set set, std::optional<capture::Rational> rate = std::nullopt);
+
+  const Set& set() const { return set_; }
+  capture::Rational rate() const { return rate_; }
+  const Source& plate() const { return *plate_; }
+  // Whether the plate is a single picture, so that frames never end by themselves.
+  bool is_endless() const;
+
+  // Time of show frame n on the plate's clock.
+  capture::Time time_of(std::int64_t frame) const;
+  // Frames must ascend. Nothing after the plate's end.
+  std::optional<PreparedFrame> make(std::int64_t frame);
+
+  void set_effort(const render::Effort& effort) { set_.effort = effort; }
+  // Throws std::invalid_argument if no object has that name.
+  void move_object(const std::string& name, const PlacementSettings& pose);
+  // Takes over another set file's content. Sources that stay the same run on. Throws SetError and
+  // changes nothing if it cannot be used, std::invalid_argument if the picture's size or rate
+  // differ.
+  void change_set(Set set);
+
+ private:
+  void build_scene();
+  std::shared_ptr<const capture::HalfImage> half_plate(const capture::Frame& frame);
+
+  Set set_;
+  capture::Rational rate_;
+  std::unique_ptr<Source> plate_;
+  std::unique_ptr<LightFeed> light_;
+  std::optional<calibrate::Track> track_;
+  std::shared_ptr<const render::Scene> scene_;
+  std::shared_ptr<const calibrate::DirectionTable> directions_;
+  std::vector<render::LocalLight> lamps_;
+  std::uint64_t scene_version_ = 0;
+  std::shared_ptr<const capture::Image> last_image_;  // that last_plate_ was made from
+  std::shared_ptr<const capture::HalfImage> last_plate_;
+};
+
+}  // namespace studio

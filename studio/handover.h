@@ -1,0 +1,49 @@
+// Hands values from one thread to another, one at a time.
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+namespace studio {
+
+// The giver goes on only once its value is taken, so it works one value ahead of the taker, never
+// two.
+template <class T>
+class Handover {
+ public:
+  // Waits until the value is taken. False, and nothing given, once closed.
+  bool give(T value) {
+    std::unique_lock lock(mutex_);
+    if (closed_) return false;
+    value_ = std::move(value);
+    changed_.notify_all();
+    changed_.wait(lock, [&] { return closed_ || !value_; });
+    return !value_;
+  }
+
+  // Waits for a value. Nothing once closed and empty.
+  std::optional<T> take() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || value_; });
+    std::optional<T> value = std::exchange(value_, std::nullopt);
+    changed_.notify_all();
+    return value;
+  }
+
+  // Nothing more will be given; what waits may still be taken.
+  void close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<T> value_;
+  bool closed_ = false;
+};
+
+}  // namespace studio

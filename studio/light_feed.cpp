@@ -1,0 +1,183 @@
+// Light of shows.
+#include "studio/light_feed.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace studio {
+namespace {
+
+constexpr int environment_height = 256;
+// The gain is averaged over about this many frames, and starts anew on a change beyond noise.
+constexpr double gain_frames = 12;
+constexpr double sudden_gain = 0.2;
+// Smaller changes than this leave the environment as it is.
+constexpr double gain_step = 0.01;
+
+[[noreturn]] void fail(const Set& set, const std::string& message) {
+  const Place place = set.probe->source_place;
+  throw SetError({{set.path, place.line, place.column, message}});
+}
+
+std::shared_ptr<render::Environment> darkness() {
+  auto env = std::make_shared<render::Environment>();
+  env->radiance = capture::make_image(8, 16, 3);
+  env->seen.assign(8 * 16, 0);
+  render::smooth_for_reflections(*env);
+  return env;
+}
+
+void scale(render::Environment& env, const std::array<float, 3>& gain) {
+  std::vector<float>& pixels = env.radiance.pixels;
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] *= gain[i % 3];
+}
+
+// The mean of the plate's pixels that look down: what the floor sends. Every eighth row and column
+// will do.
+std::optional<calibrate::Vec3f> floor_of_plate(const LightRequest& request) {
+  if (request.plate == nullptr || request.directions == nullptr) return std::nullopt;
+  constexpr int step = 8;
+  constexpr double level = -0.05;  // z of a direction just under the horizon
+  const calibrate::DirectionTable& directions = *request.directions;
+  const auto& m = request.cam_from_set.R.m;
+  std::array<double, 3> sum{};
+  int pixels = 0;
+  for (int y = 0; y < directions.height; y += step) {
+    for (int x = 0; x < directions.width; x += step) {
+      const std::size_t i = directions.index(y, x);
+      const double up = m[2] * directions.x[i] + m[5] * directions.y[i] + m[8] * directions.z[i];
+      if (!(up < level)) continue;
+      for (int c = 0; c < 3; ++c) {
+        sum[static_cast<std::size_t>(c)] += render::counted_radiance(request.plate->at(y, x, c));
+      }
+      ++pixels;
+    }
+  }
+  if (pixels == 0) return std::nullopt;
+  return calibrate::to_float({sum[0] / pixels, sum[1] / pixels, sum[2] / pixels});
+}
+
+}  // namespace
+
+LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
+  if (!settings_) {
+    environment_ = darkness();
+    return;
+  }
+  source_ = std::make_unique<ProbeSource>(set);
+  const capture::Image& first = *source_->at(capture::Time::min() / 2).image;
+  if (settings_->match.method == MatchSettings::Method::gains) {
+    match_ = render::match_given(settings_->match.gains);
+  }
+  if (!settings_->lens) {
+    if (first.width != 2 * first.height) {
+      fail(set, "a latitude-longitude map must be twice as wide as high");
+    }
+    return;
+  }
+  const calibrate::Lens& lens = *settings_->lens;
+  if (first.width != lens.width || first.height != lens.height) {
+    fail(set, "the probe's picture is " + std::to_string(first.width) + "x" +
+                  std::to_string(first.height) + ", but its lens is for " +
+                  std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  }
+  render::ProbeSettings mapping;
+  mapping.height = environment_height;
+  mapping.unseen = settings_->unseen;
+  mapping.vignetting = settings_->vignetting;
+  try {
+    mapper_ = std::make_unique<render::ProbeMapper>(lens, settings_->probe_from_set, mapping);
+  } catch (const std::invalid_argument& error) {
+    fail(set, error.what());
+  }
+}
+
+void LightFeed::build_environment(const LightRequest& request) {
+  auto env = std::make_shared<render::Environment>();
+  if (mapper_) {
+    render::ProbeFrame frame{match_.gain, {}};
+    if (settings_->unseen == render::Unseen::floor) frame.floor_radiance = floor_of_plate(request);
+    mapper_->map(*radiance_, frame, *env);
+  } else {
+    *env = render::environment_from_map(*radiance_, settings_->yaw_rad, environment_height);
+    scale(*env, match_.gain);
+  }
+  environment_ = std::move(env);
+}
+
+// Of the plate over the environment as it is now, which already holds the gain so far.
+render::MatchResult LightFeed::measure_match(const LightRequest& request) const {
+  const MatchSettings& match = settings_->match;
+  if (match.method == MatchSettings::Method::patch) {
+    const auto [x, y, width, height] = match.patch;
+    const calibrate::Vec3f normal = calibrate::to_float(calibrate::normalize(match.normal));
+    return render::match_by_patch(*request.plate, {x, y, width, height}, match.albedo,
+                                  render::irradiance_of(*environment_, normal));
+  }
+  return render::match_by_overlap(*request.plate, *request.directions, request.cam_from_set,
+                                  *environment_);
+}
+
+// Follows the plate's exposure and white. True if the gain has changed.
+bool LightFeed::follow_match(const LightRequest& request) {
+  if (settings_->match.method == MatchSettings::Method::gains) return false;
+  if (request.plate == nullptr || (matched_ && request.plate == matched_plate_)) return false;
+  matched_plate_ = request.plate;
+  render::MatchResult measured = measure_match(request);
+  const bool found = measured.pixels > 0;
+  bool changed = false;
+  std::array<float, 3> gain = match_.gain;
+  for (std::size_t c = 0; found && c < 3; ++c) {
+    const double now = static_cast<double>(match_.gain[c]) * measured.gain[c];
+    const bool anew = !matched_ || std::abs(now / averaged_gain_[c] - 1) > sudden_gain;
+    averaged_gain_[c] = anew ? now : averaged_gain_[c] + (now - averaged_gain_[c]) / gain_frames;
+    changed = changed || std::abs(averaged_gain_[c] / gain[c] - 1) > gain_step;
+  }
+  for (std::size_t c = 0; changed && c < 3; ++c) gain[c] = static_cast<float>(averaged_gain_[c]);
+  matched_ = matched_ || found;
+  match_ = std::move(measured);
+  match_.gain = gain;
+  return changed;
+}
+
+void LightFeed::update_environment(const LightRequest& request) {
+  const ProbeSource::Radiance newest = source_->at(request.time);
+  const bool fresh = newest.image != radiance_;
+  radiance_ = newest.image;
+  if (fresh) build_environment(request);
+  const bool new_gain = follow_match(request);
+  if (new_gain) build_environment(request);
+  if (!fresh && !new_gain) return;
+  render::smooth_for_reflections(*environment_);
+  table_count_ = 0;
+}
+
+Light LightFeed::at(const LightRequest& request) {
+  Light light;
+  light.time = request.time;
+  if (settings_) {
+    update_environment(request);
+    light.time = source_->at(request.time).time;
+    if (settings_->albedo_patch && request.plate != nullptr) {
+      const auto [x, y, width, height] = *settings_->albedo_patch;
+      render::Vec3f unmatched = render::irradiance_of(*environment_, {0, 0, 1});
+      unmatched = {unmatched.x / match_.gain[0], unmatched.y / match_.gain[1],
+                   unmatched.z / match_.gain[2]};
+      render::imply_albedo(*request.plate, {x, y, width, height}, unmatched, match_);
+    }
+  }
+  if (table_count_ != request.light_samples) {
+    render::LightFollowerSettings following;
+    following.table.count = request.light_samples;
+    table_ = follower_.follow(*environment_, following);
+    table_.unseen_share = environment_->unseen_share;
+    table_count_ = request.light_samples;
+  }
+  light.table = table_;
+  light.environment = environment_;
+  light.match = match_;
+  return light;
+}
+
+}  // namespace studio

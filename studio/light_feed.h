@@ -1,0 +1,68 @@
+// The light of a show: from the probe's radiance to what the kernel is lit by, frame by frame.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "calibrate/lens.h"
+#include "calibrate/pose.h"
+#include "capture/image.h"
+#include "render/environment.h"
+#include "render/light_follower.h"
+#include "render/light_table.h"
+#include "render/match.h"
+#include "render/probe.h"
+#include "studio/probe_source.h"
+#include "studio/set.h"
+
+namespace studio {
+
+// The light of one frame, in the plate's units.
+struct Light {
+  std::shared_ptr<const render::Environment> environment;  // never null
+  render::LightTable table;                                // without the set's own lamps
+  render::MatchResult match;
+  capture::Time time{};  // of the probe's newest shot
+};
+
+// What a frame tells of itself.
+struct LightRequest {
+  capture::Time time{};                   // of the show
+  const capture::Image* plate = nullptr;  // (height, width, 3); null = none arrived yet
+  const calibrate::DirectionTable* directions = nullptr;
+  calibrate::Pose cam_from_set;
+  int light_samples = 64;
+};
+
+// One thread uses it. Memory across frames (the followed light, the match) lives here.
+class LightFeed {
+ public:
+  // Opens the probe of a set; a set without one is lit by nothing. Throws SetError.
+  explicit LightFeed(const Set& set);
+
+  Light at(const LightRequest& request);
+
+ private:
+  void update_environment(const LightRequest& request);
+  void build_environment(const LightRequest& request);
+  render::MatchResult measure_match(const LightRequest& request) const;
+  bool follow_match(const LightRequest& request);
+
+  std::optional<ProbeSettings> settings_;
+  std::unique_ptr<ProbeSource> source_;
+  std::unique_ptr<render::ProbeMapper> mapper_;  // null = latitude-longitude
+  render::LightFollower follower_;
+  std::shared_ptr<const capture::Image> radiance_;  // that the environment was made from
+  const capture::Image* matched_plate_ = nullptr;
+  bool matched_ = false;
+  std::array<double, 3> averaged_gain_{1, 1, 1};
+  render::MatchResult match_;
+  // Made anew for every change, and never touched once it was handed out.
+  std::shared_ptr<render::Environment> environment_;
+  render::LightTable table_;  // of environment_, if it is not stale
+  int table_count_ = 0;       // that it was made for; 0 = stale
+};
+
+}  // namespace studio

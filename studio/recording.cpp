@@ -1,0 +1,67 @@
+// Recordings of shows.
+#include "studio/recording.h"
+
+#include <optional>
+
+#include "compositing/timecode.h"
+#include "studio/show.h"
+
+namespace studio {
+namespace {
+
+// Stretches of sound that follow each other, as one.
+std::optional<capture::Sound> joined(const std::vector<capture::Sound>& pieces) {
+  if (pieces.empty()) return std::nullopt;
+  capture::Sound whole = pieces.front();
+  for (std::size_t i = 1; i < pieces.size(); ++i) {
+    const std::vector<float>& more = pieces[i].samples;
+    whole.samples.insert(whole.samples.end(), more.begin(), more.end());
+  }
+  return whole;
+}
+
+}  // namespace
+
+void Recording::start(const RecordSettings& settings) {
+  stop();
+  compositing::RecorderSettings recorder;
+  recorder.file = settings.file;
+  recorder.exr_dir = settings.exr;
+  recorder.rate = form_.rate;
+  recorder.width = form_.width;
+  recorder.height = form_.height;
+  if (!settings.codec.empty()) recorder.codec = settings.codec;
+  if (!settings.timecode.empty()) {
+    recorder.start = compositing::parse_timecode(settings.timecode, form_.rate);
+  }
+  recorder.transfer = form_.transfer;
+  recorder.sound_channels = form_.sound_channels;
+  recorder.sound_rate = form_.sound_rate;
+  recorder_ = std::make_unique<compositing::Recorder>(recorder);
+}
+
+void Recording::stop() {
+  if (!recorder_) return;
+  recorder_->close();
+  last_status_ = recorder_->status();
+  recorder_.reset();
+}
+
+void Recording::record(const ShownFrame& shown, bool wait) {
+  if (!recorder_) return;
+  if (wait) recorder_->wait_for_room();
+  compositing::RecordedFrame frame;
+  frame.number = shown.prepared.job.frame;
+  frame.time = shown.prepared.job.time;
+  frame.rgba = {shown.result, &shown.result->rgba};
+  frame.matte = {shown.result, &shown.result->matte};
+  frame.display_rgb8 = shown.rgb8;
+  frame.sound = joined(shown.prepared.sound);
+  recorder_->push(std::move(frame));
+}
+
+compositing::RecorderStatus Recording::status() const {
+  return recorder_ ? recorder_->status() : last_status_;
+}
+
+}  // namespace studio

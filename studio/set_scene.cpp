@@ -1,0 +1,237 @@
+// Scenes of sets.
+#include "studio/set_scene.h"
+
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <stdexcept>
+#include <tuple>
+
+#include <fmt/format.h>
+
+#include "compositing/stand_in.h"
+#include "render/load_mesh.h"
+#include "render/standard.h"
+
+namespace studio {
+namespace {
+
+using render::Instance;
+using render::Mesh;
+using render::SceneDescription;
+
+using Matrix = std::array<float, 12>;
+
+// a * b of rows of 3x4 matrices whose fourth row is 0 0 0 1.
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix c{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 4; ++j) {
+      float sum = j == 3 ? a[i * 4 + 3] : 0;
+      for (std::size_t k = 0; k < 3; ++k) sum += a[i * 4 + k] * b[k * 4 + j];
+      c[i * 4 + j] = sum;
+    }
+  }
+  return c;
+}
+
+// The materials of a model whose textures now start at `offset`.
+void shift_textures(render::Material& material, std::int32_t offset) {
+  if (material.shader != "standard") return;
+  render::StandardParameters p;
+  std::memcpy(&p, material.parameters.data(), sizeof p);
+  for (std::int32_t* texture :
+       {&p.base_color_texture, &p.metallic_roughness_texture, &p.normal_texture,
+        &p.clearcoat_texture, &p.transmission_texture, &p.emission_texture}) {
+    if (*texture >= 0) *texture += offset;
+  }
+  std::memcpy(material.parameters.data(), &p, sizeof p);
+}
+
+// Adds a model's meshes, textures and materials to the scene, and returns its instances, whose
+// meshes are the scene's.
+std::vector<Instance> add_model(SceneDescription& scene, SceneDescription model) {
+  const auto first_mesh = static_cast<std::uint32_t>(scene.meshes.size());
+  const auto first_texture = static_cast<std::int32_t>(scene.textures.size());
+  const auto first_material = static_cast<std::uint32_t>(scene.materials.size());
+  for (const auto& mesh : model.meshes) {
+    Mesh moved = *mesh;
+    for (std::uint32_t& material : moved.materials) material += first_material;
+    scene.meshes.push_back(std::make_shared<Mesh>(std::move(moved)));
+  }
+  for (auto& texture : model.textures) scene.textures.push_back(std::move(texture));
+  for (render::Material& material : model.materials) {
+    shift_textures(material, first_texture);
+    scene.materials.push_back(std::move(material));
+  }
+  for (Instance& instance : model.instances) instance.mesh += first_mesh;
+  return std::move(model.instances);
+}
+
+SceneDescription load_object(const ObjectSettings& object) {
+  render::LoadOptions options;
+  options.hide = object.hide;
+  options.emission_gain = static_cast<float>(object.emission_gain);
+  return render::load_model(object.mesh, options).scene;
+}
+
+Mesh plane_mesh(double width_m, double depth_m, std::uint32_t material) {
+  const auto x = static_cast<float>(width_m / 2);
+  const auto y = static_cast<float>(depth_m / 2);
+  Mesh mesh;
+  mesh.positions = {{-x, -y, 0}, {x, -y, 0}, {x, y, 0}, {-x, y, 0}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  mesh.materials = {material};
+  return mesh;
+}
+
+// Corner i has x from bit 0, y from bit 1, z from bit 2; the box stands on z = 0.
+Mesh box_mesh(calibrate::Vec3 size, std::uint32_t material) {
+  Mesh mesh;
+  for (unsigned i = 0; i < 8; ++i) {
+    mesh.positions.push_back(calibrate::to_float(
+        {(i & 1U ? 0.5 : -0.5) * size.x, (i & 2U ? 0.5 : -0.5) * size.y, i & 4U ? size.z : 0.0}));
+  }
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  mesh.materials = {material};
+  return mesh;
+}
+
+render::Material stand_in_material(const StandInSettings& stand_in, const std::string& name) {
+  render::StandInParameters p;
+  for (std::size_t c = 0; c < 3; ++c) p.albedo[c] = stand_in.albedo[c];
+  p.reflectance = stand_in.reflectance;
+  p.roughness = stand_in.roughness;
+  p.catches_shadow = stand_in.catches_shadow ? 1 : 0;
+  p.catches_reflection = stand_in.catches_reflection ? 1 : 0;
+  p.catches_light = stand_in.catches_light ? 1 : 0;
+  return compositing::make_stand_in_material(name, p);
+}
+
+void add_stand_in(SceneDescription& scene, const StandInSettings& stand_in, std::size_t number) {
+  const std::string name =
+      stand_in.name.empty() ? fmt::format("stand-in {}", number) : stand_in.name;
+  const auto material = static_cast<std::uint32_t>(scene.materials.size());
+  std::vector<Instance> parts;
+  if (stand_in.shape == StandInSettings::Shape::mesh) {
+    // Its own materials do not matter: the plate shows what it looks like.
+    SceneDescription model = render::load_model(stand_in.mesh).scene;
+    for (const auto& mesh : model.meshes) {
+      Mesh bare = *mesh;
+      bare.materials = {material};
+      bare.uvs.clear();
+      bare.tangents.clear();
+      scene.meshes.push_back(std::make_shared<Mesh>(std::move(bare)));
+    }
+    const auto first = static_cast<std::uint32_t>(scene.meshes.size() - model.meshes.size());
+    for (Instance& instance : model.instances) instance.mesh += first;
+    parts = std::move(model.instances);
+  } else {
+    const bool box = stand_in.shape == StandInSettings::Shape::box;
+    scene.meshes.push_back(
+        std::make_shared<Mesh>(box ? box_mesh(stand_in.size, material)
+                                   : plane_mesh(stand_in.size.x, stand_in.size.y, material)));
+    Instance part;
+    part.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+    parts.push_back(part);
+  }
+  scene.materials.push_back(stand_in_material(stand_in, name));
+  const Matrix set_from_stand_in = matrix_of(stand_in.pose);
+  for (Instance& part : parts) {
+    part.name = name;
+    part.kind = render::ObjectKind::stand_in;
+    part.blocks_light = stand_in.blocks_light;
+    part.set_from_object = product(set_from_stand_in, part.set_from_object);
+    scene.instances.push_back(std::move(part));
+  }
+}
+
+void place_copies(SceneDescription& scene,
+                  const ObjectSettings& object,
+                  const std::string& name,
+                  const std::vector<Instance>& parts) {
+  const Matrix set_from_object = matrix_of(object.pose);
+  for (int row = 0; row < object.copies[1]; ++row) {
+    for (int column = 0; column < object.copies[0]; ++column) {
+      // Steps are metres of the set, so the object's scale does not count.
+      const double scale = object.pose.scale;
+      Matrix step{1, 0, 0, static_cast<float>(column * object.spacing_m[0] / scale),
+                  0, 1, 0, static_cast<float>(row * object.spacing_m[1] / scale),
+                  0, 0, 1, 0};
+      const Matrix set_from_copy = product(set_from_object, step);
+      for (Instance part : parts) {
+        part.name = fmt::format("{}/{}", name, part.name);
+        part.set_from_object = product(set_from_copy, part.set_from_object);
+        scene.instances.push_back(std::move(part));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::array<float, 12> matrix_of(const PlacementSettings& placement) {
+  const double cy = std::cos(placement.yaw_rad);
+  const double sy = std::sin(placement.yaw_rad);
+  const double ct = std::cos(placement.tilt_rad);
+  const double st = std::sin(placement.tilt_rad);
+  const double s = placement.scale;
+  const std::array<double, 12> rows{s * cy, -s * sy * ct, s * sy * st,  placement.position.x,
+                                    s * sy, s * cy * ct,  -s * cy * st, placement.position.y,
+                                    0,      s * st,       s * ct,       placement.position.z};
+  std::array<float, 12> result{};
+  for (std::size_t i = 0; i < rows.size(); ++i) result[i] = static_cast<float>(rows[i]);
+  return result;
+}
+
+SceneDescription describe_scene(const Set& set) {
+  SceneDescription scene;
+  scene.background = "plate";
+  Faults faults(set.path);
+  // A model that several objects show is held once.
+  std::map<std::tuple<std::string, std::string, std::vector<std::string>, double>,
+           std::vector<Instance>>
+      loaded;
+  for (std::size_t i = 0; i < set.objects.size(); ++i) {
+    const ObjectSettings& object = set.objects[i];
+    const std::string name = object.name.empty() ? fmt::format("object {}", i + 1) : object.name;
+    try {
+      const auto key = std::tuple(object.mesh, object.made, object.hide, object.emission_gain);
+      auto found = loaded.find(key);
+      if (found == loaded.end()) {
+        found = loaded.emplace(key, add_model(scene, load_object(object))).first;
+      }
+      place_copies(scene, object, name, found->second);
+    } catch (const std::runtime_error& error) {
+      faults.add(object.place, error.what());
+    } catch (const std::invalid_argument& error) {
+      faults.add(object.place, error.what());
+    }
+  }
+  for (std::size_t i = 0; i < set.stand_ins.size(); ++i) {
+    try {
+      add_stand_in(scene, set.stand_ins[i], i + 1);
+    } catch (const std::runtime_error& error) {
+      faults.add(set.stand_ins[i].place, error.what());
+    }
+  }
+  if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+  if (scene.instances.size() > static_cast<std::size_t>(most_instances)) {
+    faults.add({}, fmt::format("{} instances of parts, but a set holds at most {}",
+                               scene.instances.size(), most_instances));
+    throw SetError(faults.sorted());
+  }
+  return scene;
+}
+
+std::vector<render::LocalLight> describe_lamps(const Set& set) {
+  std::vector<render::LocalLight> lamps;
+  for (const LampSettings& lamp : set.lamps) {
+    const auto& [red, green, blue] = lamp.intensity;
+    lamps.push_back({calibrate::to_float(lamp.position), {}, {red, green, blue}});
+  }
+  return lamps;
+}
+
+}  // namespace studio

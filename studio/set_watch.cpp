@@ -1,0 +1,37 @@
+// Set files, watched.
+#include "studio/set_watch.h"
+
+#include <chrono>
+#include <system_error>
+#include <utility>
+
+namespace studio {
+
+using namespace std::chrono_literals;
+
+SetWatch::SetWatch(std::string path,
+                   std::function<void(Set)> changed,
+                   std::function<void(const SetError&)> refused)
+    : path_(std::move(path)),
+      changed_(std::move(changed)),
+      refused_(std::move(refused)),
+      seen_(std::filesystem::last_write_time(path_)),
+      thread_([this](const std::stop_token& stop) { watch(stop); }) {}
+
+void SetWatch::watch(const std::stop_token& stop) const {
+  std::filesystem::file_time_type seen = seen_;
+  while (!stop.stop_requested()) {
+    std::this_thread::sleep_for(250ms);
+    std::error_code error;  // editors replace a file: for a moment there is none
+    const auto now = std::filesystem::last_write_time(path_, error);
+    if (error || now == seen) continue;
+    seen = now;
+    try {
+      changed_(read_set(path_));
+    } catch (const SetError& fault) {
+      refused_(fault);
+    }
+  }
+}
+
+}  // namespace studio

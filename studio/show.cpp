@@ -1,0 +1,321 @@
+// The loop: inputs on one thread, pictures on another.
+#include "studio/show.h"
+
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "compositing/display.h"
+#include "render/kept_visibility.h"
+#include "studio/handover.h"
+#include "studio/recording.h"
+#include "studio/tally.h"
+
+namespace studio {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t most_notes = 10;
+
+template <class... Handlers>
+struct Overloaded : Handlers... {
+  using Handlers::operator()...;
+};
+
+// What the recording is to do from a frame on.
+using RecorderCommand = std::variant<StartRecording, StopRecording>;
+
+// What travels from the thread that makes inputs to the one that makes pictures.
+struct Work {
+  PreparedFrame frame;
+  std::int64_t dropped = 0;  // frames left out so far
+  capture::CameraStatistics plate;
+  std::vector<RecorderCommand> recorder;  // before this frame
+};
+
+compositing::DisplaySettings display_settings(const Set& set) {
+  compositing::DisplaySettings settings;
+  if (!set.display.display.empty()) settings.display = set.display.display;
+  if (!set.display.view.empty()) settings.view = set.display.view;
+  return settings;
+}
+
+// Buffers that others may still hold (the recorder, an observer) are left to them.
+template <class T>
+std::shared_ptr<T> free_one(std::vector<std::shared_ptr<T>>& pool) {
+  for (const auto& one : pool) {
+    if (one.use_count() == 1) return one;
+  }
+  pool.push_back(std::make_shared<T>());
+  return pool.back();
+}
+
+// Throws SetError at `place` for what goes wrong in `make`.
+template <class Make>
+auto at_place(const Set& set, Place place, const Make& make) {
+  try {
+    return make();
+  } catch (const std::runtime_error& error) {
+    throw SetError({{set.path, place.line, place.column, error.what()}});
+  } catch (const std::invalid_argument& error) {
+    throw SetError({{set.path, place.line, place.column, error.what()}});
+  }
+}
+
+RecordingForm form_of(const FrameMaker& maker) {
+  const Set& set = maker.set();
+  const capture::CameraInfo& plate = maker.plate().info();
+  const bool srgb = display_settings(set).display == "sRGB";
+  return {set.show.width,       set.show.height,
+          maker.rate(),         srgb ? capture::Transfer::srgb : capture::Transfer::rec1886,
+          plate.sound_channels, plate.sound_rate};
+}
+
+}  // namespace
+
+class Show::Stages {
+ public:
+  Stages(Set set, const ShowOptions& options)
+      : options_(options), maker_(std::move(set), options.rate), recording_(form_of(maker_)) {
+    const Set& s = maker_.set();
+    if (options.live) tally_.set_period_ms(1000 / maker_.rate().value());
+    display_ = at_place(s, s.display.place, [&] {
+      return std::make_unique<compositing::Display>(display_settings(s));
+    });
+    frames_ = options.frames ? options.frames : s.show.frames;
+    if (!frames_ && !options.live && maker_.is_endless()) frames_ = 1;
+    planned_frames_ = frames_ ? frames_ : frames_of_plate();
+    if (options.record && !(s.record.file.empty() && s.record.exr.empty())) {
+      at_place(s, s.record.place, [&] { recording_.start(s.record); });
+    }
+    tally_.status().effort = s.effort;
+    publish(false);
+  }
+
+  std::optional<std::int64_t> planned_frames() const { return planned_frames_; }
+
+  void post(ShowCommand command) {
+    const std::lock_guard lock(mutex_);
+    commands_.push_back(std::move(command));
+    posted_.notify_all();
+  }
+
+  std::shared_ptr<const ShowStatus> status() const { return status_.load(); }
+
+  void run(const std::function<void(const ShownFrame&)>& on_frame) {
+    std::future<void> inputs = std::async(std::launch::async, [this] { make_inputs(); });
+    {
+      const Closing closing{work_};  // however this ends, the other thread must not wait for ever
+      while (std::optional<Work> work = work_.take()) show_frame(std::move(*work), on_frame);
+    }
+    recording_.stop();
+    publish(true);
+    inputs.get();
+  }
+
+ private:
+  struct Closing {
+    Handover<Work>& work;
+    ~Closing() { work.close(); }
+  };
+
+  std::optional<std::int64_t> frames_of_plate() const {
+    const capture::CameraInfo& plate = maker_.plate().info();
+    if (plate.frames <= 0 || plate.rate.num <= 0 || maker_.is_endless()) return std::nullopt;
+    const double seconds = static_cast<double>(plate.frames) / plate.rate.value();
+    return std::llround(seconds * maker_.rate().value());
+  }
+
+  // On the thread that makes inputs.
+
+  void make_inputs() {
+    const Closing closing{work_};
+    const Clock::time_point start = Clock::now();
+    std::int64_t made = 0;
+    std::int64_t dropped = 0;
+    for (std::int64_t number = 0; !frames_ || made < *frames_; ++number, ++made) {
+      Work work;
+      if (!apply_commands(work)) return;
+      if (options_.live) dropped += wait_until_due(number, start + paused_for_);
+      std::optional<PreparedFrame> frame = maker_.make(number);
+      if (!frame) return;
+      work.frame = std::move(*frame);
+      work.dropped = dropped;
+      work.plate = maker_.plate().statistics();
+      if (!work_.give(std::move(work))) return;
+    }
+  }
+
+  // Waits for a live frame's time. A frame whose successor is due as well is left out: moves
+  // `number` on and returns by how many.
+  std::int64_t wait_until_due(std::int64_t& number, Clock::time_point start) const {
+    const auto due = [&](std::int64_t n) {
+      return start + capture::time_of_frame(n, maker_.rate());
+    };
+    const std::int64_t wanted = number;
+    while (Clock::now() >= due(number + 1)) ++number;
+    std::this_thread::sleep_until(due(number));
+    return number - wanted;
+  }
+
+  // Takes what was posted. Waits while paused. False on Quit.
+  bool apply_commands(Work& work) {
+    while (true) {
+      std::vector<ShowCommand> commands;
+      {
+        std::unique_lock lock(mutex_);
+        if (paused_) {
+          const Clock::time_point before = Clock::now();
+          posted_.wait(lock, [&] { return !commands_.empty(); });
+          paused_for_ += Clock::now() - before;
+        }
+        commands = std::exchange(commands_, {});
+      }
+      for (ShowCommand& command : commands) {
+        if (std::holds_alternative<Quit>(command)) return false;
+        apply(command, work);
+      }
+      if (!paused_) return true;
+    }
+  }
+
+  void apply(ShowCommand& command, Work& work) {
+    noting([&] {
+      std::visit(Overloaded{[&](const SetEffort& c) { maker_.set_effort(c.effort); },
+                            [&](const StartRecording& c) { work.recorder.emplace_back(c); },
+                            [&](const StopRecording& c) { work.recorder.emplace_back(c); },
+                            [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
+                            [&](const SetPaused& c) { paused_ = c.paused; },
+                            [&](ChangeSet& c) { maker_.change_set(std::move(c.set)); },
+                            [](const Quit&) {}},
+                 command);
+    });
+  }
+
+  // On the caller's thread.
+
+  void show_frame(Work work, const std::function<void(const ShownFrame&)>& on_frame) {
+    for (const RecorderCommand& command : work.recorder) apply(command);
+    ShownFrame shown;
+    shown.prepared = std::move(work.frame);
+    const std::shared_ptr<render::FrameResult> result = free_one(results_);
+    timed(shown, Stage::render, [&] {
+      render::FrameInputs inputs = shown.prepared.inputs();
+      inputs.kept_visibility = &kept_visibility_;
+      render::render_frame(inputs, shown.prepared.job, *shown.prepared.plate, *result);
+    });
+    shown.result = result;
+
+    const auto rgb8 = free_one(pictures_);
+    timed(shown, Stage::display, [&] {
+      const capture::HalfImage& rgba = result->rgba;
+      rgb8->resize(rgba.pixels.size() / 4 * 3);
+      tally_.status().display_nan += display_->to_rgb8(rgba, *rgb8);
+    });
+    shown.rgb8 = rgb8;
+    const Clock::time_point displayed = Clock::now();
+
+    timed(shown, Stage::record, [&] { recording_.record(shown, !options_.live); });
+    tally_.add(shown, displayed);
+    tally_.status().dropped = work.dropped;
+    tally_.status().lost_plate_frames = work.plate.lost;
+    tally_.status().damaged_plate_frames = work.plate.damaged;
+    publish(false);
+    if (on_frame) on_frame(shown);
+  }
+
+  template <class Act>
+  static void timed(ShownFrame& shown, Stage stage, const Act& act) {
+    const Clock::time_point start = Clock::now();
+    act();
+    const std::chrono::duration<double, std::milli> ms = Clock::now() - start;
+    shown.prepared.stage_ms[static_cast<std::size_t>(stage)] = ms.count();
+  }
+
+  void apply(const RecorderCommand& command) {
+    noting([&] {
+      if (const auto* start = std::get_if<StartRecording>(&command)) {
+        recording_.start(start->record);
+      } else {
+        recording_.stop();
+      }
+    });
+  }
+
+  void publish(bool finished) {
+    ShowStatus& status = tally_.status();
+    status.finished = finished;
+    status.paused = paused_;
+    status.recording = recording_.running();
+    status.recorder = recording_.status();
+    {
+      const std::lock_guard lock(mutex_);
+      status.notes = notes_;
+    }
+    status_.store(std::make_shared<const ShowStatus>(status));
+  }
+
+  // On either thread.
+
+  // What a command cannot do is noted, and the show goes on.
+  template <class Act>
+  void noting(const Act& act) {
+    try {
+      act();
+    } catch (const std::runtime_error& error) {
+      note(error.what());
+    } catch (const std::invalid_argument& error) {
+      note(error.what());
+    }
+  }
+
+  void note(std::string what) {
+    const std::lock_guard lock(mutex_);
+    notes_.push_back(std::move(what));
+    if (notes_.size() > most_notes) notes_.erase(notes_.begin());
+  }
+
+  const ShowOptions options_;
+  std::optional<std::int64_t> frames_;
+  std::optional<std::int64_t> planned_frames_;
+
+  // Of the caller's thread.
+  Tally tally_;
+  std::unique_ptr<compositing::Display> display_;
+  render::KeptVisibility kept_visibility_;
+  std::vector<std::shared_ptr<render::FrameResult>> results_;
+  std::vector<std::shared_ptr<std::vector<std::uint8_t>>> pictures_;
+
+  // Of the thread that makes inputs, once it runs.
+  FrameMaker maker_;
+  Clock::duration paused_for_{};
+
+  // Of the caller's thread.
+  Recording recording_;
+
+  // Shared.
+  mutable std::mutex mutex_;
+  std::condition_variable posted_;
+  std::vector<ShowCommand> commands_;
+  std::vector<std::string> notes_;
+  std::atomic<bool> paused_ = false;
+  Handover<Work> work_;
+  std::atomic<std::shared_ptr<const ShowStatus>> status_;
+};
+
+Show::Show(Set set, ShowOptions options)
+    : stages_(std::make_unique<Stages>(std::move(set), options)) {}
+Show::~Show() = default;
+
+void Show::post(ShowCommand command) { stages_->post(std::move(command)); }
+std::shared_ptr<const ShowStatus> Show::status() const { return stages_->status(); }
+void Show::run(const std::function<void(const ShownFrame&)>& on_frame) { stages_->run(on_frame); }
+std::optional<std::int64_t> Show::planned_frames() const { return stages_->planned_frames(); }
+
+}  // namespace studio

@@ -1,0 +1,112 @@
+// The show: a set on air. Commands go in, an immutable status comes out; everything that drives a
+// show (command line, window, remote control, tests) uses only these.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "compositing/recorder.h"
+#include "render/renderer.h"
+#include "studio/frame_maker.h"
+#include "studio/set.h"
+
+namespace studio {
+
+struct SetEffort {
+  render::Effort effort;
+};
+struct StartRecording {
+  RecordSettings record;
+};
+struct StopRecording {};
+struct MoveObject {
+  std::string name;
+  PlacementSettings pose;
+};
+struct SetPaused {
+  bool paused = false;
+};
+struct ChangeSet {
+  Set set;
+};
+struct Quit {};
+using ShowCommand =
+    std::variant<SetEffort, StartRecording, StopRecording, MoveObject, SetPaused, ChangeSet, Quit>;
+
+// How the show stands after a frame.
+struct ShowStatus {
+  std::int64_t frames = 0;                    // shown so far
+  std::int64_t dropped = 0;                   // left out because the show was late
+  std::int64_t frame = -1;                    // number of the last one
+  double fps = 0;                             // since the first frame was shown
+  double frame_ms_p50 = 0, frame_ms_p99 = 0;  // from one shown frame to the next
+  double first_frame_ms = 0;                  // from the show's making to its first picture
+  std::array<double, stages> stage_ms{};      // mean of each stage
+  double delay_frames = 0;  // plate's arrival to its picture, in show frames: median
+  double delay_frames_p99 = 0;
+  render::RenderStatistics statistics;  // sums over all frames
+  render::MatchResult match;
+  float unseen_share = 0;
+  float light_error_estimate = 0;
+  std::size_t lights = 0;
+  std::int64_t lost_plate_frames = 0;
+  std::int64_t damaged_plate_frames = 0;
+  std::int64_t display_nan = 0;  // pixels that reached the display without a number
+  render::Effort effort;
+  bool paused = false;
+  bool recording = false;
+  compositing::RecorderStatus recorder;  // of the present or last recording
+  bool finished = false;
+  std::vector<std::string> notes;  // what went wrong without ending the show; the last ten
+};
+
+// A finished picture with all that it came from.
+struct ShownFrame {
+  PreparedFrame prepared;
+  std::shared_ptr<const render::FrameResult> result;
+  std::shared_ptr<const std::vector<std::uint8_t>> rgb8;  // (height, width, 3) display codes
+};
+
+struct ShowOptions {
+  bool live = false;  // paced by the clock, late frames left out; else every frame is made
+  std::optional<std::int64_t> frames;     // show at most so many; nothing = as the set says
+  std::optional<capture::Rational> rate;  // in place of the set's
+  bool record = true;                     // as the set says, from the first frame on
+};
+
+// Inputs of a frame are made on a thread of the show's own while the frame before is rendered on
+// the caller's and oneTBB's. When not live, the frames are the same bits whatever the timing.
+class Show {
+ public:
+  // Throws SetError as FrameMaker, also for what cannot be displayed or recorded.
+  explicit Show(Set set, ShowOptions options = {});
+  Show(const Show&) = delete;
+  Show& operator=(const Show&) = delete;
+  ~Show();
+
+  // From any thread, at any time. Takes effect with the next frame whose inputs are made.
+  void post(ShowCommand command);
+  // From any thread; never null.
+  std::shared_ptr<const ShowStatus> status() const;
+
+  // Shows frames until the set's end or Quit, then closes the recording. `on_frame` is called after
+  // each, on this thread. Once only. Throws what a stage threw for reasons outside the show's
+  // power.
+  void run(const std::function<void(const ShownFrame&)>& on_frame = {});
+
+  // Frames that run() will show; nothing if it does not know.
+  std::optional<std::int64_t> planned_frames() const;
+
+ private:
+  class Stages;
+  std::unique_ptr<Stages> stages_;
+};
+
+}  // namespace studio

@@ -1,0 +1,47 @@
+// Figures of a running show.
+#include "studio/tally.h"
+
+namespace studio {
+namespace {
+
+double ms_between(Tally::Clock::time_point from, Tally::Clock::time_point to) {
+  return std::chrono::duration<double, std::milli>(to - from).count();
+}
+
+}  // namespace
+
+void Tally::add(const ShownFrame& shown, Clock::time_point displayed) {
+  const PreparedFrame& frame = shown.prepared;
+  ShowStatus& s = status_;
+  if (s.frames == 0) {
+    first_shown_ = displayed;
+    s.first_frame_ms = ms_between(made_, displayed);
+  } else {
+    interval_ms_.add(ms_between(last_shown_, displayed));
+  }
+  delay_ms_.add(ms_between(frame.arrived, displayed));
+  last_shown_ = displayed;
+  ++s.frames;
+  s.frame = frame.job.frame;
+  const double elapsed_s = ms_between(first_shown_, displayed) / 1000;
+  s.fps = elapsed_s > 0 ? static_cast<double>(s.frames - 1) / elapsed_s : 0;
+  s.frame_ms_p50 = interval_ms_.at(0.5);
+  s.frame_ms_p99 = interval_ms_.at(0.99);
+  const double period_ms = period_ms_ > 0 ? period_ms_ : interval_ms_.mean();
+  if (period_ms > 0) {
+    s.delay_frames = delay_ms_.at(0.5) / period_ms;
+    s.delay_frames_p99 = delay_ms_.at(0.99) / period_ms;
+  }
+  for (std::size_t i = 0; i < stages; ++i) {
+    stage_sum_ms_[i] += frame.stage_ms[i];
+    s.stage_ms[i] = stage_sum_ms_[i] / static_cast<double>(s.frames);
+  }
+  s.statistics += shown.result->statistics;
+  s.match = frame.match;
+  s.unseen_share = frame.job.lights.unseen_share;
+  s.light_error_estimate = frame.job.lights.error_estimate;
+  s.lights = frame.job.lights.lights.size();
+  s.effort = frame.job.effort;
+}
+
+}  // namespace studio
