@@ -180,14 +180,27 @@ struct Box {
   }
 };
 
-// Names points where there is room: the front first, and no name over another or over a mark.
-void label_points(Svg& svg, const Chart& chart, const Axis& x, const Axis& y) {
+// Names points where there is room: the front first, and no name over another, a mark or the front.
+void label_points(Svg& svg,
+                  const Chart& chart,
+                  const Axis& x,
+                  const Axis& y,
+                  const std::vector<std::pair<double, double>>& front) {
   constexpr double size = 11;
   std::vector<Box> taken;
   for (const ChartPoint& p : chart.points) {
     const double px = x(p.time_ms);
     const double py = y(p.error);
     taken.push_back({px - 5, py - 5, px + 5, py + 5});
+  }
+  constexpr int pieces = 24;  // of each stretch of the front
+  for (std::size_t i = 1; i < front.size(); ++i) {
+    for (int j = 0; j <= pieces; ++j) {
+      const double t = static_cast<double>(j) / pieces;
+      const double px = front[i - 1].first + (front[i].first - front[i - 1].first) * t;
+      const double py = front[i - 1].second + (front[i].second - front[i - 1].second) * t;
+      taken.push_back({px - 1, py - 1, px + 1, py + 1});
+    }
   }
   std::vector<const ChartPoint*> order;
   for (const ChartPoint& p : chart.points) order.push_back(&p);
@@ -199,13 +212,13 @@ void label_points(Svg& svg, const Chart& chart, const Axis& x, const Axis& y) {
     const double w = text_width(p->label, size);
     const double px = x(p->time_ms);
     const double py = y(p->error);
-    // Below left of the front is empty by its nature, so names go there first.
-    const std::array<std::pair<double, double>, 6> places{{{px - w - 8, py + 15},
-                                                           {px + 9, py + 4},
-                                                           {px - w / 2, py - 10},
-                                                           {px - w - 9, py + 4},
-                                                           {px - w / 2, py + 19},
-                                                           {px + 8, py - 8}}};
+    // Below left of the front is empty by its nature, so its own names go there.
+    std::vector<std::pair<double, double>> places{{px + 9, py + 4},
+                                                  {px + 8, py - 8},
+                                                  {px - w / 2, py - 10},
+                                                  {px - w - 9, py + 4},
+                                                  {px - w / 2, py + 19}};
+    if (p->on_front) places.insert(places.begin(), {px - w - 8, py + 15});
     for (const auto& [tx, ty] : places) {
       const Box box{tx - 1, ty - size, tx + w + 1, ty + 2};
       const bool inside = box.x0 > x.from && box.x1 < x.to && box.y0 > y.to && box.y1 < y.from;
@@ -251,7 +264,7 @@ void draw_main_panel(Svg& svg, const Chart& chart, const std::map<std::string, S
     if (p.on_front) svg.mark(x(p.time_ms), y(p.error), Mark::ring, 8.5, front_ink);
     svg.mark(x(p.time_ms), y(p.error), style.mark, 5, style.colour);
   }
-  label_points(svg, chart, x, y);
+  label_points(svg, chart, x, y, front);
 }
 
 void draw_legend(Svg& svg, const Chart& chart, const std::map<std::string, Style>& styles) {
@@ -320,6 +333,10 @@ void draw_stressor(Svg& svg, const Stressor& stressor, double left, double top) 
   svg.text(left + 28, key_y, "error", {11.5});
   svg.polyline({{left + 84, key_y - 4}, {left + 106, key_y - 4}}, colours[1], 1.6, "6 4");
   svg.text(left + 112, key_y, "the program's own estimate", {11.5});
+  if (std::ranges::any_of(stressor.samples, [](const auto& s) { return s.status != "ok"; })) {
+    svg.mark(left + 318, key_y - 4, Mark::cross, 5, colours[1]);
+    svg.text(left + 330, key_y, "refused or failed", {11.5});
+  }
 }
 
 }  // namespace

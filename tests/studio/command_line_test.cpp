@@ -10,7 +10,12 @@
 #include <iterator>
 #include <string>
 
+#include <nlohmann/json.hpp>
+
+#include "capture/exr.h"
+#include "capture/png.h"
 #include "studio/command.h"
+#include "tests/studio/made_show.h"
 
 namespace studio {
 namespace {
@@ -139,6 +144,96 @@ TEST_F(CommandLine, NamesAllFaultsOfASetAndWritesThemAsFigures) {
   EXPECT_THAT(outcome.err, HasSubstr("camera is missing"));
   EXPECT_THAT(content_of(json), HasSubstr("\"line\": 2"));
   EXPECT_THAT(content_of(json), HasSubstr("\"column\": 10"));
+}
+
+// Runs of real files: a sequence of stills, an object, a sky.
+class Runs : public CommandLine {
+ protected:
+  std::string write_set() const {
+    const std::vector<std::uint8_t> grey(64 * 48 * 3, 120);
+    for (int i = 0; i < 3; ++i) {
+      capture::write_png(dir_ / ("plate_" + std::to_string(i) + ".png"), 64, 48, 3, grey);
+    }
+    return write_made_set(dir_, "file:plate_%d.png");
+  }
+};
+
+TEST_F(Runs, WriteTheFiguresThatScriptsRelyOn) {
+  const std::string json_path = (dir_ / "run.json").string();
+  const Outcome outcome = run("run " + write_set() + " --frames 3 --json " + json_path);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(content_of(json_path));
+  EXPECT_EQ(json["frames"], 3);
+  EXPECT_EQ(json["dropped"], 0);
+  EXPECT_GT(json["fps"], 0);
+  EXPECT_GT(json["frame_ms"]["p50"], 0);
+  EXPECT_GE(json["frame_ms"]["p99"], json["frame_ms"]["p50"]);
+  for (const char* stage : {"capture", "probe", "job", "render", "display", "record"}) {
+    EXPECT_TRUE(json["stage_ms"][stage].is_number()) << stage;
+  }
+  for (const char* kind : {"primary", "shadow", "secondary"}) {
+    EXPECT_GT(json["rays"][kind], 0) << kind;
+  }
+  EXPECT_GT(json["delay_frames"], 0);
+  EXPECT_EQ(json["match"], nlohmann::json::array({1.0, 1.0, 1.0}));
+  EXPECT_GT(json["peak_memory_mb"], 1);
+  EXPECT_LT(json["peak_memory_mb"], 1024);
+}
+
+TEST_F(Runs, RecordVideoAndExr) {
+  const std::string take = (dir_ / "take.mkv").string();
+  const Outcome outcome = run("run --quiet " + write_set() + " --record " + take + " --exr " +
+                              (dir_ / "take").string());
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.out + outcome.err, "");
+  EXPECT_GT(fs::file_size(take), 500U);
+  EXPECT_EQ(std::distance(fs::directory_iterator(dir_ / "take"), fs::directory_iterator()), 3);
+}
+
+TEST_F(Runs, CheckTheErrorOfTheLastFrame) {
+  const std::string json_path = (dir_ / "run.json").string();
+  const Outcome outcome =
+      run("run " + write_set() + " --frames 1 --check-error 64 --json " + json_path);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto error = nlohmann::json::parse(content_of(json_path))["error"];
+  EXPECT_GT(error["relative_rms"], 0);
+  EXPECT_LT(error["relative_rms"], 0.5);
+  EXPECT_GT(error["pixels"], 100);
+}
+
+TEST_F(Runs, FailWithOneLineWhenTheRecordingCannotBegin) {
+  const Outcome outcome = run("run " + write_set() + " --record /proc/nowhere/take.mkv");
+  EXPECT_EQ(outcome.status, 1);
+  expect_one_line(outcome.err);
+}
+
+TEST_F(Runs, DrawOverlaysOverAStill) {
+  const std::string set = write_set();
+  const std::string plain = (dir_ / "plain.png").string();
+  const std::string drawn = (dir_ / "drawn.png").string();
+  EXPECT_EQ(run("still " + set + " -o " + plain).status, 0);
+  const Outcome outcome =
+      run("still " + set + " -o " + drawn + " --overlay grid,axes,stand_in,coverage,light");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_TRUE(content_of(plain).starts_with("\x89PNG"));
+  EXPECT_NE(content_of(plain), content_of(drawn));
+  EXPECT_EQ(run("still " + set).status, 2);
+  EXPECT_EQ(run("still " + set + " -o " + plain + " --overlay gird").status, 2);
+}
+
+TEST_F(Runs, ConvertAnHdrPicture) {
+  write_set();
+  const std::string out = (dir_ / "out.exr").string();
+  const std::string json = (dir_ / "hdr.json").string();
+  const Outcome outcome =
+      run("hdr " + (dir_ / "sky.exr").string() + " -o " + out + " --json " + json);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(capture::read_exr(out).pixels, capture::read_exr((dir_ / "sky.exr").string()).pixels);
+  for (const char* key : {"exposures_s", "response", "stops", "time_ms"}) {
+    EXPECT_TRUE(nlohmann::json::parse(content_of(json)).contains(key)) << key;
+  }
+  EXPECT_EQ(run("hdr " + (dir_ / "sky.exr").string() + " -o out.jpg").status, 2);
+  EXPECT_EQ(run("hdr " + (dir_ / "absent.jpg").string() + " -o " + out).status, 1);
 }
 
 }  // namespace

@@ -1,0 +1,222 @@
+// The show: its clock, its commands, and that timing changes no bit.
+#include "studio/show.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "tests/made_files.h"
+#include "tests/studio/made_show.h"
+
+namespace studio {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::Contains;
+using testing::HasSubstr;
+
+class ShowTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    start();
+    register_grey_camera();
+  }
+  void SetUp() override { dir_ = made::make_temporary_directory(); }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+
+  Set made_set(const std::string& source, const std::string& more = "") const {
+    return read_set(write_made_set(dir_, source, more));
+  }
+
+  std::filesystem::path dir_;
+};
+
+using Pictures = std::vector<std::vector<capture::Half>>;
+
+Pictures pictures_of(const Set& set, const ShowOptions& options, std::chrono::milliseconds delay) {
+  Pictures pictures;
+  Show show(set, options);
+  show.run([&](const ShownFrame& shown) {
+    pictures.push_back(shown.result->rgba.pixels);
+    std::this_thread::sleep_for(delay * (pictures.size() % 3));
+  });
+  return pictures;
+}
+
+TEST_F(ShowTest, GivesTheSameBitsWhateverTheTiming) {
+  const Set set = made_set("grey:6,25,0");
+  const Pictures fast = pictures_of(set, {}, 0ms);
+  ASSERT_EQ(fast.size(), 6U);
+  EXPECT_NE(fast[0], fast[1]);
+  EXPECT_EQ(pictures_of(set, {}, 7ms), fast);
+}
+
+TEST_F(ShowTest, ShowsEveryFrameOfAPlateThatIsSlowerThanTheShowTwice) {
+  const Set set = made_set("grey:4,10,0");
+  ShowOptions options;
+  options.rate = capture::Rational{20, 1};
+  const Pictures pictures = pictures_of(set, options, 0ms);
+  ASSERT_EQ(pictures.size(), 8U);
+  for (std::size_t i = 0; i < 8; i += 2) EXPECT_EQ(pictures[i], pictures[i + 1]) << i;
+  EXPECT_NE(pictures[1], pictures[2]);
+}
+
+TEST_F(ShowTest, PassesOverFramesOfAPlateThatIsFaster) {
+  const Set set = made_set("grey:8,40,0");
+  ShowOptions options;
+  options.rate = capture::Rational{20, 1};
+  std::vector<double> times_s;
+  Show show(set, options);
+  show.run([&](const ShownFrame& shown) {
+    times_s.push_back(std::chrono::duration<double>(shown.prepared.job.textures[0].time).count());
+  });
+  EXPECT_EQ(times_s, (std::vector<double>{0, 0.05, 0.1, 0.15}));
+}
+
+TEST_F(ShowTest, CountsFramesThatThePlateLost) {
+  Show show(made_set("grey:9,25,3"));
+  show.run();
+  EXPECT_EQ(show.status()->frames, 9);
+  EXPECT_EQ(show.status()->lost_plate_frames, 3);
+  EXPECT_EQ(show.status()->dropped, 0);
+}
+
+TEST_F(ShowTest, DropsLateFramesWhenLiveAndKeepsToTheClock) {
+  ShowOptions options;
+  options.live = true;
+  std::vector<std::int64_t> numbers;
+  Show show(made_set("grey:20,25,0"), options);
+  show.run([&](const ShownFrame& shown) {
+    numbers.push_back(shown.prepared.job.frame);
+    std::this_thread::sleep_for(95ms);
+  });
+  EXPECT_TRUE(std::ranges::is_sorted(numbers));
+  EXPECT_GT(show.status()->dropped, 5);
+  EXPECT_EQ(show.status()->frames + show.status()->dropped, numbers.back() + 1);
+}
+
+TEST_F(ShowTest, DelaysPicturesByTwoFramesAtMost) {
+  Show show(made_set("grey:40,25,0"));
+  show.run([](const ShownFrame&) { std::this_thread::sleep_for(4ms); });
+  EXPECT_LE(show.status()->delay_frames, 2.1);
+  EXPECT_GT(show.status()->delay_frames, 0);
+}
+
+TEST_F(ShowTest, ShowsAStillOnceUnlessToldOtherwise) {
+  EXPECT_EQ(pictures_of(made_set("grey:1,25,0"), {}, 0ms).size(), 1U);
+  ShowOptions options;
+  options.frames = 3;
+  EXPECT_EQ(pictures_of(made_set("grey:1,25,0"), options, 0ms).size(), 3U);
+}
+
+TEST_F(ShowTest, EndsOnQuit) {
+  ShowOptions options;
+  options.frames = 1'000'000;
+  Show show(made_set("grey:1,25,0"), options);
+  show.run([&](const ShownFrame& shown) {
+    if (shown.prepared.job.frame == 2) show.post(Quit{});
+  });
+  EXPECT_LE(show.status()->frames, 5);
+  EXPECT_TRUE(show.status()->finished);
+}
+
+TEST_F(ShowTest, TakesEffortMovesAndPausesWhileItRuns) {
+  ShowOptions options;
+  options.frames = 12;
+  Show show(made_set("grey:1,25,0"), options);
+  Pictures pictures;
+  show.run([&](const ShownFrame& shown) {
+    pictures.push_back(shown.result->rgba.pixels);
+    if (shown.prepared.job.frame == 1) {
+      show.post(MoveObject{"cube", {{1.5, 0, 0}, 0, 0.5, 1}});
+      render::Effort effort;
+      effort.light_samples = 4;
+      show.post(SetEffort{effort});
+      show.post(SetPaused{true});
+      show.post(SetPaused{false});
+    }
+  });
+  EXPECT_EQ(pictures.size(), 12U);
+  EXPECT_EQ(pictures[0], pictures[1]);
+  EXPECT_NE(pictures[0], pictures[11]);
+  EXPECT_EQ(show.status()->effort.light_samples, 4);
+  EXPECT_LE(show.status()->lights, 4U);
+}
+
+TEST_F(ShowTest, NotesWhatACommandCannotDoAndGoesOn) {
+  ShowOptions options;
+  options.frames = 5;
+  Show show(made_set("grey:1,25,0"), options);
+  show.post(MoveObject{"no such thing", {}});
+  RecordSettings record;
+  record.file = "/proc/nowhere/take.mkv";
+  show.post(StartRecording{record});
+  Set smaller = made_set("grey:1,25,0");
+  smaller.show.width = 32;
+  show.post(ChangeSet{smaller});
+  show.run();
+  EXPECT_EQ(show.status()->frames, 5);
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("no such thing")));
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("/proc/nowhere")));
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("size and rate")));
+}
+
+TEST_F(ShowTest, TakesAChangedSetOver) {
+  ShowOptions options;
+  options.frames = 6;
+  const Set set = made_set("grey:1,25,0");
+  Show show(set, options);
+  Pictures pictures;
+  show.run([&](const ShownFrame& shown) {
+    pictures.push_back(shown.result->rgba.pixels);
+    if (shown.prepared.job.frame == 0) {
+      Set changed = set;
+      changed.objects.clear();
+      show.post(ChangeSet{changed});
+    }
+  });
+  const std::vector<capture::Half>& empty = pictures.back();
+  EXPECT_NE(pictures.front(), empty);
+  const capture::Half grey = capture::half_from_float(0.1F);
+  for (std::size_t i = 0; i < empty.size(); ++i) ASSERT_EQ(empty[i], i % 4 == 3 ? 0 : grey) << i;
+}
+
+TEST_F(ShowTest, RecordsFromOneFrameToAnother) {
+  ShowOptions options;
+  options.frames = 12;
+  Show show(made_set("grey:1,25,0"), options);
+  RecordSettings record;
+  record.exr = (dir_ / "take").string();
+  show.run([&](const ShownFrame& shown) {
+    if (shown.prepared.job.frame == 2) show.post(StartRecording{record});
+    if (shown.prepared.job.frame == 6) show.post(StopRecording{});
+  });
+  EXPECT_FALSE(show.status()->recording);
+  EXPECT_GE(show.status()->recorder.written, 3);
+  EXPECT_LE(show.status()->recorder.written, 6);
+  EXPECT_EQ(show.status()->recorder.error, "");
+}
+
+TEST_F(ShowTest, RefusesAPlateOfAnotherSizeAtItsPlace) {
+  Set set = made_set("grey:1,25,0");
+  set.show.width = 32;
+  try {
+    const Show show(set);
+    FAIL() << "was accepted";
+  } catch (const SetError& error) {
+    EXPECT_EQ(error.diagnostics()[0].line, 5);
+    EXPECT_THAT(error.what(), HasSubstr("64x48"));
+  }
+}
+
+TEST_F(ShowTest, RefusesADisplayAndAModelThatThereAreNot) {
+  EXPECT_THROW(Show(made_set("grey:1,25,0", "[display]\nview = \"Fancy\"\n")), SetError);
+  std::ofstream(dir_ / "damaged.glb") << "glTF";
+  EXPECT_THROW(Show(made_set("grey:1,25,0", "[[object]]\nmesh = \"damaged.glb\"\n")), SetError);
+}
+
+}  // namespace
+}  // namespace studio

@@ -1,0 +1,121 @@
+// Cameras by the show's clock, brackets that roll, and what hands values over.
+#include "studio/source.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <random>
+#include <thread>
+
+#include "studio/handover.h"
+#include "studio/probe_source.h"
+#include "studio/quantiles.h"
+#include "tests/studio/made_show.h"
+
+namespace studio {
+namespace {
+
+Source grey_source(std::int64_t frames, std::int64_t fps) {
+  return Source(std::make_unique<GreyCamera>(frames, capture::Rational{fps, 1}, 0));
+}
+
+TEST(Source, GivesTheNewestFrameThatIsNotAfterTheTime) {
+  std::mt19937 random(1);
+  for (const std::int64_t fps : {7, 25, 60}) {
+    Source source = grey_source(1000, fps);
+    capture::Time time{};
+    for (int i = 0; i < 100; ++i) {
+      time += capture::Time(random() % 90'000'000);
+      const auto frame = source.at(time);
+      ASSERT_TRUE(frame);
+      EXPECT_LE(frame->time, time);
+      EXPECT_GT(capture::time_of_frame(frame->number + 1, {fps, 1}), time);
+    }
+  }
+}
+
+TEST(Source, EndsWhenItsLastFrameHasBeenShownForAsLongAsTheOthers) {
+  Source source = grey_source(3, 10);
+  EXPECT_EQ(source.at(capture::Time{299'999'999})->number, 2);
+  EXPECT_FALSE(source.at(capture::Time{300'000'000}));
+}
+
+TEST(Source, ShowsASinglePictureForEver) {
+  Source source = grey_source(1, 25);
+  EXPECT_TRUE(source.is_still());
+  EXPECT_TRUE(source.at(std::chrono::hours(100)));
+}
+
+TEST(Source, RefusesACameraWithoutFrames) { EXPECT_THROW(grey_source(0, 25), std::runtime_error); }
+
+TEST(Handover, LetsTheGiverWorkOneValueAheadAndNoMore) {
+  Handover<int> handover;
+  std::atomic<int> begun = 0;
+  std::jthread giver([&] {
+    for (int i = 0; i < 50; ++i) {
+      begun = i;
+      if (!handover.give(i)) return;
+    }
+    handover.close();
+  });
+  int expected = 0;
+  while (const auto value = handover.take()) {
+    EXPECT_EQ(*value, expected++);
+    std::this_thread::yield();
+    EXPECT_LE(begun, *value + 1);
+  }
+  EXPECT_EQ(expected, 50);
+}
+
+TEST(Handover, FreesAGiverWhenItIsClosed) {
+  Handover<int> handover;
+  std::jthread giver([&] { EXPECT_FALSE(handover.give(1)); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  handover.close();
+}
+
+TEST(Quantiles, AreRightToOnePercent) {
+  std::mt19937 random(2);
+  std::lognormal_distribution<double> time(2, 1);
+  std::vector<double> all;
+  Quantiles quantiles;
+  for (int i = 0; i < 5000; ++i) {
+    all.push_back(time(random));
+    quantiles.add(all.back());
+  }
+  std::ranges::sort(all);
+  for (const double share : {0.0, 0.1, 0.5, 0.9, 0.99, 1.0}) {
+    const double exact = all[static_cast<std::size_t>(share * 4999)];
+    EXPECT_NEAR(quantiles.at(share) / exact, 1, 0.011) << share;
+  }
+  EXPECT_EQ(Quantiles().at(0.5), 0);
+}
+
+// A shot of a scene of constant radiance, clipped at 1.
+capture::Image shot_of(double radiance, double exposure_s) {
+  capture::Image shot = capture::make_image(4, 6);
+  for (float& v : shot.pixels) v = static_cast<float>(std::min(1.0, radiance * exposure_s));
+  return shot;
+}
+
+TEST(RollingBracket, MergesRadianceFromTheNewestShotOfEachExposure) {
+  const std::vector<double> exposures_s{0.001, 0.01, 0.1};
+  RollingBracket bracket(exposures_s);
+  for (const double radiance : {0.05, 3.0, 60.0, 700.0}) {
+    for (const double exposure_s : exposures_s) {
+      bracket.add(shot_of(radiance, exposure_s), exposure_s);
+    }
+    for (const float v : bracket.merge().pixels) EXPECT_NEAR(v / radiance, 1, 0.01) << radiance;
+  }
+}
+
+TEST(RollingBracket, RefusesShotsOfTwoSizes) {
+  RollingBracket bracket({0.01, 0.1});
+  bracket.add(capture::make_image(4, 6), 0.01);
+  EXPECT_THROW(bracket.add(capture::make_image(6, 4), 0.1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace studio
