@@ -135,17 +135,27 @@ Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness) {
 
 Vec3f irradiance_of(const Environment& env, Vec3f normal) {
   const capture::Image& map = env.radiance;
+  // What the cosine owes to a column, before the row's sine.
+  std::vector<float> across(static_cast<std::size_t>(map.width));
+  for (int x = 0; x < map.width; ++x) {
+    const float azimuth_rad =
+        (0.5F - (static_cast<float>(x) + 0.5F) / static_cast<float>(map.width)) * 2 * pi;
+    across[static_cast<std::size_t>(x)] =
+        normal.x * std::cos(azimuth_rad) + normal.y * std::sin(azimuth_rad);
+  }
   std::array<double, 3> sum{};
   for (int y = 0; y < map.height; ++y) {
-    const double solid_angle = texel_solid_angle(y, map.width, map.height);
-    for (int x = 0; x < map.width; ++x) {
-      const Vec3f v =
-          direction_of_texel(static_cast<float>(x), static_cast<float>(y), map.width, map.height);
-      const double weight = std::max(dot(v, normal), 0.0F) * solid_angle;
-      for (std::size_t c = 0; c < 3; ++c) {
-        sum[c] += weight * counted_radiance(map.at(y, x, static_cast<int>(c)));
-      }
+    const float polar_rad = (static_cast<float>(y) + 0.5F) / static_cast<float>(map.height) * pi;
+    const float sine = std::sin(polar_rad);
+    const float along = normal.z * std::cos(polar_rad);
+    std::array<float, 3> row{};
+    const float* p = &map.pixels[map.index(y, 0)];
+    for (std::size_t x = 0; x < across.size(); ++x, p += 3) {
+      const float cosine = std::max(sine * across[x] + along, 0.0F);
+      for (std::size_t c = 0; c < 3; ++c) row[c] += cosine * counted_radiance(p[c]);
     }
+    const double solid_angle = texel_solid_angle(y, map.width, map.height);
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += row[c] * solid_angle;
   }
   return {static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2])};
 }

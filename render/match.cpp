@@ -13,6 +13,9 @@ namespace {
 constexpr double pi = std::numbers::pi;
 // Turns a median absolute deviation into a standard deviation.
 constexpr double deviation_of_median = 1.4826;
+// Plate pixels to look at along a texel's side, and the largest step that leaves out others.
+constexpr double pixels_along_texel = 3;
+constexpr int most_step = 16;
 // Fewer plate pixels than this in a texel are its rim.
 constexpr int least_pixels_per_texel = 4;
 // Above this spread, the two cameras do not look at the same things.
@@ -70,6 +73,59 @@ std::vector<Colour> patch_pixels(const capture::Image& plate,
   return pixels;
 }
 
+// The plate's light in a texel of the environment.
+struct Texel {
+  Colour sum{};
+  int pixels = 0;  // not_usable once one of them is clipped or dark
+};
+constexpr int not_usable = -1;
+
+// Pixels from one to the next that is looked at, so that a texel still has enough of them.
+int pixel_step(const calibrate::DirectionTable& directions, int environment_height) {
+  const auto at = [&](int x) {
+    const std::size_t i = directions.index(directions.height / 2, x);
+    return Vec3f{directions.x[i], directions.y[i], directions.z[i]};
+  };
+  const Vec3f a = at(directions.width / 2 - 1);
+  const Vec3f b = at(directions.width / 2);
+  const double pixel_rad = length(a - b);
+  if (dot(a, a) == 0 || dot(b, b) == 0 || pixel_rad == 0) return 1;
+  return std::clamp(static_cast<int>(pi / environment_height / pixel_rad / pixels_along_texel), 1,
+                    most_step);
+}
+
+std::vector<Texel> average_over_texels(const capture::Image& plate,
+                                       const calibrate::DirectionTable& directions,
+                                       const calibrate::Pose& cam_from_set,
+                                       const Environment& env,
+                                       const MatchSettings& settings) {
+  const int width = env.radiance.width;
+  const int height = env.radiance.height;
+  std::vector<Texel> texels(env.radiance.pixels.size() / 3);
+  const calibrate::Mat3 set_from_cam = cam_from_set.R.transposed();
+  const int step = pixel_step(directions, height);
+  for (int y = step / 2; y < plate.height; y += step) {
+    for (int x = step / 2; x < plate.width; x += step) {
+      const std::size_t i = directions.index(y, x);
+      const calibrate::Vec3 v_cam{directions.x[i], directions.y[i], directions.z[i]};
+      if (dot(v_cam, v_cam) == 0) continue;
+      const auto at = texel_of_direction(to_float(set_from_cam * v_cam), width, height);
+      const int column = std::clamp(static_cast<int>(std::lround(at[0])), 0, width - 1);
+      const int row = std::clamp(static_cast<int>(std::lround(at[1])), 0, height - 1);
+      Texel& texel = texels[static_cast<std::size_t>(row * width + column)];
+      const float* p = &plate.pixels[plate.index(y, x)];
+      if (texel.pixels == not_usable) continue;
+      if (!usable(p, settings)) {
+        texel.pixels = not_usable;
+        continue;
+      }
+      for (std::size_t c = 0; c < 3; ++c) texel.sum[c] += p[c];
+      ++texel.pixels;
+    }
+  }
+  return texels;
+}
+
 bool is_lit(Vec3f irradiance) {
   return irradiance.x > 0 && irradiance.y > 0 && irradiance.z > 0 &&
          std::isfinite(irradiance.x + irradiance.y + irradiance.z);
@@ -87,42 +143,18 @@ MatchResult match_by_overlap(const capture::Image& plate,
       plate.channels != 3) {
     throw std::invalid_argument("the plate is not of its lens's size");
   }
-  // The plate, averaged over the environment's texels.
-  struct Texel {
-    std::array<double, 3> sum{};
-    int pixels = 0;
-    bool usable = true;
-  };
-  const int width = env.radiance.width;
-  const int height = env.radiance.height;
-  std::vector<Texel> texels(env.radiance.pixels.size() / 3);
-  const calibrate::Mat3 set_from_cam = cam_from_set.R.transposed();
-  for (int y = 0; y < plate.height; ++y) {
-    for (int x = 0; x < plate.width; ++x) {
-      const std::size_t i = plate_directions.index(y, x);
-      const calibrate::Vec3 v_cam{plate_directions.x[i], plate_directions.y[i],
-                                  plate_directions.z[i]};
-      if (dot(v_cam, v_cam) == 0) continue;
-      const auto at = texel_of_direction(to_float(set_from_cam * v_cam), width, height);
-      const int column = std::clamp(static_cast<int>(std::lround(at[0])), 0, width - 1);
-      const int row = std::clamp(static_cast<int>(std::lround(at[1])), 0, height - 1);
-      Texel& texel = texels[static_cast<std::size_t>(row * width + column)];
-      const float* p = &plate.pixels[plate.index(y, x)];
-      texel.usable = texel.usable && usable(p, settings);
-      for (std::size_t c = 0; c < 3; ++c) texel.sum[c] += p[c];
-      ++texel.pixels;
-    }
-  }
+  const std::vector<Texel> texels =
+      average_over_texels(plate, plate_directions, cam_from_set, env, settings);
   MatchResult result;
   std::vector<Colour> ratios;
   for (std::size_t t = 0; t < texels.size(); ++t) {
     const Texel& texel = texels[t];
     const bool seen = env.seen.empty() || env.seen[t] != 0;
-    if (!seen || !texel.usable || texel.pixels < least_pixels_per_texel) continue;
+    if (!seen || texel.pixels < least_pixels_per_texel) continue;
     Colour ratio{};
     for (std::size_t c = 0; c < 3; ++c) {
-      ratio[c] = static_cast<float>(texel.sum[c] / texel.pixels /
-                                    counted_radiance(env.radiance.pixels[3 * t + c]));
+      ratio[c] = texel.sum[c] / static_cast<float>(texel.pixels) /
+                 counted_radiance(env.radiance.pixels[3 * t + c]);
     }
     if (!std::isfinite(ratio[0] + ratio[1] + ratio[2])) continue;
     ratios.push_back(ratio);
