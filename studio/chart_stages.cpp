@@ -3,10 +3,12 @@
 
 #include <vector>
 
+#include "studio/charts/lights.h"
+
 namespace studio {
 
 std::span<const ChartStage> chart_stages() {
-  static const std::vector<ChartStage> all{};
+  static const std::vector<ChartStage> all{lights_chart()};
   return all;
 }
 

@@ -40,6 +40,7 @@ std::span<const Command> commands() {
       still_command(),
       hdr_command(),
       chart_command(),
+      bench_command(),
   };
   return all;
 }

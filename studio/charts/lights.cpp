@@ -131,7 +131,7 @@ class LightsChart {
       picture = render(shot_.environment, table, effort);
       p.time_ms = std::min(p.time_ms, milliseconds_since(start));
     }
-    const render::PictureError error = picture_error(picture, reference_, mask_);
+    const render::PictureError error = render::picture_error(picture, reference_, mask_);
     p.error = error.relative_rms;
     p.error_p99 = error.p99;
     const capture::Image a =
@@ -155,7 +155,7 @@ class LightsChart {
     p.time_ms = milliseconds_since(start);
     settings.seed = 12;
     const capture::Image b = render_reference(shot_.inputs(), shot_.job, shot_.plate, settings);
-    const render::PictureError error = picture_error(a, reference_, mask_);
+    const render::PictureError error = render::picture_error(a, reference_, mask_);
     p.error = error.relative_rms;
     p.error_p99 = error.p99;
     p.figures = {{"flicker", difference(a, b, mask_)}};
@@ -175,7 +175,7 @@ class LightsChart {
     render::FrameResult result;
     render_frame(small.inputs(), job, small.half_plate, result);
     const render::PictureError error =
-        picture_error(capture::to_float(result.rgba), truth, affected_mask(small, truth));
+        render::picture_error(capture::to_float(result.rgba), truth, affected_mask(small, truth));
     return {value, error.relative_rms, job.lights.error_estimate, "ok"};
   }
 

@@ -5,6 +5,7 @@
 
 namespace studio {
 
+Command bench_command();
 Command chart_command();
 Command check_command();
 Command hdr_command();
