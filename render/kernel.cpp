@@ -16,7 +16,7 @@ namespace {
 constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
 constexpr int ring_pixels = ring_size * ring_size;
 constexpr int samples_max = 64;  // camera rays in one pixel
-constexpr std::uint32_t no_hit = ~0U;
+constexpr Scene::Surface no_hit{~0U, ~0U};
 
 // A stream of rays with their hits.
 struct RayStream {
@@ -52,8 +52,8 @@ struct Sample {
 
 // What the camera ray through a pixel's centre met: enough to find edges and to share shading.
 struct Met {
-  std::uint32_t surface;  // object and material, or no_hit
-  Vec3f normal;           // of the triangle, unit, towards the camera
+  Scene::Surface surface;  // or no_hit
+  Vec3f normal;            // of the triangle, unit, towards the camera
   Vec3f position;
 };
 
@@ -309,8 +309,7 @@ Met TileWorkspace::Impl::met_at(int index) const {
   const Vec3f d{s.dx[i], s.dy[i], s.dz[i]};
   Vec3f n = normalize(Vec3f{s.ngx[i], s.ngy[i], s.ngz[i]});
   if (dot(n, d) > 0) n = -n;
-  const std::uint32_t surface =
-      s.inst[i] == RTC_INVALID_GEOMETRY_ID ? s.geom[i] * 2 : (s.inst[i] * 64 + s.geom[i]) * 2 + 1;
+  const Scene::Surface surface = frame->inputs.scene->surface_of(s.geom[i], s.prim[i], s.inst[i]);
   return {surface, n, frame->camera + d * s.far_m[i]};
 }
 

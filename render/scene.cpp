@@ -472,8 +472,14 @@ HitPoint Scene::hit_point(
     unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
   return impl_->hit_point(geom_id, prim_id, inst_id, u, v, incoming);
 }
-std::uint32_t Scene::instance_of(unsigned geom_id, unsigned inst_id) const {
-  return impl_->instance_of_geometry[inst_id == RTC_INVALID_GEOMETRY_ID ? geom_id : inst_id];
+Scene::Surface Scene::surface_of(unsigned geom_id, unsigned prim_id, unsigned inst_id) const {
+  Surface surface;
+  const Impl::Part& part = impl_->part(geom_id, inst_id, surface.instance);
+  const std::vector<std::uint32_t>& materials = impl_->description.meshes[part.mesh]->materials;
+  const std::uint32_t triangle =
+      part.triangle_of_prim.empty() ? prim_id : part.triangle_of_prim[prim_id];
+  surface.material = materials[materials.size() == 1 ? 0 : triangle];
+  return surface;
 }
 const Shader& Scene::shader_of(std::uint32_t material) const { return *impl_->shaders[material]; }
 const BackgroundShader& Scene::background() const { return *impl_->background; }

@@ -83,8 +83,12 @@ class Scene {
   // The point that Embree's ids and barycentric u, v name. `incoming` is the ray's direction.
   HitPoint hit_point(
       unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const;
-  // Instance that Embree's ids name, without the rest.
-  std::uint32_t instance_of(unsigned geom_id, unsigned inst_id) const;
+  // Instance and material that Embree's ids name, without the rest.
+  struct Surface {
+    std::uint32_t instance = 0, material = 0;
+    friend bool operator==(const Surface&, const Surface&) = default;
+  };
+  Surface surface_of(unsigned geom_id, unsigned prim_id, unsigned inst_id) const;
   const Shader& shader_of(std::uint32_t material) const;
   const BackgroundShader& background() const;
   // Whether any stand-in blocks light; whether any surface lets some through.
