@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <stdexcept>
+#include <vector>
 
 #include "capture/counter_random.h"
 
@@ -55,6 +57,58 @@ double read_electrons(const MadeSensor& sensor, double mean, std::uint64_t key) 
   return photons + (read > 0 ? read * normal_deviate(mixed_bits(key)) : 0);
 }
 
+// The codes of a sensor by the light at which each begins.
+class Coder {
+ public:
+  explicit Coder(const MadeSensor& sensor)
+      : linear_(sensor.transfer == Transfer::linear),
+        pedestal_(sensor.pedestal),
+        scale_(last_code(sensor) - sensor.pedestal),
+        last_(last_code(sensor)) {
+    if (linear_) return;
+    for (int code = 1; code <= last_; ++code) {
+      begins_.push_back(decode(sensor.transfer, (code - 0.5 - pedestal_) / scale_));
+    }
+    for (int bin = 0; bin <= bins; ++bin) {
+      first_.push_back(
+          count_up_to(static_cast<double>(bin) * bin / (bins * double{bins}), 0, begins_.size()));
+    }
+  }
+
+  std::uint16_t code(double light) const {
+    if (linear_) {
+      const double code = std::floor(pedestal_ + scale_ * light + 0.5);
+      return static_cast<std::uint16_t>(std::clamp(code, 0.0, double(last_)));
+    }
+    if (light >= 1) return static_cast<std::uint16_t>(last_);
+    // The square root spreads codes evenly enough over the bins.
+    const int bin = light > 0 ? static_cast<int>(std::sqrt(light) * bins) : 0;
+    const std::size_t from = light > 0 ? first_[static_cast<std::size_t>(bin)] : 0;
+    // The next bin but one: the root is rounded.
+    const std::size_t to = first_[static_cast<std::size_t>(std::min(bin + 2, bins))];
+    return static_cast<std::uint16_t>(count_up_to(light, from > 0 ? from - 1 : 0, to));
+  }
+
+ private:
+  static constexpr int bins = 1024;
+
+  // How many codes beyond 0 begin at `light` or below, known to be `from` to `to`.
+  std::size_t count_up_to(double light, std::size_t from, std::size_t to) const {
+    const auto begin = begins_.begin();
+    return static_cast<std::size_t>(std::upper_bound(begin + static_cast<std::ptrdiff_t>(from),
+                                                     begin + static_cast<std::ptrdiff_t>(to),
+                                                     light) -
+                                    begin);
+  }
+
+  bool linear_;
+  double pedestal_;
+  double scale_;
+  int last_;
+  std::vector<double> begins_;      // of code i + 1
+  std::vector<std::size_t> first_;  // codes that begin up to each bin's lower edge
+};
+
 }  // namespace
 
 MadeShot expose(const MadeSensor& sensor,
@@ -68,17 +122,15 @@ MadeShot expose(const MadeSensor& sensor,
   }
   MadeShot result{radiance.width, radiance.height, radiance.channels, sensor.bits,
                   std::vector<std::uint16_t>(radiance.pixels.size())};
+  const Coder coder(sensor);
   const double electrons = sensor.full_well_e * exposure_s / sensor.saturation;
-  const double scale = last_code(sensor) - sensor.pedestal;
   const std::uint64_t shot_key = mixed_bits(sensor.seed, shot);
   for (std::size_t i = 0; i < result.codes.size(); ++i) {
     const double seen = std::isfinite(radiance.pixels[i]) ? radiance.pixels[i] : 0;
     // Beyond 64 wells nothing is left to chance: the site is full.
     const double mean = std::clamp(seen * electrons, 0.0, 64 * sensor.full_well_e);
     const double light = read_electrons(sensor, mean, mixed_bits(shot_key, i)) / sensor.full_well_e;
-    const double value = encode(sensor.transfer, std::min(light, 1.0));
-    const double code = std::floor(sensor.pedestal + scale * value + 0.5);
-    result.codes[i] = static_cast<std::uint16_t>(std::clamp(code, 0.0, double(last_code(sensor))));
+    result.codes[i] = coder.code(std::min(light, 1.0));
   }
   return result;
 }

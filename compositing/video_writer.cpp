@@ -160,6 +160,7 @@ void VideoWriter::State::open_streams() {
   muxer.reset(context);
   muxer->pb = file.context();
   muxer->flags |= AVFMT_FLAG_CUSTOM_IO | AVFMT_FLAG_FLUSH_PACKETS;
+  if (settings.repeatable) muxer->flags |= AVFMT_FLAG_BITEXACT;
 
   picture_stream = avformat_new_stream(context, nullptr);
   if (picture_stream == nullptr) throw std::bad_alloc();

@@ -23,6 +23,7 @@ struct VideoSettings {
   std::string timecode;            // of picture 0; "" = none
   int sound_channels = 0;          // 0 = silent
   int sound_rate = 0;
+  bool repeatable = false;  // the same pictures and sound give the same bytes: no random numbers
 };
 
 // Throws std::invalid_argument with the reason if the settings cannot be.

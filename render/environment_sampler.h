@@ -15,7 +15,9 @@ struct EnvironmentSample {
   float density = 0;  // with which it is chosen, per steradian
 };
 
-// Works on every texel of the map at its full size. Keeps a copy with counted radiance
+// Follows the map at its full size, and between texels too: look-ups are bilinear, and so is each
+// quarter of a texel, which is sampled exactly in proportion to its light. So radiance over density
+// hardly varies, however few texels hold the sun. Keeps a copy with counted radiance
 // (environment.h).
 class EnvironmentSampler {
  public:
@@ -28,12 +30,21 @@ class EnvironmentSampler {
   Vec3f radiance(Vec3f direction) const { return radiance_of(environment_, direction, 0); }
 
  private:
+  // A quarter of a texel: the light (all colours together) at its corners, and its chance.
+  struct Patch {
+    float light[2][2];  // [lower][right]
+    double chance = 0;
+  };
+  Patch patch(std::size_t row, std::size_t column) const;
+  // Density over the unit square of the patch, times its chance, to density per steradian.
+  float per_steradian(const Patch& patch, double s, double t, double sine) const;
+
   Environment environment_;
-  int width_ = 0;
-  int height_ = 0;
-  std::vector<double> rows_;      // cumulative, up to 1
-  std::vector<float> columns_;    // per row cumulative, up to 1
-  std::vector<float> densities_;  // per texel, times the sine of the angle from the pole
+  std::size_t width_ = 0;  // of the grid of patches
+  std::size_t height_ = 0;
+  std::vector<float> corners_;  // (height_ + 1, width_ + 1)
+  std::vector<double> rows_;    // cumulative, up to 1
+  std::vector<float> columns_;  // per row cumulative, up to 1
 };
 
 }  // namespace render

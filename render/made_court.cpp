@@ -132,6 +132,14 @@ void add_things(Builder& court, int texture_size, std::uint32_t seed) {
          {-6.7F, 6.3F, 0}, 0.5F);
   court.add("crates", std::move(crates), white, 0.7F, boards);
 
+  const MadeCard& card = court_card;
+  Mesh sheet;
+  append(sheet,
+         make_rectangle({-card.width / 2, -card.depth / 2, 0}, {card.width, 0, 0},
+                        {0, card.depth, 0}, 0),
+         card.middle, card.yaw_rad);
+  court.add("grey card", std::move(sheet), {card.albedo, card.albedo, card.albedo}, 1, -1, 0);
+
   constexpr std::array<std::array<float, 2>, 2> cones{{{-4.1F, 2.2F}, {-3.1F, 4.0F}}};
   Mesh orange;
   Mesh rings;

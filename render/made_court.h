@@ -22,9 +22,21 @@ struct MadeCrate {
 };
 inline constexpr MadeCrate court_crate{{4.9F, 4.6F, 0}, {1.1F, 1.1F, 1.0F}, 0.35F};
 
-// Asphalt with lines and kerbs at z = 0 around the origin, which is free within 3.4 m; a wall in
-// the +y direction, a lamp post, crates, cones and bollards. Every instance is a virtual object
-// with a material of the shader "standard".
+// A matte grey card for matching cameras, flat on the court.
+struct MadeCard {
+  Vec3f middle;
+  float width, depth;  // along its own x and y
+  float yaw_rad;
+  float albedo;
+};
+inline constexpr MadeCard court_card{{0.1F, -2.1F, 0.004F}, 0.5F, 0.36F, 0.9F, 0.5F};
+
+// How the car of the made set stands at the origin.
+inline constexpr double court_car_yaw_deg = -165;
+
+// Asphalt with lines and kerbs at z = 0 around the origin, where nothing but a grey card lies
+// within 3.4 m; a wall in the +y direction, a lamp post, crates, cones and bollards. Every instance
+// is a virtual object with a material of the shader "standard".
 SceneDescription make_court(const MadeCourtSettings& settings);
 
 }  // namespace render

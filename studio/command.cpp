@@ -39,6 +39,7 @@ std::span<const Command> commands() {
       check_command(),
       still_command(),
       hdr_command(),
+      demo_command(),
       chart_command(),
       bench_command(),
   };

@@ -8,6 +8,7 @@ namespace studio {
 Command bench_command();
 Command chart_command();
 Command check_command();
+Command demo_command();
 Command hdr_command();
 Command run_command();
 Command still_command();

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "capture/counter_random.h"
+
 namespace capture {
 namespace {
 
@@ -57,6 +59,14 @@ TEST(Expose, HasTheMeanAndVarianceThatItStates) {
   }
 }
 
+TEST(NormalQuantile, IsThatOfTheTables) {
+  EXPECT_NEAR(normal_quantile(0.5), 0, 1e-9);
+  EXPECT_NEAR(normal_quantile(0.975), 1.959963985, 1e-6);
+  EXPECT_NEAR(normal_quantile(0.1), -1.281551566, 1e-6);
+  EXPECT_NEAR(normal_quantile(1e-6), -4.753424309, 1e-6);
+  EXPECT_NEAR(normal_quantile(1 - 1e-9), 5.997807015, 1e-5);
+}
+
 TEST(Expose, GivesTwiceTheLightForTwiceTheTime) {
   const MadeSensor sensor{.saturation = 0.05, .full_well_e = 1e6, .read_noise_e = 0, .bits = 16};
   const double once = moments_of(expose(sensor, grey(1), 0.01, 0)).mean;
@@ -86,7 +96,7 @@ TEST(Expose, RoundsToTheCodeThatStandsForTheLight) {
                             .read_noise_e = 0,
                             .bits = 8,
                             .transfer = transfer};
-    for (int code = 1; code < 255; ++code) {
+    for (int code = 0; code <= 255; ++code) {
       const auto light = static_cast<float>(light_of_code(sensor, code));
       EXPECT_EQ(expose(sensor, grey(light, 1), exposure_s, 0).codes[0], code);
     }

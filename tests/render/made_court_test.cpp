@@ -43,10 +43,10 @@ TEST(MakeCourt, TurnsEveryTriangleTheWayOfItsNormals) {
   }
 }
 
-TEST(MakeCourt, IsFlatAndFreeAroundTheOrigin) {
+TEST(MakeCourt, IsFlatAndFreeAroundTheOriginButForACard) {
   const SceneDescription court = make_court(small());
   for (const Instance& instance : court.instances) {
-    if (instance.name == "court") continue;
+    if (instance.name == "court" || instance.name == "grey card") continue;
     for (const Vec3f p : court.meshes[instance.mesh]->positions) {
       ASSERT_GT(std::hypot(p.x, p.y), 3.4F) << instance.name;
     }

@@ -1,0 +1,19 @@
+// The cameras of the made studio as sources of frames.
+#pragma once
+
+namespace render {
+
+// Registers the scheme "made" with capture::open_camera. Call once at start-up.
+//
+//     made:plate?width=640&height=480&frames=60&samples=4&seed=1
+//     made:probe?size=384&frames=180&samples=4&seed=1
+//
+// All settings are optional. `frames` are those that come before the end, 0 (the default) = without
+// end; `samples` are the paths per pixel of the still pictures that all frames are made from when
+// the camera is opened, which takes some seconds. Frame n is the same however often it is asked
+// for: picture n of the camera, with its own noise and its own strength of the sun. Values are the
+// sensor's codes, decoded by options.colour; the first frame's time is 0. options.response is not
+// used: the codes follow the camera's transfer (made_studio.h). options.loop changes nothing.
+void register_made_cameras();
+
+}  // namespace render

@@ -1,0 +1,95 @@
+// The made studio: a court under a made sky, seen by a made plate camera and a made fish-eye.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "calibrate/lens.h"
+#include "calibrate/pose.h"
+#include "capture/frame.h"
+#include "capture/made_sensor.h"
+#include "render/made_court.h"
+#include "render/made_sky.h"
+#include "render/scene.h"
+
+namespace render {
+
+// A camera of the studio: how it stands, sees and codes. It takes `rate` pictures per second, with
+// its exposures in turn; picture 0 is exposed about `start`.
+struct MadeCamera {
+  calibrate::Lens lens;
+  calibrate::Pose cam_from_set;
+  capture::MadeSensor sensor;
+  std::vector<double> exposures_s;
+  capture::Rational rate;
+  capture::Time start{};
+};
+
+// The middle of the exposure of picture n, and its exposure.
+capture::Time time_of_picture(const MadeCamera& camera, std::int64_t n);
+double exposure_of_picture(const MadeCamera& camera, std::int64_t n);
+
+struct MadeStudioSettings {
+  int width = 640;  // of the plate
+  int height = 480;
+  int probe_size = 384;     // of the fish-eye's square picture
+  int sky_height = 512;     // of the sky's maps
+  int texture_size = 2560;  // of the court's side
+  int frames = 60;          // of the plate, after which the light repeats itself
+  std::uint32_t seed = 1;
+};
+
+// Everything of the studio but time. The set's origin is the spot on the court where a car is to
+// stand; radiance is in the plate's units, 1 = display white.
+struct MadeStudio {
+  MadeStudioSettings settings;
+  MadeSky sky;
+  SceneDescription court;
+  MadeCamera plate;  // 25 pictures a second, Rec.1886 codes of 8 bits
+  MadeCamera
+      probe;  // 75 a second, three exposures in turn, sRGB codes of 8 bits, looking straight up
+  capture::Time period{};  // of the light
+};
+
+// The same settings give the same studio. Throws std::invalid_argument for sizes below 16.
+MadeStudio make_studio(const MadeStudioSettings& settings);
+
+// How strong the sun is at a time: 1, less while a thin cloud passes before it. Smooth, the same
+// again after studio.period.
+float sun_strength(const MadeStudio& studio, capture::Time time);
+
+// Where the plate shows the inside of the grey card: x, y, width, height of a rectangle of pixels
+// that lies in it.
+std::array<int, 4> picture_of_card(const MadeStudio& studio);
+
+// What is seen of a still scene, by where its light came from: at any strength of the sun, the
+// picture is rest + strength * sun, since light adds.
+struct LightParts {
+  capture::Image sun;   // (height, width, 3)
+  capture::Image rest;  // (height, width, 3)
+};
+capture::Image add_light(const LightParts& parts, float sun_strength);
+
+// A scene in the studio's light through `directions`, path-traced with `samples` paths a pixel for
+// each part of the light, and more where the sun itself is seen. Noise does not depend on the number
+// of threads.
+LightParts photograph_parts(const MadeStudio& studio,
+                            const Scene& scene,
+                            const calibrate::DirectionTable& directions,
+                            const calibrate::Pose& cam_from_set,
+                            int samples);
+
+// Directions of a latitude-longitude map (height, 2 * height) as render::Environment has them, for
+// a camera that is not turned against the set.
+calibrate::DirectionTable latlong_directions(int height);
+
+// Which share of every pixel the instances named in `seen` (one flag for each) cover, (height,
+// width, 1).
+capture::Image coverage_of(const SceneDescription& scene,
+                           const std::vector<bool>& seen,
+                           const calibrate::DirectionTable& directions,
+                           const calibrate::Pose& cam_from_set,
+                           int samples);
+
+}  // namespace render

@@ -1,0 +1,64 @@
+// platelight demo: makes footage, sets and their truth.
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "studio/commands/commands.h"
+#include "studio/demo.h"
+
+namespace studio {
+namespace {
+
+struct DemoOptions {
+  std::string dir;
+  std::optional<std::int64_t> samples;
+  std::optional<std::int64_t> frames;
+  std::optional<std::int64_t> seed;
+};
+
+void demo(const DemoOptions& options, Console& console) {
+  DemoSettings settings;
+  settings.dir = options.dir;
+  if (options.samples) settings.samples = static_cast<int>(*options.samples);
+  if (options.frames) settings.studio.frames = static_cast<int>(*options.frames);
+  if (options.seed) settings.studio.seed = static_cast<std::uint32_t>(*options.seed);
+  const auto start = std::chrono::steady_clock::now();
+  const DemoFigures made = write_court_demo(
+      settings, [&](double share, std::string_view what) { console.progress(share, what); });
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  console.figures(nlohmann::ordered_json{{"frames", made.frames},
+                                         {"shots", made.shots},
+                                         {"car_share", made.car_share},
+                                         {"ground_share", made.ground_share},
+                                         {"bytes", made.bytes},
+                                         {"time_ms", seconds * 1000}}
+                      .dump(2));
+  console.say(
+      fmt::format("{}: {} frames, {} probe shots, {:.0f} MB in {:.1f} s; the car "
+                  "covers {:.0f} % of the picture",
+                  (settings.dir / "car.toml").string(), made.frames, made.shots,
+                  static_cast<double>(made.bytes) * 1e-6, seconds, 100 * made.car_share));
+}
+
+}  // namespace
+
+Command demo_command() {
+  return {"demo", "Make footage, a set and their truth", "platelight demo made",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto options = std::make_shared<DemoOptions>();
+            arguments.positional("DIR", options->dir, "where to write");
+            arguments.option("--samples", options->samples, 1, 65536,
+                             "paths per pixel of the truth, for each part of the light (32)");
+            arguments.option("--frames", options->frames, 1, 100000, "frames of the plate (60)");
+            arguments.option("--seed", options->seed, 1, 1'000'000,
+                             "another one makes another sky");
+            return [options](Console& console) { demo(*options, console); };
+          }};
+}
+
+}  // namespace studio
