@@ -243,8 +243,7 @@ ValueGrid code_grid(int depth, bool limited) {
 
 }  // namespace
 
-CodedRows::CodedRows(const AVFrame& frame, bool centred_chroma)
-    : transfer_tag_(capture::transfer_tag(frame)) {
+CodedRows::CodedRows(const AVFrame& frame) : transfer_tag_(capture::transfer_tag(frame)) {
   auto format = static_cast<AVPixelFormat>(frame.format);
   const AVPixFmtDescriptor* its = av_pix_fmt_desc_get(format);
   if (its == nullptr) {
@@ -262,7 +261,7 @@ CodedRows::CodedRows(const AVFrame& frame, bool centred_chroma)
     description_ += std::string(" by swscale as ") + its->name;
   }
   if ((its->flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL)) == 0 && its->nb_components >= 3) {
-    const YcbcrTags tags = ycbcr_tags(frame, centred_chroma);
+    const YcbcrTags tags = ycbcr_tags(frame);
     auto reader = std::make_unique<Ycbcr>(frame, *its, tags);
     grid_ = reader->matrix.grid();
     description_ += ", " + tags.description;

@@ -22,9 +22,9 @@ using CodedRow = std::array<const std::int32_t*, 3>;
 // Not thread-safe.
 class CodedRows {
  public:
-  // Takes size, format and tags from `frame`; `centred_chroma` as in ycbcr_tags.
+  // Takes size, format and tags from `frame`.
   // Throws std::runtime_error, without a file name, if format or tags are of a kind not handled.
-  CodedRows(const AVFrame& frame, bool centred_chroma);
+  explicit CodedRows(const AVFrame& frame);
   ~CodedRows();
 
   bool fits(const AVFrame& frame) const;

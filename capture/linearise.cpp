@@ -17,8 +17,7 @@ std::vector<float> make_table(const ValueGrid& grid, const Curve& curve) {
 
 }  // namespace
 
-Lineariser::Lineariser(LightCurves curves, bool centred_chroma)
-    : curves_(std::move(curves)), centred_chroma_(centred_chroma) {}
+Lineariser::Lineariser(LightCurves curves) : curves_(std::move(curves)) {}
 
 void Lineariser::make_tables() {
   const ValueGrid& grid = rows_->grid();
@@ -36,7 +35,7 @@ void Lineariser::make_tables() {
 
 void Lineariser::linearise(const AVFrame& picture, const Crop& crop, Image& image) {
   if (!rows_ || !rows_->fits(picture)) {
-    rows_ = std::make_unique<CodedRows>(picture, centred_chroma_);
+    rows_ = std::make_unique<CodedRows>(picture);
     make_tables();
   }
   image.height = crop.height;

@@ -30,7 +30,7 @@ struct LightCurves {
 // between pictures that are alike. Not thread-safe.
 class Lineariser {
  public:
-  Lineariser(LightCurves curves, bool centred_chroma);
+  explicit Lineariser(LightCurves curves);
 
   // Light of a part of the picture, into `image`: (crop.height, crop.width, 3).
   // Throws std::runtime_error, without a file name, if format or tags are of a kind not handled.
@@ -43,7 +43,6 @@ class Lineariser {
   void make_tables();
 
   LightCurves curves_;
-  bool centred_chroma_;
   std::unique_ptr<CodedRows> rows_;
   std::array<std::vector<float>, 3> tables_;  // one, and two empty ones, if channels are alike
 };

@@ -75,7 +75,7 @@ class PictureCamera : public Camera {
   std::shared_ptr<const Image> load(std::size_t entry);
 
   std::vector<PictureEntry> entries_;
-  LightCurves curves_;
+  Lineariser lineariser_;
   bool loop_;
   int source_width_ = 0;
   int source_height_ = 0;
@@ -98,7 +98,7 @@ PictureCamera::PictureCamera(const std::string& name,
                              const CameraOptions& options,
                              LightCurves curves)
     : entries_(std::move(entries)),
-      curves_(std::move(curves)),
+      lineariser_(std::move(curves)),
       loop_(options.loop),
       loaded_entry_(entries_.size()) {
   const auto fail = [&](const std::string& why) {
@@ -113,7 +113,7 @@ PictureCamera::PictureCamera(const std::string& name,
   std::string reason;
   for (std::size_t i = entry_; i < entries_.size() && !last_image_; ++i) {
     try {
-      Still still = read_picture(entries_[i].path, curves_);
+      Still still = read_picture(entries_[i].path, lineariser_);
       source_width_ = still.image.width;
       source_height_ = still.image.height;
       crop_ = crop_within(options.crop, source_width_, source_height_);
@@ -145,7 +145,7 @@ std::shared_ptr<const Image> PictureCamera::load(std::size_t entry) {
   if (entry == loaded_entry_) {
     return last_image_;
   }
-  Still still = read_picture(entries_[entry].path, curves_);
+  Still still = read_picture(entries_[entry].path, lineariser_);
   if (still.image.width != source_width_ || still.image.height != source_height_) {
     throw std::runtime_error(entries_[entry].path + " has another size than the first picture");
   }
@@ -200,9 +200,9 @@ double exposure_in(const std::string& path) {
   return marked_s > 0 ? snapped_exposure_s(marked_s) : 0;
 }
 
-Still read_picture(const std::string& path, const LightCurves& curves) {
+Still read_picture(const std::string& path, Lineariser& lineariser) {
   if (!is_exr(path) && !is_radiance(path)) {
-    return read_still(path, curves);
+    return read_still(path, lineariser);
   }
   check_is_file(path);
   if (is_exr(path)) {

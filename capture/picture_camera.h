@@ -22,9 +22,9 @@ struct PictureEntry {
 
 // Reads any picture file as three channels of light: OpenEXR and Radiance pictures, by their
 // endings
-// (.exr, .hdr, .pic), are light already; other stills are read by `curves`.
+// (.exr, .hdr, .pic), are light already; other stills are linearised.
 // Throws std::runtime_error with path, reason and what to do.
-Still read_picture(const std::string& path, const LightCurves& curves);
+Still read_picture(const std::string& path, Lineariser& lineariser);
 
 // Whether read_picture would know the kind of file.
 bool is_picture(const std::string& path);

@@ -55,7 +55,7 @@ struct Sitings {
   const char* name;
 };
 
-Sitings sitings(AVChromaLocation location, bool centred) {
+Sitings sitings(AVChromaLocation location) {
   switch (location) {
     case AVCHROMA_LOC_LEFT:
       return {Siting::first, Siting::middle, "chroma left"};
@@ -70,8 +70,7 @@ Sitings sitings(AVChromaLocation location, bool centred) {
     case AVCHROMA_LOC_BOTTOM:
       return {Siting::middle, Siting::last, "chroma bottom"};
     default:
-      return centred ? Sitings{Siting::middle, Siting::middle, "chroma centre (untagged)"}
-                     : Sitings{Siting::first, Siting::middle, "chroma left (untagged)"};
+      return {Siting::first, Siting::middle, "chroma left (untagged)"};
   }
 }
 
@@ -90,9 +89,9 @@ bool is_full_range_format(int format) {
 
 }  // namespace
 
-YcbcrTags ycbcr_tags(const AVFrame& frame, bool centred_chroma) {
+YcbcrTags ycbcr_tags(const AVFrame& frame) {
   const LumaWeights weights = luma_weights(frame.colorspace, frame.height);
-  const Sitings sited = sitings(frame.chroma_location, centred_chroma);
+  const Sitings sited = sitings(frame.chroma_location);
   const bool full = frame.color_range == AVCOL_RANGE_JPEG || is_full_range_format(frame.format);
   return {weights.kr, weights.kb,
           full,       sited.across,

@@ -26,9 +26,9 @@ struct YcbcrTags {
 };
 
 // Untagged pictures: BT.601 up to 576 rows, else BT.709, limited range unless the format says full;
-// chroma as in MPEG-2, or centred if `centred_chroma` (JPEG).
+// chroma as in MPEG-2 (libav tags that of JPEG).
 // Throws std::runtime_error, without a file name, for a matrix that is not handled.
-YcbcrTags ycbcr_tags(const AVFrame& frame, bool centred_chroma);
+YcbcrTags ycbcr_tags(const AVFrame& frame);
 
 // Whether codes of RGB, grey or palette are of limited range; full if untagged.
 bool is_limited_rgb(const AVFrame& frame);

@@ -166,7 +166,7 @@ Still8 decode_still8(std::span<const std::byte> file_bytes, const std::string& n
     fail(name, "neither PNG nor JPEG; convert it to one of them");
   }
   const libav::FrameHandle frame = decode(*codec, file_bytes, name);
-  CodedRows rows(*frame, *codec == AV_CODEC_ID_MJPEG);
+  CodedRows rows(*frame);
   const bool alpha = rows.has_alpha() && *codec == AV_CODEC_ID_PNG;
   const std::vector<std::uint8_t> codes = codes_of(rows.grid());
   const std::vector<std::uint8_t> alpha_codes =
@@ -202,6 +202,11 @@ bool is_still(const std::string& path) {
 }
 
 Still read_still(const std::string& path, const LightCurves& curves) {
+  Lineariser lineariser(curves);
+  return read_still(path, lineariser);
+}
+
+Still read_still(const std::string& path, Lineariser& lineariser) {
   check_is_file(path);
   const std::vector<std::byte> bytes = read_file(path, max_file_bytes);
   const std::optional<AVCodecID> codec = codec_of(bytes, path);
@@ -210,7 +215,6 @@ Still read_still(const std::string& path, const LightCurves& curves) {
   }
   const libav::FrameHandle frame = decode(*codec, bytes, path);
   try {
-    Lineariser lineariser(curves, *codec == AV_CODEC_ID_MJPEG);
     Still still;
     lineariser.linearise(*frame, crop_within({}, frame->width, frame->height), still.image);
     still.description = std::string(avcodec_get_name(*codec)) + ", " + lineariser.description();

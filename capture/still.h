@@ -12,6 +12,7 @@
 
 namespace capture {
 
+class Lineariser;
 struct LightCurves;
 
 // (height, width, channels), row by row: 3 = RGB, 4 = RGB and unassociated alpha; the file's own
@@ -42,5 +43,7 @@ bool is_still(const std::string& path);
 // Reads a still file; its codes become light by `curves`, as colour.md defines it. Alpha is not
 // read. Throws std::runtime_error with path, reason and what to do.
 Still read_still(const std::string& path, const LightCurves& curves);
+// The same for many, which keeps tables between them.
+Still read_still(const std::string& path, Lineariser& lineariser);
 
 }  // namespace capture

@@ -41,10 +41,6 @@ Rational rate_of(const AVStream& stream) {
   return rational(counted.num > 0 ? counted : average);
 }
 
-bool centres_chroma(AVCodecID codec) {
-  return codec == AV_CODEC_ID_MJPEG || codec == AV_CODEC_ID_MJPEGB || codec == AV_CODEC_ID_AMV;
-}
-
 class VideoFile : public Camera {
  public:
   VideoFile(const std::string& path, const CameraOptions& options, const LightCurves& curves);
@@ -67,6 +63,8 @@ class VideoFile : public Camera {
   std::string path_;
   bool loop_;
   CameraInfo info_;
+  int source_width_ = 0;
+  int source_height_ = 0;
   Crop crop_;
   std::unique_ptr<MediaFile> file_;
   std::unique_ptr<VideoDecoder> decoder_;
@@ -94,10 +92,10 @@ VideoFile::VideoFile(const std::string& path,
     : path_(path),
       loop_(options.loop),
       file_(std::make_unique<MediaFile>(path)),
-      lineariser_(curves, centres_chroma(codec_of(*file_))) {
+      lineariser_(curves) {
   open();
   info_.rate = rate_of(file_->video());
-  info_.frames = file_->video().nb_frames;
+  info_.frames = loop_ ? 0 : file_->video().nb_frames;
   clock_.emplace(Rational{file_->video().time_base.num, file_->video().time_base.den}, info_.rate);
   if (options.frame) {
     skip_to(*options.frame);
@@ -118,7 +116,9 @@ VideoFile::VideoFile(const std::string& path,
       const AVFrame& first = *picture->frame;
       try {
         libav::check_size(first.width, first.height);
-        crop_ = crop_within(options.crop, first.width, first.height);
+        source_width_ = first.width;
+        source_height_ = first.height;
+        crop_ = crop_within(options.crop, source_width_, source_height_);
         Image probe;
         lineariser_.linearise(first, crop_, probe);
       } catch (const std::runtime_error& error) {
@@ -232,8 +232,10 @@ Frame VideoFile::make_frame(const DecodedPicture& picture) {
 void VideoFile::linearise(const DecodedPicture& picture, Frame& frame) {
   const AVFrame& decoded = *picture.frame;
   try {
-    crop_within(std::array{crop_.x, crop_.y, crop_.width, crop_.height}, decoded.width,
-                decoded.height);
+    if (decoded.width != source_width_ || decoded.height != source_height_) {
+      throw std::runtime_error("the picture's size changed to " + std::to_string(decoded.width) +
+                               " x " + std::to_string(decoded.height));
+    }
     std::shared_ptr<Image> image = pool_.lend();
     lineariser_.linearise(decoded, crop_, *image);
     last_image_ = std::move(image);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include "capture/camera.h"
 #include "tests/independent_plate.h"
@@ -177,6 +178,23 @@ TEST_F(Plate, ComesBackWithinOneCodeByEveryCurve) {
       }
     }
   }
+}
+
+// Decoding and linearising together, of all threads; only meaningful on a machine at rest.
+TEST(PlateInTheLongTests, TakesATenthOfAFrameAt25PerSecond) {
+#if PLATELIGHT_FULL_TESTS
+  const std::filesystem::path clip = made::real_data() / "video/box.mp4";
+  if (!std::filesystem::exists(clip)) GTEST_SKIP() << "no real data";
+  const auto camera = open_camera(clip.string());
+  const std::clock_t begin = std::clock();
+  int frames = 0;
+  while (camera->next()) ++frames;
+  const double frame_ms = 1e3 * static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC / frames;
+  RecordProperty("frame_ms", std::to_string(frame_ms));
+  EXPECT_LE(frame_ms, 4.0) << "640 x 480, H.264 and sound";
+#else
+  GTEST_SKIP() << "times are measured in the long tests only";
+#endif
 }
 
 }  // namespace

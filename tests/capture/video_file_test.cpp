@@ -238,6 +238,27 @@ TEST_F(VideoFile, ShowsThePictureBeforeInPlaceOfALostOne) {
   EXPECT_EQ(frames[8].time, milliseconds(320));
 }
 
+TEST_F(VideoFile, LosesPicturesOfAnotherSizeInTheMiddle) {
+  const std::string clip =
+      make("a.ts", "testsrc2=size=64x48:rate=25:duration=0.2", "-c:v mpeg2video");
+  const std::string other = make("b.ts", "testsrc2=size=96x80:rate=25:duration=0.2",
+                                 "-c:v mpeg2video -output_ts_offset 0.2");
+  const std::vector<std::uint8_t> more = independent::read_bytes(other);
+  std::ofstream(clip, std::ios::binary | std::ios::app)
+      .write(reinterpret_cast<const char*>(more.data()), static_cast<std::streamsize>(more.size()));
+  const auto camera = open_camera(clip);
+  const std::vector<Frame> frames = all_frames(*camera);
+  // The decoder may give up a picture where one stream turns into the other.
+  ASSERT_GE(frames.size(), 9U);
+  for (std::size_t n = 0; n < frames.size(); ++n) {
+    EXPECT_EQ(frames[n].image->width, 64);
+    EXPECT_TRUE(n > 3 || frames[n].status == FrameStatus::good) << n;
+    EXPECT_TRUE(n < 6 || frames[n].status == FrameStatus::lost) << n;
+  }
+  EXPECT_THAT(frames[6].note, HasSubstr("size changed to 96 x 80"));
+  EXPECT_GE(camera->statistics().lost, 3);
+}
+
 TEST_F(VideoFile, RefusesWhatIsNoVideo) {
   const std::string text = (directory_ / "letter.mp4").string();
   std::ofstream(text) << "Dear Sir,\nthis is not a film.\n";
