@@ -1,0 +1,226 @@
+// Takes that go wrong: killed, disk full, folders that vanish, settings that cannot be.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <thread>
+
+#include "compositing/recorder.h"
+#include "take.h"
+
+namespace compositing {
+namespace {
+
+using RecorderFaultsTest = TakeTest;
+
+// The life of a child process: records, and says so once 100 frames are written.
+[[noreturn]] void record_until_killed(const RecorderSettings& settings, int pipe) {
+  Recorder recorder(settings);
+  for (std::int64_t n = 0; recorder.status().error.empty(); ++n) {
+    recorder.wait_for_room();
+    RecordedFrame frame = picture(n, textured(settings.width, settings.height, n));
+    frame.time = capture::time_of_frame(n, settings.rate);
+    frame.sound = capture::Sound{frame.time, 1, 8000, std::vector<float>(320, 0.1F)};
+    recorder.push(std::move(frame));
+    if (recorder.status().written >= 100 && ::write(pipe, "x", 1) != 1) break;
+  }
+  ::_exit(1);
+}
+
+TEST_F(RecorderFaultsTest, LeavesAPlayableFileWhenKilled) {
+  const std::string file = path("take.mkv");
+  RecorderSettings settings = small_take(file);
+  settings.width = 160;
+  settings.height = 120;
+  settings.sound_channels = 1;
+  settings.sound_rate = 8000;
+  std::array<int, 2> pipe{};
+  ASSERT_EQ(::pipe(pipe.data()), 0);
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) record_until_killed(settings, pipe[1]);
+  ::close(pipe[1]);
+  char ready = 0;
+  EXPECT_EQ(::read(pipe[0], &ready, 1), 1);
+  ::close(pipe[0]);
+  ::kill(child, SIGKILL);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status));
+
+  const int frames =
+      std::stoi(probe(file, "stream=nb_read_frames", "-count_frames -select_streams v:0"));
+  EXPECT_GE(frames, 100 - 13 - 1);  // half a second is still in memory
+  EXPECT_EQ(probe(file, "stream_tags=timecode"), "00:00:00:00");
+  output_of("ffmpeg -v error -xerror -i " + file + " -f null -");
+}
+
+// The limit on a file's size stands for a full disk: write() fails in the same way.
+TEST_F(RecorderFaultsTest, StopsCleanlyWhenTheDiskIsFull) {
+  for (const char* codec : {"h264", "lossless"}) {
+    const std::string file = path(std::string(codec) + ".mkv");
+    RecorderSettings settings = small_take(file);
+    settings.width = 160;
+    settings.height = 120;
+    settings.codec = codec;
+    settings.sound_channels = 1;
+    settings.sound_rate = 8000;
+    struct rlimit before {};
+    ::getrlimit(RLIMIT_FSIZE, &before);
+    const auto handler = ::signal(SIGXFSZ, SIG_IGN);
+    const struct rlimit limited { 1'500'000, before.rlim_max };
+    ::setrlimit(RLIMIT_FSIZE, &limited);
+    RecorderStatus status;
+    {
+      Recorder recorder(settings);
+      int n = 0;
+      for (; n < 2000 && recorder.status().error.empty(); ++n) {
+        recorder.wait_for_room();
+        RecordedFrame frame = picture(n, textured(160, 120, n));
+        frame.time = capture::time_of_frame(n, settings.rate);
+        frame.sound = capture::Sound{frame.time, 1, 8000, std::vector<float>(320, 0.1F)};
+        recorder.push(std::move(frame));
+      }
+      recorder.wait_for_room();
+      EXPECT_FALSE(recorder.push(picture(n, textured(160, 120, n))));  // the show goes on
+      recorder.close();
+      status = recorder.status();
+      EXPECT_EQ(status.written + status.dropped, n + 1);
+    }
+    ::setrlimit(RLIMIT_FSIZE, &before);
+    ::signal(SIGXFSZ, handler);
+
+    EXPECT_NE(status.error.find(file), std::string::npos) << status.error;
+    EXPECT_NE(status.error.find("File too large"), std::string::npos) << status.error;
+    EXPECT_LE(fs::file_size(file), 1'500'000U);
+    EXPECT_GT(fs::file_size(file), 700'000U);
+    // No packet lies behind the hole that the lost ones left.
+    std::istringstream packets(probe(file, "packet=pts_time:format=duration"));
+    std::vector<double> times_s;
+    for (double time_s = 0; packets >> time_s;) times_s.push_back(time_s);
+    const double duration_s = times_s.back();
+    times_s.pop_back();
+    EXPECT_GE(times_s.size(), 20U) << codec;
+    EXPECT_LE(static_cast<std::int64_t>(times_s.size()), status.written + 1);
+    EXPECT_NEAR(duration_s, static_cast<double>(times_s.size()) / 25, 1.1) << codec;
+    for (std::size_t i = 0; i < times_s.size(); ++i) {
+      ASSERT_NEAR(times_s[i], static_cast<double>(i) / 25, 0.001) << codec;
+    }
+    const std::string raw =
+        output_of("ffmpeg -v error -xerror -i " + file + " -f rawvideo -pix_fmt rgb24 -");
+    const std::size_t size = 160 * 120 * 3;
+    ASSERT_EQ(raw.size(), times_s.size() * size) << codec;
+    if (settings.codec != "lossless") continue;
+    for (std::size_t i = 0; i < times_s.size(); ++i) {
+      const auto number = static_cast<std::int64_t>(i);
+      ASSERT_EQ(std::memcmp(raw.data() + i * size, textured(160, 120, number)->data(), size), 0)
+          << i;
+    }
+  }
+}
+
+TEST_F(RecorderFaultsTest, ClosesTheVideoWholeWhenItIsTheExrFramesThatFail) {
+  RecorderSettings settings = small_take(path("take.mkv"));
+  settings.exr_dir = path("take");
+  Recorder recorder(settings);
+  RecordedFrame frame = half_picture(0, 64, 48);
+  frame.display_rgb8 = flat(64, 48, 100);
+  for (; frame.number < 5; ++frame.number) EXPECT_TRUE(recorder.push(frame));
+  while (recorder.status().written < 5) std::this_thread::yield();
+  fs::remove_all(settings.exr_dir);
+  EXPECT_TRUE(recorder.push(frame));
+  recorder.wait_for_room();
+  recorder.close();
+  const RecorderStatus status = recorder.status();
+  EXPECT_NE(status.error.find("frame.000005.exr"), std::string::npos) << status.error;
+  EXPECT_EQ(status.written, 5);
+  EXPECT_EQ(status.dropped, 1);
+  EXPECT_EQ(picture_times_s(settings.file).size(), 6U);
+  EXPECT_NEAR(std::stod(probe(settings.file, "format=duration", "")), 0.24, 0.001);
+}
+
+TEST_F(RecorderFaultsTest, RefusesWhatCannotBeWrittenAtOnceWithPathAndReason) {
+  const auto reason = [](const RecorderSettings& settings) -> std::string {
+    try {
+      const Recorder recorder(settings);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string missing = path("no/such/folder/take.mkv");
+  EXPECT_EQ(reason(small_take(missing)),
+            missing + ": cannot be written: No such file or directory");
+  fs::create_directories(path("folder.mkv"));
+  EXPECT_EQ(reason(small_take(path("folder.mkv"))),
+            path("folder.mkv") + ": cannot be written: Is a directory");
+  RecorderSettings settings = small_take("");
+  std::ofstream(path("file")) << "x";
+  settings.exr_dir = path("file");
+  EXPECT_NE(reason(settings).find(path("file")), std::string::npos) << reason(settings);
+  settings.exr_dir = path("file/deeper");
+  EXPECT_NE(reason(settings).find(path("file/deeper")), std::string::npos) << reason(settings);
+}
+
+TEST_F(RecorderFaultsTest, RefusesHostileSettings) {
+  const auto refused = [&](auto change) {
+    RecorderSettings settings = small_take(path("take.mkv"));
+    change(settings);
+    EXPECT_THROW(Recorder{settings}, std::invalid_argument);
+    EXPECT_FALSE(fs::exists(path("take.mkv")));
+  };
+  refused([](RecorderSettings& s) { s.file = ""; });
+  refused([](RecorderSettings& s) { s.file += ".mov"; });
+  refused([](RecorderSettings& s) { s.rate = {0, 1}; });
+  refused([](RecorderSettings& s) { s.rate = {25, 0}; });
+  refused([](RecorderSettings& s) { s.rate = {-25, -1}; });
+  refused([](RecorderSettings& s) { s.rate = {std::int64_t{25} << 40, std::int64_t{1} << 40}; });
+  refused([](RecorderSettings& s) { s.width = 0; });
+  refused([](RecorderSettings& s) { s.width = 63; });
+  refused([](RecorderSettings& s) { s.height = -48; });
+  refused([](RecorderSettings& s) { s.width = 2'000'000'000; });
+  refused([](RecorderSettings& s) { s.codec = "h265"; });
+  refused([](RecorderSettings& s) { s.crf = 52; });
+  refused([](RecorderSettings& s) { s.crf = -1; });
+  refused([](RecorderSettings& s) { s.transfer = capture::Transfer::linear; });
+  refused([](RecorderSettings& s) { s.queue_frames = 0; });
+  refused([](RecorderSettings& s) { s.queue_frames = 1'000'000; });
+  refused([](RecorderSettings& s) { s.sound_channels = -1; });
+  refused([](RecorderSettings& s) { s.sound_channels = 1; });
+  refused([](RecorderSettings& s) { s.start = Timecode{24, 0, 0, 0, false}; });
+  refused([](RecorderSettings& s) { s.start = Timecode{0, 0, 0, 0, true}; });
+  refused([this](RecorderSettings& s) {
+    s.exr_dir = path("take");
+    s.exr_compression = "jpeg";
+  });
+}
+
+TEST_F(RecorderFaultsTest, RefusesFramesThatLackWhatIsRecorded) {
+  RecorderSettings settings = small_take(path("take.mkv"));
+  settings.exr_dir = path("take");
+  Recorder recorder(settings);
+  RecordedFrame frame = picture(0, flat(64, 48, 100));
+  EXPECT_THROW(recorder.push(frame), std::invalid_argument);
+  frame.rgba = std::make_shared<capture::HalfImage>(
+      capture::HalfImage{48, 64, std::vector<capture::Half>(48 * 64 * 4), 4});
+  EXPECT_THROW(recorder.push(frame), std::invalid_argument);
+  frame.matte = std::make_shared<capture::HalfImage>(
+      capture::HalfImage{48, 64, std::vector<capture::Half>(48 * 64), 1});
+  EXPECT_TRUE(recorder.push(frame));
+  EXPECT_THROW(recorder.push(frame), std::invalid_argument);  // the same number again
+  frame.number = 1;
+  frame.display_rgb8 = flat(62, 48, 100);
+  EXPECT_THROW(recorder.push(frame), std::invalid_argument);
+  recorder.close();
+  EXPECT_EQ(recorder.status().written, 1);
+}
+
+}  // namespace
+}  // namespace compositing
