@@ -111,7 +111,7 @@ Mesh make_car_mirror() {
   grid.rows = 49;
   grid.columns = 17;
   grid.parameters = [](int row, int column) {
-    return std::array<double, 2>{(row % 48) / 48.0, 0.02 + 0.98 * column / 16.0};
+    return std::array<double, 2>{(row % 48) / 48.0, column / 16.0};
   };
   grid.material = [](int, int column) {
     return index(column > 14 ? CarMaterial::plastic : CarMaterial::paint);
@@ -124,7 +124,7 @@ Mesh make_car_mirror() {
   };
   grid.columns = 7;
   grid.parameters = [](int row, int column) {
-    return std::array<double, 2>{(row % 48) / 48.0, 0.001 + 0.999 * column / 6.0};
+    return std::array<double, 2>{(row % 48) / 48.0, column / 6.0};
   };
   grid.material = [](int, int column) {
     return index(column >= 5 ? CarMaterial::plastic : CarMaterial::chrome);
@@ -136,7 +136,7 @@ Mesh make_car_mirror() {
   // Its foot, from the door's corner.
   const SmoothSurface foot = [](double u, double v) {
     const double around = 2 * pi * u;
-    return Vec3{0.645 + 0.030 * std::cos(around), 0.815 + 0.10 * v,
+    return Vec3{0.645 + 0.030 * std::cos(around), 0.78 + 0.135 * v,
                 0.925 + 0.016 * std::sin(around) + 0.025 * v};
   };
   grid.rows = 25;

@@ -42,9 +42,11 @@ struct MadeCarSettings {
 // "standard". The same settings give the same car, bit for bit.
 //
 // Its triangles are all of the visible outer surface: what a panel, a lamp or glass covers is not
-// there. (A triangle counts as visible if a straight line leads from a point of it out of the car;
-// a test shoots these lines.) The count is met exactly by halving the largest triangles along their
-// longest edge, which changes no shape.
+// there. A triangle counts as visible if a straight line leads from it out of the car; a tyre's
+// also if such a line is there once the wheel has turned half around. (A test shoots these lines;
+// fewer than one triangle in a thousand is seen by none of them: cells that an edge all but
+// covers.) The count is met exactly by halving the largest triangles along their longest edge,
+// which changes no shape.
 SceneDescription made_car(const MadeCarSettings& settings = {});
 
 // Where its wheels are.

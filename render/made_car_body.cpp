@@ -1,11 +1,13 @@
-// The made car's body: band, deck, cabin, floor, arches, lamps, glass, trim.
+// The made car's body: band, deck, cabin, floor, arches, handles, wipers.
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "render/made_car.h"
 #include "render/made_car_shape.h"
+#include "render/made_car_trim.h"
 #include "render/surface_patches.h"
 
 namespace render {
@@ -15,20 +17,19 @@ constexpr double pi = std::numbers::pi;
 
 std::uint32_t index(CarMaterial material) { return static_cast<std::uint32_t>(material); }
 
-using Corners = std::vector<std::array<double, 2>>;
-
 class BodyMaker {
  public:
   BodyMaker() {
     band_ = [this](double way, double z) { return shape_.band(way, z); };
     deck_ = [this](double x, double share) { return shape_.deck(x, share); };
     cabin_ = [this](double foot_x, double share) { return shape_.cabin(foot_x, share); };
+    CarTrim trim = make_car_trim(shape_);
+    mesh_ = std::move(trim.mesh);
+    band_cuts_ = std::move(trim.on_band);
+    cabin_cuts_ = std::move(trim.on_cabin);
   }
 
   Mesh make() {
-    lay_front();
-    lay_rear();
-    lay_windows();
     add_band();
     add_deck();
     add_cabin();
@@ -40,176 +41,17 @@ class BodyMaker {
   }
 
  private:
-  // A patch on the band, and its mirror image; what lies under it is left out.
-  void lay_on_band(const Corners& corners,
-                   CarMaterial material,
-                   double lift_m,
-                   bool both_sides,
-                   int rings = 8,
-                   int points = 96,
-                   CarMaterial rim = CarMaterial::seam) {
-    LaidPatch patch;
-    patch.line = make_rounded_line(corners, points);
-    patch.lift_m = lift_m;
-    patch.rings = rings;
-    patch.material = index(material);
-    patch.rim = index(rim);
-    Mesh part;
-    add_laid(part, band_, patch);
-    append_mesh(mesh_, part);
-    if (both_sides) add_mirrored(mesh_, part);
-    band_cuts_.push_back({scaled(patch.line, 0.985), both_sides});
-  }
-  // The same on top of another patch, which stays whole beneath it (its edges show).
-  void lay_over(const Corners& corners,
-                CarMaterial material,
-                double lift_m,
-                bool both_sides,
-                int rings,
-                int points) {
-    const std::size_t cuts = band_cuts_.size();
-    lay_on_band(corners, material, lift_m, both_sides, rings, points, material);
-    band_cuts_.resize(cuts);
-  }
-
-  void lay_front() {
-    // Head lamps wrap around the corners.
-    lay_on_band({{0.52, 0.545},
-                 {0.66, 0.530},
-                 {1.02, 0.575},
-                 {1.22, 0.680},
-                 {1.10, 0.695},
-                 {0.80, 0.655},
-                 {0.56, 0.610}},
-                CarMaterial::lens, 0.004, true, 10, 128);
-    lay_over({{0.60, 0.562}, {0.68, 0.556}, {0.70, 0.590}, {0.69, 0.612}, {0.62, 0.604}},
-             CarMaterial::head_lamp, 0.008, true, 5, 48);
-    lay_over({{0.76, 0.572}, {0.84, 0.574}, {0.88, 0.608}, {0.85, 0.634}, {0.78, 0.624}},
-             CarMaterial::head_lamp, 0.008, true, 5, 48);
-    lay_over({{0.93, 0.582}, {1.01, 0.596}, {1.13, 0.664}, {1.11, 0.672}, {0.95, 0.598}},
-             CarMaterial::head_lamp, 0.008, true, 4, 64);
-    // Grille between them, with bars.
-    lay_on_band({{-0.43, 0.505},
-                 {0.43, 0.505},
-                 {0.50, 0.560},
-                 {0.44, 0.600},
-                 {-0.44, 0.600},
-                 {-0.50, 0.560}},
-                CarMaterial::plastic, 0.004, false, 10, 160, CarMaterial::chrome);
-    for (int i = 0; i < 3; ++i) {
-      const double z = 0.527 + 0.024 * i;
-      const double w = 0.42 - 0.015 * i;
-      lay_over({{-w, z - 0.003}, {w, z - 0.003}, {w, z + 0.003}, {-w, z + 0.003}},
-               CarMaterial::chrome, 0.010, false, 3, 120);
-    }
-    lay_over({{-0.055, 0.528}, {0.055, 0.528}, {0.055, 0.590}, {-0.055, 0.590}},
-             CarMaterial::chrome, 0.016, false, 6, 64);
-    // Lower intake and fog lamps.
-    lay_on_band({{-0.46, 0.245}, {0.46, 0.245}, {0.40, 0.345}, {-0.40, 0.345}},
-                CarMaterial::plastic, 0.003, false, 8, 128);
-    lay_on_band({{0.64, 0.260}, {0.92, 0.275}, {0.95, 0.345}, {0.86, 0.375}, {0.66, 0.345}},
-                CarMaterial::plastic, 0.003, true, 7, 80);
-    lay_over({{0.71, 0.295}, {0.79, 0.297}, {0.79, 0.340}, {0.71, 0.338}}, CarMaterial::head_lamp,
-             0.008, true, 5, 40);
-    lay_on_band({{-0.26, 0.385}, {0.26, 0.385}, {0.26, 0.475}, {-0.26, 0.475}}, CarMaterial::plate,
-                0.006, false, 6, 120, CarMaterial::plastic);
-  }
-
-  void lay_rear() {
-    const double back = shape_.length() / 2;
-    const auto from_back = [back](Corners corners) {
-      for (auto& corner : corners) corner[0] = back - corner[0];
-      std::reverse(corners.begin(), corners.end());
-      return corners;
-    };
-    lay_on_band(from_back({{0.42, 0.725},
-                           {0.70, 0.700},
-                           {1.00, 0.715},
-                           {1.13, 0.790},
-                           {0.98, 0.845},
-                           {0.66, 0.840},
-                           {0.44, 0.800}}),
-                CarMaterial::lens, 0.004, true, 9, 120);
-    lay_over(from_back({{0.47, 0.738},
-                        {0.70, 0.716},
-                        {0.96, 0.730},
-                        {1.00, 0.760},
-                        {0.70, 0.748},
-                        {0.48, 0.766}}),
-             CarMaterial::tail_lamp, 0.009, true, 5, 80);
-    lay_over(from_back({{0.49, 0.782},
-                        {0.70, 0.772},
-                        {1.02, 0.785},
-                        {0.96, 0.822},
-                        {0.68, 0.820},
-                        {0.50, 0.800}}),
-             CarMaterial::tail_lamp, 0.009, true, 5, 80);
-    lay_on_band(from_back({{-0.27, 0.560}, {0.27, 0.560}, {0.27, 0.655}, {-0.27, 0.655}}),
-                CarMaterial::plate, 0.006, false, 6, 120, CarMaterial::plastic);
-    lay_on_band(from_back({{-0.62, 0.215}, {0.62, 0.215}, {0.55, 0.330}, {-0.55, 0.330}}),
-                CarMaterial::plastic, 0.003, false, 8, 128);
-    lay_over(from_back({{0.40, 0.235}, {0.50, 0.235}, {0.50, 0.285}, {0.40, 0.285}}),
-             CarMaterial::chrome, 0.012, true, 5, 48);
-    lay_over(from_back({{-0.06, 0.740}, {0.06, 0.740}, {0.06, 0.800}, {-0.06, 0.800}}),
-             CarMaterial::chrome, 0.008, false, 6, 56);
-  }
-
-  void lay_on_cabin(const Corners& corners, bool both_sides, int points, int rings) {
-    LaidPatch patch;
-    patch.line = make_rounded_line(corners, points);
-    patch.lift_m = 0.0025;
-    patch.rings = rings;
-    patch.rim_rings = 2;
-    patch.material = index(CarMaterial::glass);
-    patch.rim = index(CarMaterial::plastic);
-    Mesh part;
-    add_laid(part, cabin_, patch);
-    append_mesh(mesh_, part);
-    if (both_sides) add_mirrored(mesh_, part);
-    cabin_cuts_.push_back({scaled(patch.line, 0.985), both_sides});
-  }
-
-  void lay_windows() {
-    lay_on_cabin(
-        {{0.24, 0.275}, {0.96, 0.200}, {0.985, 0.5}, {0.96, 0.800}, {0.24, 0.725}, {0.20, 0.5}},
-        false, 176, 10);
-    lay_on_cabin({{-1.76, 0.235},
-                  {-1.22, 0.295},
-                  {-1.19, 0.5},
-                  {-1.22, 0.705},
-                  {-1.76, 0.765},
-                  {-1.79, 0.5}},
-                 false, 144, 9);
-    // Side windows: front door with its corner, rear door, quarter light.
-    lay_on_cabin({{-0.355, 0.040},
-                  {0.82, 0.045},
-                  {0.55, 0.130},
-                  {0.16, 0.222},
-                  {-0.02, 0.232},
-                  {-0.355, 0.236}},
-                 true, 128, 8);
-    lay_on_cabin({{-1.13, 0.040}, {-0.435, 0.040}, {-0.435, 0.236}, {-0.80, 0.234}, {-1.13, 0.222}},
-                 true, 96, 7);
-    lay_on_cabin({{-1.60, 0.060}, {-1.185, 0.042}, {-1.185, 0.214}, {-1.36, 0.190}}, true, 64, 5);
-  }
-
   // Whether all corners of a cell lie under a patch.
-  struct Cut {
-    ParameterLine line;
-    bool both_sides;
-  };
   template <class Reflect>
-  static bool covered(const std::vector<Cut>& cuts,
+  static bool covered(const std::vector<CoveredArea>& cuts,
                       const std::array<std::array<double, 2>, 4>& corners,
                       Reflect&& reflections) {
-    return std::any_of(cuts.begin(), cuts.end(), [&](const Cut& cut) {
+    return std::any_of(cuts.begin(), cuts.end(), [&](const CoveredArea& cut) {
       const auto all_inside = [&](auto&& map) {
-        return std::all_of(corners.begin(), corners.end(), [&](const auto& corner) {
-          const auto [u, v] = map(corner);
-          return lies_inside(cut.line, u, v);
-        });
+        return std::all_of(corners.begin(), corners.end(),
+                           [&](const auto& corner) { return cut.covers(map(corner)); });
       };
-      return reflections(cut.both_sides, all_inside);
+      return reflections(cut.both_sides(), all_inside);
     });
   }
   template <class Parameters>
@@ -257,7 +99,7 @@ class BodyMaker {
     std::vector<double> ways = half;
     for (auto way = half.rbegin() + 1; way != half.rend(); ++way)
       ways.push_back(shape_.length() - *way);
-    constexpr int rows = 37;
+    constexpr int rows = 36;
     GridPatch grid;
     grid.rows = rows;
     grid.columns = static_cast<int>(ways.size());
@@ -342,7 +184,10 @@ class BodyMaker {
         const auto [x, share] = grid.parameters(row, column);
         return in_shut_line(x, share) ? 0.005 : 0.0;
       };
-      add_grid(mesh_, deck_, grid);
+      Mesh part;
+      add_grid(part, deck_, grid);
+      smooth_normals(part);
+      append_mesh(mesh_, part);
     };
     // Rows lie closer towards the ends, where the outline turns across.
     const auto rows_towards = [](double from, double to, int rows) {
@@ -392,7 +237,7 @@ class BodyMaker {
       share = std::min(share, 1 - share);
       // The pillar between the doors, and the sills of the windows, are dark.
       const bool between_doors = x > -0.45 && x < -0.34 && share < 0.236;
-      const bool sill = share < 0.034 && x > -1.62 && x < 0.88;
+      const bool sill = share < 0.034 && x > -1.58 && x < 0.88;
       const bool dark = between_doors || sill;
       return index(dark ? CarMaterial::plastic : CarMaterial::paint);
     };
@@ -538,13 +383,13 @@ class BodyMaker {
     }
   }
 
-  static constexpr double well_y = 0.60;          // of the wall behind a wheel
+  static constexpr double well_y = 0.54;          // of the wall behind a wheel
   static constexpr double bonnet_front_x = 1.80;  // its shut line
 
   CarShape shape_;
   SmoothSurface band_, deck_, cabin_;
   Mesh mesh_;
-  std::vector<Cut> band_cuts_, cabin_cuts_;
+  std::vector<CoveredArea> band_cuts_, cabin_cuts_;
   std::vector<double> seams_;
 };
 

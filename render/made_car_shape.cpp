@@ -43,19 +43,19 @@ CarShape::CarShape()
                  {1.50, 0.785},
                  {1.90, 0.705},
                  {2.10, 0.655}}),
-      crown_({{-2.10, 0.0},
-              {-1.95, 0.025},
-              {-1.5, 0.05},
-              {0.5, 0.06},
-              {1.1, 0.085},
-              {1.6, 0.075},
-              {1.95, 0.03},
-              {2.10, 0.0}}),
-      height_({{-1.90, 0.0},
-               {-1.72, 0.115},
-               {-1.50, 0.235},
-               {-1.25, 0.345},
-               {-0.95, 0.410},
+      crown_({{-1.958, 0.0},
+              {-1.85, 0.028},
+              {-1.50, 0.05},
+              {0.50, 0.06},
+              {1.10, 0.085},
+              {1.55, 0.075},
+              {1.80, 0.038},
+              {1.908, 0.0}}),
+      height_({{-1.80, 0.0},
+               {-1.66, 0.100},
+               {-1.46, 0.225},
+               {-1.22, 0.340},
+               {-0.95, 0.405},
                {-0.40, 0.440},
                {0.00, 0.420},
                {0.25, 0.365},
@@ -190,7 +190,7 @@ Vec3 CarShape::cabin(double foot_x, double share) const {
   // Sides lean in; in front and behind, glass swings forward and back in the middle.
   const double lean = 1 - 0.22 * up * smooth_step(0.0, 0.3, h) - 0.06 * up;
   const double swing_front = 0.16 * smooth_step(-0.2, 0.95, foot_x);
-  const double swing_rear = 0.12 * smooth_step(-1.0, -1.8, foot_x);
+  const double swing_rear = 0.12 * smooth_step(1.0, 1.75, -foot_x);
   const double x = foot_x + (swing_front - swing_rear) * (1 - across * across) - 0.10 * swing_front;
   const double half = shoulder_at(x)[0];
   const double foot_z = deck(x, across * lean).z;

@@ -37,8 +37,8 @@ class CarShape {
 
   static constexpr double half_length = 2.1, half_width = 0.9;
   static constexpr double floor_z = 0.17;
-  static constexpr double arch_radius = 0.385;
-  static constexpr double cabin_front_x = 1.02, cabin_rear_x = -1.90;
+  static constexpr double arch_radius = 0.40;
+  static constexpr double cabin_front_x = 1.02, cabin_rear_x = -1.80;
 
  private:
   std::array<double, 2> outline(double way, std::array<double, 2>& normal) const;

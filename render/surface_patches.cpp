@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <utility>
 
 namespace render {
 namespace {
@@ -19,8 +19,13 @@ std::array<double, 2> mean_of(const ParameterLine& line) {
   return mean;
 }
 
+// Nothing is added for a triangle without area, where a grid's row shrinks to a point.
 void add_triangle(
     Mesh& mesh, std::uint32_t a, std::uint32_t b, std::uint32_t c, std::uint32_t material) {
+  const auto same = [&mesh](std::uint32_t p, std::uint32_t q) {
+    return length(mesh.positions[p] - mesh.positions[q]) < 1e-6F;
+  };
+  if (same(a, b) || same(b, c) || same(c, a)) return;
   mesh.triangles.push_back({a, b, c});
   mesh.materials.push_back(material);
 }
@@ -120,10 +125,12 @@ void add_grid(Mesh& mesh, const SmoothSurface& surface, const GridPatch& patch) 
 
 void add_laid(Mesh& mesh, const SmoothSurface& surface, const LaidPatch& patch) {
   const auto mean = mean_of(patch.line);
-  const auto count = static_cast<std::uint32_t>(patch.line.size());
+  const std::size_t count = patch.line.size();
   const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  ParameterLine places;
   const auto add_vertex = [&](double u, double v, double lift) {
     const Vec3 normal = normal_of(surface, u, v);
+    places.push_back({u, v});
     mesh.positions.push_back(single(surface(u, v) + normal * lift));
     mesh.normals.push_back(single(normal));
   };
@@ -134,19 +141,46 @@ void add_laid(Mesh& mesh, const SmoothSurface& surface, const LaidPatch& patch) 
                  ring == 0 ? -0.5 * patch.lift_m : patch.lift_m);
   }
   add_vertex(mean[0], mean[1], patch.lift_m);
+  const auto add = [&](std::size_t a, std::size_t b, std::size_t c, std::uint32_t material) {
+    const bool hidden =
+        std::any_of(patch.covers.begin(), patch.covers.end(), [&](const ParameterLine& cover) {
+          return lies_inside(cover, places[a][0], places[a][1]) &&
+                 lies_inside(cover, places[b][0], places[b][1]) &&
+                 lies_inside(cover, places[c][0], places[c][1]);
+        });
+    if (!hidden)
+      add_triangle(mesh, first + static_cast<std::uint32_t>(a),
+                   first + static_cast<std::uint32_t>(b), first + static_cast<std::uint32_t>(c),
+                   material);
+  };
   for (int ring = 0; ring + 1 < patch.rings; ++ring) {
     const std::uint32_t material = ring < patch.rim_rings ? patch.rim : patch.material;
-    const auto outer = first + static_cast<std::uint32_t>(ring) * count;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const std::uint32_t next = (i + 1) % count;
-      add_triangle(mesh, outer + i, outer + next, outer + count + next, material);
-      add_triangle(mesh, outer + i, outer + count + next, outer + count + i, material);
+    const std::size_t outer = static_cast<std::size_t>(ring) * count;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t next = (i + 1) % count;
+      add(outer + i, outer + next, outer + count + next, material);
+      add(outer + i, outer + count + next, outer + count + i, material);
     }
   }
-  const auto inner = first + static_cast<std::uint32_t>(patch.rings - 1) * count;
-  const auto middle = first + static_cast<std::uint32_t>(patch.rings) * count;
-  for (std::uint32_t i = 0; i < count; ++i)
-    add_triangle(mesh, inner + i, inner + (i + 1) % count, middle, patch.material);
+  const std::size_t inner = static_cast<std::size_t>(patch.rings - 1) * count;
+  const std::size_t middle = static_cast<std::size_t>(patch.rings) * count;
+  for (std::size_t i = 0; i < count; ++i)
+    add(inner + i, inner + (i + 1) % count, middle, patch.material);
+}
+
+CoveredArea::CoveredArea(ParameterLine line, bool both_sides)
+    : line_(std::move(line)), both_sides_(both_sides), lower_(line_[0]), upper_(line_[0]) {
+  for (const auto& point : line_) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      lower_[i] = std::min(lower_[i], point[i]);
+      upper_[i] = std::max(upper_[i], point[i]);
+    }
+  }
+}
+
+bool CoveredArea::covers(const std::array<double, 2>& place) const {
+  return place[0] > lower_[0] && place[0] < upper_[0] && place[1] > lower_[1] &&
+         place[1] < upper_[1] && lies_inside(line_, place[0], place[1]);
 }
 
 void smooth_normals(Mesh& mesh) {

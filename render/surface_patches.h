@@ -48,8 +48,22 @@ struct LaidPatch {
   int rim_rings = 1;
   std::uint32_t material = 0;
   std::uint32_t rim = 0;
+  std::vector<ParameterLine> covers;  // what lies on the patch: triangles inside them are left out
 };
 void add_laid(Mesh& mesh, const SmoothSurface& surface, const LaidPatch& patch);
+
+// An area of a surface that a patch hides, and its mirror image if it is on both sides.
+class CoveredArea {
+ public:
+  CoveredArea(ParameterLine line, bool both_sides);
+  bool both_sides() const { return both_sides_; }
+  bool covers(const std::array<double, 2>& place) const;
+
+ private:
+  ParameterLine line_;
+  bool both_sides_;
+  std::array<double, 2> lower_, upper_;  // bounds
+};
 
 // Gives every vertex the mean of its triangles' normals, weighted by area.
 void smooth_normals(Mesh& mesh);
