@@ -16,10 +16,10 @@ namespace render {
 class KeptVisibility {
  public:
   // Forgets what another scene, camera, light directions or effort has left behind. Takes memory
-  // for all cells and lights, or keeps nothing if that were more than max_bytes.
-  void begin_frame(std::uint64_t key, int columns, int rows, std::size_t lights);
+  // for the masks of all cells, or keeps nothing if that were more than max_bytes.
+  void begin_frame(std::uint64_t key, int columns, int rows, std::size_t masks_per_cell);
 
-  // The masks of a cell (one a light), or null if nothing is kept for it.
+  // The masks of a cell (see CellMemory), or null if nothing is kept for it.
   const CellMask* find(int column, int row) const;
   // Where to put them, or null; keep() makes them count.
   CellMask* place(int column, int row);
@@ -35,7 +35,7 @@ class KeptVisibility {
 
   std::uint64_t key_ = 0;
   int columns_ = 0, rows_ = 0;
-  std::size_t lights_ = 0;
+  std::size_t masks_per_cell_ = 0;
   std::vector<CellMask> masks_;
   std::vector<std::uint8_t> kept_;
 };

@@ -204,7 +204,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   if (inputs.kept_visibility) {
     inputs.kept_visibility->begin_frame(
         visibility_key(inputs, job), (d.width + cell_size - 1) / cell_size,
-        (d.height + cell_size - 1) / cell_size, job.lights.lights.size());
+        (d.height + cell_size - 1) / cell_size, 2 * job.lights.lights.size());
   }
   return context;
 }

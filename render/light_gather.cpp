@@ -446,7 +446,7 @@ bool gather_cell(const LightContext& context,
     for (std::size_t word = 0; word < 4; ++word) real_first[word] &= r.active[word];
   }
   const bool any_real_first = real_first != CellMask{};
-  bool complete = memory.room != nullptr && !any_real_first;
+  bool complete = memory.room != nullptr;
 
   for (std::size_t first = 0; first < lights.size(); first += GatherWorkspace::group) {
     const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lights.size() - first);
@@ -462,10 +462,17 @@ bool gather_cell(const LightContext& context,
     }
     if (any_real_first) {
       // Light that real things block is not there to be lost.
-      CellVisibility behind(context, r, w, statistics, mask_real_blocker);
-      behind.skip_ = skip;
-      behind.find(first32, count);
-      w.tints.clear();
+      if (memory.kept) {
+        std::copy_n(memory.kept + lights.size() + first, count, w.seen.begin());
+      } else {
+        CellVisibility behind(context, r, w, statistics, mask_real_blocker);
+        behind.skip_ = skip;
+        behind.find(first32, count);
+        w.tints.clear();
+        if (complete) {
+          std::copy_n(w.seen.begin(), count, memory.room + lights.size() + first);
+        }
+      }
       for (std::size_t i = 0; i < count; ++i) {
         for (std::size_t word = 0; word < 4; ++word) {
           const std::uint64_t hidden = w.lit[i][word] & ~w.seen[i][word] & real_first[word];

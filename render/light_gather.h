@@ -64,14 +64,16 @@ struct LightContext {
   const Effort* effort = nullptr;
 };
 
-// Visibility of a cell from an earlier frame, and room for this one's. Either may be null.
+// Visibility of a cell from an earlier frame, and room for this one's. Either may be null. Two
+// masks a light: first of all lights the pixels that no virtual object hides from it, then those
+// that no real one does.
 struct CellMemory {
-  const CellMask* kept = nullptr;  // one a light: pixels that see it
+  const CellMask* kept = nullptr;
   CellMask* room = nullptr;
 };
 
 // Adds up the light at the pixels of a cell: open and lost. Returns whether `memory.room` holds
-// this frame's visibility now (glass and real blockers are not kept). Shadow rays go to one pixel
+// this frame's visibility now (what glass weakens is not kept). Shadow rays go to one pixel
 // of every 4x4 block of a smooth surface first, another for each light; where neighbouring blocks
 // disagree, to its 2x2 blocks or pixels, as the effort's interleave asks.
 bool gather_cell(const LightContext& context,

@@ -11,6 +11,7 @@
 
 #include "compositing/stand_in.h"
 #include "render/load_mesh.h"
+#include "render/made_car.h"
 #include "render/standard.h"
 
 namespace studio {
@@ -69,6 +70,11 @@ std::vector<Instance> add_model(SceneDescription& scene, SceneDescription model)
 }
 
 SceneDescription load_object(const ObjectSettings& object) {
+  if (object.made == "car") {
+    render::MadeCarSettings car;
+    car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
+    return render::made_car(car);
+  }
   render::LoadOptions options;
   options.hide = object.hide;
   options.emission_gain = static_cast<float>(object.emission_gain);

@@ -84,7 +84,14 @@ TEST(RenderFrame, DoesNotDependOnTilesOrThreads) {
 
 // Lights' energies, camera and effort change from frame to frame; kept visibility must not show.
 TEST(RenderFrame, IsTheSameColdAndWarm) {
-  MadeShot shot = made_shot(96, 64, made_scene(), 70);
+  render::SceneDescription scene = made_scene();
+  render::Instance real = scene.instances[1];  // a real ball, which shades the floor too
+  real.kind = render::ObjectKind::stand_in;
+  real.set_from_object[3] = -1.2F;
+  scene.meshes.push_back(made_ball({0, 0, 0.5F}, 0.5F, 0));
+  real.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+  scene.instances.push_back(real);
+  MadeShot shot = made_shot(96, 64, scene, 70);
   render::KeptVisibility kept;
   for (int frame = 0; frame < 6; ++frame) {
     if (frame == 2) shot.job.lights.lights[3].irradiance *= 0.5F;
