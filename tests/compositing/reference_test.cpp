@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "../render/sun_and_sky.h"
 #include "../render/plain_shapes.h"
+#include "../render/sun_and_sky.h"
 #include "compositing/stand_in.h"
 
 namespace {

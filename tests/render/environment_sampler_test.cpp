@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "sun_and_sky.h"
 #include "render/sample_sequence.h"
+#include "sun_and_sky.h"
 
 namespace render {
 namespace {

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <string>
 
-#include "sun_and_sky.h"
 #include "plain_shapes.h"
+#include "sun_and_sky.h"
 
 namespace render {
 namespace {

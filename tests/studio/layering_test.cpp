@@ -126,5 +126,15 @@ TEST(Tree, SaysInTheFirstLineOfEveryFileWhatItIs) {
   }
 }
 
+TEST(Tree, HasScriptsThatShellsCanReadAndRun) {
+  const auto scripts = lines_of("git -C " PLATELIGHT_SOURCE_DIR " ls-files -- '*.sh' .ci/run");
+  if (scripts.empty()) GTEST_SKIP() << "not a git checkout";
+  for (const std::string& script : scripts) {
+    const fs::path path = fs::path(PLATELIGHT_SOURCE_DIR) / script;
+    EXPECT_EQ(lines_of("bash -n " + path.string() + " 2>&1"), std::vector<std::string>{}) << script;
+    EXPECT_NE(fs::status(path).permissions() & fs::perms::owner_exec, fs::perms::none) << script;
+  }
+}
+
 }  // namespace
 }  // namespace studio
