@@ -224,9 +224,11 @@ TEST_F(RecorderTest, NeverBlocksAndCountsWhatItDrops) {
   const auto begin = std::chrono::steady_clock::now();
   for (int n = 0; n < 200; ++n) accepted += recorder.push(picture(n, rgb)) ? 1 : 0;
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
-  EXPECT_LT(taken.count(), 0.1);  // 200 frames of some 30 ms each would take 6 s
   recorder.close();
   const RecorderStatus status = recorder.status();
+  // Waiting for the disk would take 200 times this; measured, since machines are busy or slow.
+  const double write_s = status.write_s / static_cast<double>(status.written);
+  EXPECT_LT(taken.count(), 200 * write_s / 10);
   EXPECT_GE(accepted, 2);
   EXPECT_EQ(status.written, accepted);
   EXPECT_EQ(status.dropped, 200 - accepted);
