@@ -38,7 +38,7 @@ MadeCamera make_plate_camera(const MadeStudioSettings& settings) {
                             0.046,
                             0.0006,
                             -0.0004};
-  camera.cam_from_set = calibrate::look_at({-2.7, -3.75, 2.15}, {0.15, 0.15, 0.62}, 0.4 * degree);
+  camera.cam_from_set = calibrate::look_at({-2.4, -3.36, 2.0}, {0.15, 0.12, 0.4}, 0.4 * degree);
   constexpr double exposure_s = 1.0 / 250;
   camera.sensor = {.saturation = exposure_s,  // display white fills the well
                    .full_well_e = 15000,

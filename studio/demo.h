@@ -14,7 +14,7 @@ namespace studio {
 struct DemoSettings {
   std::filesystem::path dir;
   render::MadeStudioSettings studio;
-  int samples = 32;  // paths per pixel and part of the light
+  int samples = 16;  // paths per pixel and part of the light
 };
 
 struct DemoFigures {

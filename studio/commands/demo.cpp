@@ -53,7 +53,7 @@ Command demo_command() {
             auto options = std::make_shared<DemoOptions>();
             arguments.positional("DIR", options->dir, "where to write");
             arguments.option("--samples", options->samples, 1, 65536,
-                             "paths per pixel of the truth, for each part of the light (32)");
+                             "paths per pixel of the truth, for each part of the light (16)");
             arguments.option("--frames", options->frames, 1, 100000, "frames of the plate (60)");
             arguments.option("--seed", options->seed, 1, 1'000'000,
                              "another one makes another sky");

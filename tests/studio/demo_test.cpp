@@ -44,6 +44,9 @@ TEST(WriteCourtDemo, WritesASetThatCanBeReadWithAPlateAndAProbeOfOneLength) {
   const DemoFigures figures = write_court_demo(settings, ignore);
   EXPECT_EQ(figures.frames, 6);
   EXPECT_EQ(figures.shots, 18);
+  EXPECT_GT(figures.car_share, 0.25);
+  EXPECT_LT(figures.car_share, 0.35);
+  EXPECT_GT(figures.ground_share, 0.4);
   const Set set = read_set((settings.dir / "car.toml").string());
   const auto count = [](const std::string& uri) {
     const auto camera = capture::open_camera(uri);
