@@ -14,9 +14,9 @@ packages=(
   # compositing
   libopencolorio-dev
   # studio
-  fonts-dejavu-core libcli11-dev libfmt-dev librsvg2-dev libspdlog-dev nlohmann-json3-dev
+  fonts-dejavu-core libcli11-dev libfmt-dev librsvg2-dev nlohmann-json3-dev
   # tests
-  ffmpeg libbenchmark-dev libgmock-dev libgtest-dev openimageio-tools
+  ffmpeg libgmock-dev libgtest-dev openimageio-tools
 )
 missing=()
 for package in "${packages[@]}"; do
