@@ -301,6 +301,12 @@ void CodedRows::begin(const AVFrame& frame) {
 
 CodedRow CodedRows::read(int y) { return reader_->read(y); }
 
+const std::uint8_t* CodedRows::packed_rgb(int y) const {
+  const AVFrame& picture = *reader_->picture;
+  if (picture.format != AV_PIX_FMT_RGB24) return nullptr;
+  return picture.data[0] + static_cast<std::ptrdiff_t>(y) * picture.linesize[0];
+}
+
 bool CodedRows::has_alpha() const { return (reader_->its->flags & AV_PIX_FMT_FLAG_ALPHA) != 0; }
 
 int CodedRows::max_alpha() const {

@@ -37,6 +37,10 @@ class CodedRows {
   // Row y of it, all columns. The pointers stay good until the next call.
   CodedRow read(int y);
 
+  // Row y again as it lies in the picture, if that is bytes R, G, B, R, G, B, ... of the grid's
+  // indices; else null.
+  const std::uint8_t* packed_rgb(int y) const;
+
   // Alpha, if the format has it: row y in codes 0 .. max_alpha().
   bool has_alpha() const;
   int max_alpha() const;

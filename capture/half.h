@@ -1,7 +1,9 @@
 // Half floats (IEEE binary16) as their bits.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 #if defined(__F16C__)
 #include <immintrin.h>
@@ -30,5 +32,17 @@ inline float float_from_half(Half bits) { return _cvtsh_ss(bits); }
 inline Half half_from_float(float value) { return software::half_from_float(value); }
 inline float float_from_half(Half bits) { return software::float_from_half(bits); }
 #endif
+
+// As many halves as there are floats, each by half_from_float.
+inline void halves_from_floats(std::span<const float> floats, Half* halves) {
+  std::size_t i = 0;
+#if defined(__F16C__)
+  for (; i + 8 <= floats.size(); i += 8) {
+    const __m128i eight = _mm256_cvtps_ph(_mm256_loadu_ps(&floats[i]), _MM_FROUND_TO_NEAREST_INT);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(halves + i), eight);
+  }
+#endif
+  for (; i < floats.size(); ++i) halves[i] = half_from_float(floats[i]);
+}
 
 }  // namespace capture

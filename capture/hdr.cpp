@@ -2,6 +2,7 @@
 #include "capture/hdr.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -18,15 +19,26 @@ void require_exposure(double exposure_s) {
   }
 }
 
-void require_one_size(std::span<const Shot> shots) {
+const Image& picture_of(const Shot& shot) { return shot.linear; }
+const Image& picture_of(const LiveShot& shot) { return *shot.linear; }
+
+template <class AnyShot>
+void require_one_size(std::span<const AnyShot> shots) {
   if (shots.empty()) throw std::invalid_argument("there are no shots to merge");
-  const Image& first = shots[0].linear;
-  for (const Shot& shot : shots) {
+  const Image& first = picture_of(shots[0]);
+  for (const AnyShot& shot : shots) {
+    const Image& picture = picture_of(shot);
     require_exposure(shot.exposure_s);
-    if (shot.linear.width != first.width || shot.linear.height != first.height ||
-        shot.linear.channels != first.channels || shot.linear.empty()) {
+    if (picture.width != first.width || picture.height != first.height ||
+        picture.channels != first.channels || picture.empty()) {
       throw std::invalid_argument("the shots of a bracket need one size");
     }
+  }
+}
+
+void require_noise(const NoiseModel& noise) {
+  if (!(noise.read > 0) || !(noise.shot >= 0) || !(noise.saturation > 0)) {
+    throw std::invalid_argument("a noise model has variance at black, and a saturation above it");
   }
 }
 
@@ -81,9 +93,7 @@ double NoiseModel::variance(double value) const {
 
 Image merge_shots(std::span<const Shot> shots, const NoiseModel& noise, Image* deviation) {
   require_one_size(shots);
-  if (!(noise.read > 0) || !(noise.shot >= 0) || !(noise.saturation > 0)) {
-    throw std::invalid_argument("a noise model has variance at black, and a saturation above it");
-  }
+  require_noise(noise);
   const Image& first = shots[0].linear;
   const Shot& shortest =
       *std::min_element(shots.begin(), shots.end(),
@@ -98,6 +108,88 @@ Image merge_shots(std::span<const Shot> shots, const NoiseModel& noise, Image* d
     }
   }
   return radiance;
+}
+
+namespace {
+
+// Weighted sums of a stretch of samples. Functions of their own, so that the compiler knows what
+// does not overlap, and vectorises them.
+struct Stretch {
+  static constexpr std::size_t most = 1024;  // stays in the first cache from shot to shot
+  std::array<float, most> weighted;
+  std::array<float, most> weights;
+};
+
+// Values of the shortest shot, with a weight that is less than a float's last bit beside any other.
+void start_stretch(const float* __restrict value,
+                   std::size_t count,
+                   float per_s,
+                   Stretch& __restrict sums) {
+  constexpr float negligible = 1e-30F;
+  constexpr float largest = std::numeric_limits<float>::max();
+  for (std::size_t i = 0; i < count; ++i) {
+    const float bound = std::abs(value[i]) <= largest ? value[i] : 0.0F;
+    sums.weighted[i] = negligible * (bound * per_s);
+    sums.weights[i] = negligible;
+  }
+}
+
+struct ShotWeight {
+  float per_s;    // 1 / exposure
+  float squared;  // of the exposure over the longest one: keeps weights in a float's range
+  float read, shot, relative_squared, saturation;
+};
+
+void add_stretch(const float* __restrict value,
+                 std::size_t count,
+                 const ShotWeight& of,
+                 Stretch& __restrict sums) {
+  constexpr float lowest = std::numeric_limits<float>::lowest();
+  const auto [per_s, squared, read, shot, relative_squared, saturation] = of;
+  std::array<float, Stretch::most> sample;
+  std::array<float, Stretch::most> share;
+  for (std::size_t i = 0; i < count; ++i) {
+    const bool counts = (value[i] < saturation) & (value[i] >= lowest);
+    sample[i] = counts ? value[i] : 0.0F;
+    share[i] = counts ? squared : 0.0F;
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    const float light = std::max(sample[i], 0.0F);
+    const float weight = share[i] / (read + light * (shot + relative_squared * light));
+    sums.weighted[i] += weight * (per_s * sample[i]);
+    sums.weights[i] += weight;
+  }
+}
+
+}  // namespace
+
+void merge_live_shots(std::span<const LiveShot> shots, const NoiseModel& noise, Image& radiance) {
+  require_one_size(shots);
+  require_noise(noise);
+  const Image& first = *shots[0].linear;
+  radiance.height = first.height;
+  radiance.width = first.width;
+  radiance.channels = first.channels;
+  radiance.pixels.resize(first.pixels.size());
+  const LiveShot& shortest = *std::ranges::min_element(shots, {}, &LiveShot::exposure_s);
+  const double longest_s = std::ranges::max_element(shots, {}, &LiveShot::exposure_s)->exposure_s;
+  const auto per_s = [](const LiveShot& shot) { return static_cast<float>(1 / shot.exposure_s); };
+  Stretch sums;
+  for (std::size_t begin = 0; begin < radiance.pixels.size(); begin += Stretch::most) {
+    const std::size_t count = std::min(Stretch::most, radiance.pixels.size() - begin);
+    start_stretch(&shortest.linear->pixels[begin], count, per_s(shortest), sums);
+    for (const LiveShot& shot : shots) {
+      const double t = shot.exposure_s / longest_s;
+      add_stretch(
+          &shot.linear->pixels[begin], count,
+          {per_s(shot), static_cast<float>(t * t), static_cast<float>(noise.read),
+           static_cast<float>(noise.shot), static_cast<float>(noise.relative * noise.relative),
+           static_cast<float>(noise.saturation)},
+          sums);
+    }
+    float* to = &radiance.pixels[begin];
+    for (std::size_t i = 0; i < count; ++i) to[i] = sums.weighted[i] / sums.weights[i];
+  }
 }
 
 CodeTable linear_code_table(int bits, double black, double white, const NoiseModel& noise) {

@@ -18,9 +18,7 @@ Image make_image(int height, int width, int channels) {
 
 HalfImage to_half(const Image& image) {
   HalfImage half{image.height, image.width, std::vector<Half>(image.pixels.size()), image.channels};
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    half.pixels[i] = half_from_float(image.pixels[i]);
-  }
+  halves_from_floats(image.pixels, half.pixels.data());
   return half;
 }
 

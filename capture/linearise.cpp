@@ -2,6 +2,7 @@
 #include "capture/linearise.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 namespace capture {
@@ -13,6 +14,19 @@ std::vector<float> make_table(const ValueGrid& grid, const Curve& curve) {
     table[static_cast<std::size_t>(index)] = static_cast<float>(curve(grid.value(index)));
   }
   return table;
+}
+
+// Light of bytes R, G, B, R, G, B, ...
+void look_up(const std::uint8_t* __restrict codes,
+             std::ptrdiff_t pixels,
+             const std::array<const float*, 3>& tables,
+             float* __restrict light) {
+  const auto [red, green, blue] = tables;
+  for (std::ptrdiff_t i = 0; i < 3 * pixels; i += 3) {
+    light[i] = red[codes[i]];
+    light[i + 1] = green[codes[i + 1]];
+    light[i + 2] = blue[codes[i + 2]];
+  }
 }
 
 }  // namespace
@@ -48,6 +62,11 @@ void Lineariser::linearise(const AVFrame& picture, const Crop& crop, Image& imag
   const float* const blue = tables_[2].empty() ? red : tables_[2].data();
   rows_->begin(picture);
   for (int y = 0; y < crop.height; ++y) {
+    if (const std::uint8_t* packed = rows_->packed_rgb(crop.y + y)) {
+      look_up(packed + 3 * static_cast<std::ptrdiff_t>(crop.x), crop.width, {red, green, blue},
+              image.pixels.data() + image.index(y, 0));
+      continue;
+    }
     const CodedRow row = rows_->read(crop.y + y);
     const std::int32_t* const r = row[0] + crop.x;
     const std::int32_t* const g = row[1] + crop.x;

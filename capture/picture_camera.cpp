@@ -11,6 +11,7 @@
 #include "capture/exr.h"
 #include "capture/files.h"
 #include "capture/media_file.h"
+#include "capture/pool.h"
 #include "capture/rgbe.h"
 
 namespace capture {
@@ -44,9 +45,9 @@ Image three_channels(Image image) {
   return colour;
 }
 
-Image cut(Image image, const Crop& crop) {
+void cut(Image& image, const Crop& crop) {
   if (crop.width == image.width && crop.height == image.height) {
-    return image;
+    return;
   }
   Image part = make_image(crop.height, crop.width, image.channels);
   for (int y = 0; y < crop.height; ++y) {
@@ -55,7 +56,7 @@ Image cut(Image image, const Crop& crop) {
     std::copy_n(from, crop.width * image.channels,
                 part.pixels.begin() + static_cast<std::ptrdiff_t>(part.index(y, 0)));
   }
-  return part;
+  image = std::move(part);
 }
 
 class PictureCamera : public Camera {
@@ -77,6 +78,7 @@ class PictureCamera : public Camera {
   std::vector<PictureEntry> entries_;
   Lineariser lineariser_;
   bool loop_;
+  Pool<Image> pool_;
   int source_width_ = 0;
   int source_height_ = 0;
   Crop crop_;
@@ -113,13 +115,14 @@ PictureCamera::PictureCamera(const std::string& name,
   std::string reason;
   for (std::size_t i = entry_; i < entries_.size() && !last_image_; ++i) {
     try {
-      Still still = read_picture(entries_[i].path, lineariser_);
-      source_width_ = still.image.width;
-      source_height_ = still.image.height;
+      const std::shared_ptr<Image> image = pool_.lend();
+      info_.description = read_picture(entries_[i].path, lineariser_, *image);
+      source_width_ = image->width;
+      source_height_ = image->height;
       crop_ = crop_within(options.crop, source_width_, source_height_);
-      last_image_ = std::make_shared<Image>(cut(std::move(still.image), crop_));
+      cut(*image, crop_);
+      last_image_ = image;
       loaded_entry_ = i;
-      info_.description = std::move(still.description);
     } catch (const std::runtime_error& error) {
       if (source_width_ > 0) {
         fail(std::string(": ") + error.what());
@@ -145,12 +148,14 @@ std::shared_ptr<const Image> PictureCamera::load(std::size_t entry) {
   if (entry == loaded_entry_) {
     return last_image_;
   }
-  Still still = read_picture(entries_[entry].path, lineariser_);
-  if (still.image.width != source_width_ || still.image.height != source_height_) {
+  const std::shared_ptr<Image> image = pool_.lend();
+  read_picture(entries_[entry].path, lineariser_, *image);
+  if (image->width != source_width_ || image->height != source_height_) {
     throw std::runtime_error(entries_[entry].path + " has another size than the first picture");
   }
   loaded_entry_ = entry;
-  return std::make_shared<Image>(cut(std::move(still.image), crop_));
+  cut(*image, crop_);
+  return image;
 }
 
 std::optional<Frame> PictureCamera::next() {
@@ -200,15 +205,17 @@ double exposure_in(const std::string& path) {
   return marked_s > 0 ? snapped_exposure_s(marked_s) : 0;
 }
 
-Still read_picture(const std::string& path, Lineariser& lineariser) {
+std::string read_picture(const std::string& path, Lineariser& lineariser, Image& image) {
   if (!is_exr(path) && !is_radiance(path)) {
-    return read_still(path, lineariser);
+    return read_still(path, lineariser, image);
   }
   check_is_file(path);
   if (is_exr(path)) {
-    return {three_channels(read_exr(path)), "OpenEXR, linear"};
+    image = three_channels(read_exr(path));
+    return "OpenEXR, linear";
   }
-  return {three_channels(read_rgbe(path)), "Radiance, linear"};
+  image = three_channels(read_rgbe(path));
+  return "Radiance, linear";
 }
 
 std::unique_ptr<Camera> make_picture_camera(const std::string& name,

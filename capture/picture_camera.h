@@ -21,10 +21,10 @@ struct PictureEntry {
 };
 
 // Reads any picture file as three channels of light: OpenEXR and Radiance pictures, by their
-// endings
-// (.exr, .hdr, .pic), are light already; other stills are linearised.
+// endings (.exr, .hdr, .pic), are light already; other stills are linearised, into `image` as it
+// is if it has the size. Returns the description of a still (see Still).
 // Throws std::runtime_error with path, reason and what to do.
-Still read_picture(const std::string& path, Lineariser& lineariser);
+std::string read_picture(const std::string& path, Lineariser& lineariser, Image& image);
 
 // Whether read_picture would know the kind of file.
 bool is_picture(const std::string& path);

@@ -203,10 +203,12 @@ bool is_still(const std::string& path) {
 
 Still read_still(const std::string& path, const LightCurves& curves) {
   Lineariser lineariser(curves);
-  return read_still(path, lineariser);
+  Still still;
+  still.description = read_still(path, lineariser, still.image);
+  return still;
 }
 
-Still read_still(const std::string& path, Lineariser& lineariser) {
+std::string read_still(const std::string& path, Lineariser& lineariser, Image& image) {
   check_is_file(path);
   const std::vector<std::byte> bytes = read_file(path, max_file_bytes);
   const std::optional<AVCodecID> codec = codec_of(bytes, path);
@@ -215,10 +217,8 @@ Still read_still(const std::string& path, Lineariser& lineariser) {
   }
   const libav::FrameHandle frame = decode(*codec, bytes, path);
   try {
-    Still still;
-    lineariser.linearise(*frame, crop_within({}, frame->width, frame->height), still.image);
-    still.description = std::string(avcodec_get_name(*codec)) + ", " + lineariser.description();
-    return still;
+    lineariser.linearise(*frame, crop_within({}, frame->width, frame->height), image);
+    return std::string(avcodec_get_name(*codec)) + ", " + lineariser.description();
   } catch (const std::runtime_error& error) {
     fail(path, error.what());
   }

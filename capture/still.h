@@ -43,7 +43,8 @@ bool is_still(const std::string& path);
 // Reads a still file; its codes become light by `curves`, as colour.md defines it. Alpha is not
 // read. Throws std::runtime_error with path, reason and what to do.
 Still read_still(const std::string& path, const LightCurves& curves);
-// The same for many, which keeps tables between them.
-Still read_still(const std::string& path, Lineariser& lineariser);
+// The same for many, which keeps tables between them: into `image`, used again if it has the size.
+// Returns the description.
+std::string read_still(const std::string& path, Lineariser& lineariser, Image& image);
 
 }  // namespace capture

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "capture/crop.h"
-#include "capture/image_pool.h"
+#include "capture/pool.h"
 #include "capture/sound_decoder.h"
 #include "capture/stamp_clock.h"
 #include "capture/video_decoder.h"
@@ -71,7 +71,7 @@ class VideoFile : public Camera {
   std::unique_ptr<SoundDecoder> sound_;
   std::string sound_note_;
   Lineariser lineariser_;
-  ImagePool pool_;
+  Pool<Image> pool_;
   std::optional<StampClock> clock_;
 
   std::deque<Frame> ahead_;  // made while opening

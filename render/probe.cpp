@@ -159,21 +159,36 @@ void ProbeMapper::map(const capture::Image& probe, const ProbeFrame& frame, Envi
   out.unseen_share = unseen_share();
 }
 
+namespace {
+
+// A pixel's three channels as they count, and something else. The four floats must be there.
+FourFloats counted_pixel(const float* pixel) {
+  FourFloats v;
+  std::memcpy(&v, pixel, sizeof v);
+  v = v > 0 ? v : FourFloats{};
+  return v < brightest_radiance ? v : FourFloats{} + brightest_radiance;
+}
+
+}  // namespace
+
 void ProbeMapper::shrink(const capture::Image& probe) {
   const int n = gather_.shrink;
   const float part = 1.0F / static_cast<float>(n * n);
+  const float* const last_pixel = &probe.pixels[probe.pixels.size() - 3];
+  const std::array<float, 4> last{last_pixel[0], last_pixel[1], last_pixel[2], 0};
   const tbb::blocked_range<int> all(0, shrunk_.height, rows_per_task);
   tbb::parallel_for(all, [&](const auto& rows) {
     for (int y = rows.begin(); y != rows.end(); ++y) {
       float* to = &shrunk_.pixels[shrunk_.index(y, 0)];
-      std::fill(to, to + 4 * shrunk_.width, 0.0F);
-      for (int dy = 0; dy < n; ++dy) {
-        const float* from = &probe.pixels[probe.index(y * n + dy, 0)];
-        for (int x = 0; x < shrunk_.width; ++x) {
+      for (int x = 0; x < shrunk_.width; ++x, to += 4) {
+        FourFloats sum{};
+        for (int dy = 0; dy < n; ++dy) {
+          const float* from = &probe.pixels[probe.index(y * n + dy, x * n)];
           for (int dx = 0; dx < n; ++dx, from += 3) {
-            for (int c = 0; c < 3; ++c) to[4 * x + c] += part * counted_radiance(from[c]);
+            sum += part * counted_pixel(from == last_pixel ? last.data() : from);
           }
         }
+        std::memcpy(to, &sum, sizeof sum);
       }
     }
   });

@@ -23,7 +23,7 @@ void write_demo_clap(const std::filesystem::path& file,
                      const render::MadeStudio& studio,
                      const render::LightParts& picture);
 
-// The probe's shots as PNG files, with frames.csv. Returns how many.
+// The probe's shots as PPM files, with frames.csv. Returns how many.
 int write_demo_probe(const std::filesystem::path& dir,
                      const render::MadeStudio& studio,
                      const render::LightParts& picture);

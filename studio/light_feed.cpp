@@ -94,7 +94,7 @@ LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
 }
 
 void LightFeed::build_environment(const LightRequest& request) {
-  auto env = std::make_shared<render::Environment>();
+  std::shared_ptr<render::Environment> env = environments_.lend();
   if (mapper_) {
     render::ProbeFrame frame{match_.gain, {}};
     if (settings_->unseen == render::Unseen::floor) frame.floor_radiance = floor_of_plate(request);

@@ -9,6 +9,7 @@
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
 #include "capture/image.h"
+#include "capture/pool.h"
 #include "render/environment.h"
 #include "render/light_follower.h"
 #include "render/light_table.h"
@@ -59,8 +60,9 @@ class LightFeed {
   bool matched_ = false;
   std::array<double, 3> averaged_gain_{1, 1, 1};
   render::MatchResult match_;
-  // Made anew for every change, and never touched once it was handed out.
+  // Another one for every change, never touched once it was handed out.
   std::shared_ptr<render::Environment> environment_;
+  capture::Pool<render::Environment> environments_;
   render::LightTable table_;  // of environment_, if it is not stale
   int table_count_ = 0;       // that it was made for; 0 = stale
 };

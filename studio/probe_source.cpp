@@ -4,27 +4,18 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
+#include "capture/hdr.h"
 #include "capture/make_hdr.h"
 
 namespace studio {
 namespace {
 
-constexpr int code_bits = 16;
-constexpr double white_code = 65535;
 constexpr std::size_t longest_cycle = 16;  // exposures of a bracket
 constexpr double same_exposure = 0.02;     // relative
 
 bool about_equal(double a, double b) { return std::abs(a - b) <= same_exposure * b; }
-
-std::vector<std::uint16_t> codes_of(const capture::Image& linear) {
-  std::vector<std::uint16_t> codes(linear.pixels.size());
-  std::ranges::transform(linear.pixels, codes.begin(), [](float v) {
-    const float scaled = v * static_cast<float>(white_code) + 0.5F;
-    return static_cast<std::uint16_t>(std::min(std::max(scaled, 0.0F), 65535.0F));
-  });
-  return codes;
-}
 
 [[noreturn]] void fail(const Set& set, const std::string& message) {
   const Place place = set.probe->source_place;
@@ -34,37 +25,30 @@ std::vector<std::uint16_t> codes_of(const capture::Image& linear) {
 }  // namespace
 
 RollingBracket::RollingBracket(std::vector<double> exposures_s) {
-  for (const double exposure_s : exposures_s) slots_.push_back({exposure_s, {}});
+  for (const double exposure_s : exposures_s) slots_.push_back({exposure_s, nullptr});
 }
 
-void RollingBracket::add(const capture::Image& linear, double exposure_s) {
+void RollingBracket::add(std::shared_ptr<const capture::Image> linear, double exposure_s) {
   if (width_ == 0) {
-    width_ = linear.width;
-    height_ = linear.height;
+    width_ = linear->width;
+    height_ = linear->height;
   }
-  if (linear.width != width_ || linear.height != height_ || linear.channels != 3) {
+  if (linear->width != width_ || linear->height != height_ || linear->channels != 3) {
     throw std::invalid_argument("the shots of a bracket must have one size and three channels");
   }
   const auto nearest = std::ranges::min_element(slots_, {}, [&](const Slot& slot) {
     return std::abs(std::log(slot.exposure_s / exposure_s));
   });
-  nearest->exposure_s = exposure_s;
-  nearest->codes = codes_of(linear);
+  *nearest = {exposure_s, std::move(linear)};
 }
 
-capture::Image RollingBracket::merge() {
-  std::vector<const std::uint16_t*> shots;
-  std::vector<double> exposures_s;
+std::shared_ptr<const capture::Image> RollingBracket::merge() {
+  std::vector<capture::LiveShot> shots;
   for (const Slot& slot : slots_) {
-    if (slot.codes.empty()) continue;
-    shots.push_back(slot.codes.data());
-    exposures_s.push_back(slot.exposure_s);
+    if (slot.linear != nullptr) shots.push_back({slot.linear.get(), slot.exposure_s});
   }
-  const capture::CodeTable table = capture::linear_code_table(code_bits, 0, white_code, {});
-  capture::MergeTables tables({table, table, table}, static_cast<int>(shots.size()));
-  tables.set_exposures(exposures_s);
-  capture::Image radiance = capture::make_image(height_, width_, 3);
-  tables.merge(shots, width_, 0, height_, radiance.pixels.data());
+  std::shared_ptr<capture::Image> radiance = pool_.lend();
+  capture::merge_live_shots(shots, {}, *radiance);
   return radiance;
 }
 
@@ -137,12 +121,12 @@ void ProbeSource::take(const std::vector<capture::Frame>& frames) {
     fresh = true;
     newest_.time = frame.time;
     if (bracket_) {
-      bracket_->add(*frame.image, exposure_s_of(frame));
+      bracket_->add(frame.image, exposure_s_of(frame));
     } else {
       newest_.image = frame.image;
     }
   }
-  if (fresh && bracket_) newest_.image = std::make_shared<capture::Image>(bracket_->merge());
+  if (fresh && bracket_) newest_.image = bracket_->merge();
 }
 
 ProbeSource::Radiance ProbeSource::at(capture::Time time) {

@@ -1,13 +1,12 @@
 // Radiance as the lightprobe measures it: a picture that stays, or a camera that brackets.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
 
-#include "capture/hdr.h"
 #include "capture/image.h"
+#include "capture/pool.h"
 #include "studio/set.h"
 #include "studio/source.h"
 
@@ -23,18 +22,19 @@ class RollingBracket {
 
   // A shot, linear, 1 = saturated: (height, width, 3), all of one size. Throws
   // std::invalid_argument for another size.
-  void add(const capture::Image& linear, double exposure_s);
-  // Radiance in sensor units per second, of the shots that were seen.
-  capture::Image merge();
+  void add(std::shared_ptr<const capture::Image> linear, double exposure_s);
+  // Radiance in sensor units per second, of the shots that were seen; at least one must have been.
+  std::shared_ptr<const capture::Image> merge();
 
  private:
   struct Slot {
     double exposure_s;
-    std::vector<std::uint16_t> codes;  // 65535 = saturated; empty = not seen yet
+    std::shared_ptr<const capture::Image> linear;  // null = not seen yet
   };
 
   int height_ = 0, width_ = 0;
   std::vector<Slot> slots_;
+  capture::Pool<capture::Image> pool_;
 };
 
 // One thread uses it.

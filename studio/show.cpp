@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "capture/pool.h"
 #include "compositing/display.h"
 #include "render/kept_visibility.h"
 #include "studio/handover.h"
@@ -44,16 +45,6 @@ compositing::DisplaySettings display_settings(const Set& set) {
   if (!set.display.display.empty()) settings.display = set.display.display;
   if (!set.display.view.empty()) settings.view = set.display.view;
   return settings;
-}
-
-// Buffers that others may still hold (the recorder, an observer) are left to them.
-template <class T>
-std::shared_ptr<T> free_one(std::vector<std::shared_ptr<T>>& pool) {
-  for (const auto& one : pool) {
-    if (one.use_count() == 1) return one;
-  }
-  pool.push_back(std::make_shared<T>());
-  return pool.back();
 }
 
 // Throws SetError at `place` for what goes wrong in `make`.
@@ -204,7 +195,7 @@ class Show::Stages {
     for (const RecorderCommand& command : work.recorder) apply(command);
     ShownFrame shown;
     shown.prepared = std::move(work.frame);
-    const std::shared_ptr<render::FrameResult> result = free_one(results_);
+    const std::shared_ptr<render::FrameResult> result = results_.lend();
     timed(shown, Stage::render, [&] {
       render::FrameInputs inputs = shown.prepared.inputs();
       inputs.kept_visibility = &kept_visibility_;
@@ -212,7 +203,7 @@ class Show::Stages {
     });
     shown.result = result;
 
-    const auto rgb8 = free_one(pictures_);
+    const auto rgb8 = pictures_.lend();
     timed(shown, Stage::display, [&] {
       const capture::HalfImage& rgba = result->rgba;
       rgb8->resize(rgba.pixels.size() / 4 * 3);
@@ -289,8 +280,8 @@ class Show::Stages {
   Tally tally_;
   std::unique_ptr<compositing::Display> display_;
   render::KeptVisibility kept_visibility_;
-  std::vector<std::shared_ptr<render::FrameResult>> results_;
-  std::vector<std::shared_ptr<std::vector<std::uint8_t>>> pictures_;
+  capture::Pool<render::FrameResult> results_;
+  capture::Pool<std::vector<std::uint8_t>> pictures_;
 
   // Of the thread that makes inputs, once it runs.
   FrameMaker maker_;

@@ -16,6 +16,7 @@
 #include "render/light_table.h"
 #include "render/ray_log.h"
 #include "studio/bench_scene.h"
+#include "studio/commands/benches.h"
 #include "studio/commands/commands.h"
 #include "studio/machine.h"
 
@@ -74,6 +75,8 @@ Measured measure(const BenchScene& shot, const render::FrameJob& job, int runs) 
   return m;
 }
 
+}  // namespace
+
 void bench_kernel(int runs, Console& console) {
   const BenchScene shot = make_bench_scene(640, 480);
   render::FrameJob job = shot.job;
@@ -116,26 +119,34 @@ void bench_kernel(int runs, Console& console) {
                       .dump(2));
 }
 
+namespace {
+
 struct BenchOptions {
   std::string what;
+  std::string set;
   std::optional<std::int64_t> runs = 5;
 };
 
 }  // namespace
 
 Command bench_command() {
-  return {"bench", "Measure the kernel against the limit: bare Embree over the same rays",
+  return {"bench",
+          "Measure the kernel against bare Embree over the same rays, or what inputs cost a set",
           "platelight bench kernel --json kernel.json",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto o = std::make_shared<BenchOptions>();
-            arguments.positional("WHAT", o->what, "kernel");
+            arguments.positional("WHAT", o->what, "kernel, or inputs (plate, probe, light table)");
+            arguments.option("--set", o->set, "the set file whose inputs are measured");
             arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
             return [o](Console& console) {
-              if (o->what != "kernel") {
-                throw UsageError(
-                    fmt::format("there is no benchmark of \"{}\": there is kernel", o->what));
+              const int runs = static_cast<int>(*o->runs);
+              if (o->what == "kernel") return bench_kernel(runs, console);
+              if (o->what != "inputs") {
+                throw UsageError(fmt::format(
+                    "there is no benchmark of \"{}\": there are kernel and inputs", o->what));
               }
-              bench_kernel(static_cast<int>(*o->runs), console);
+              if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");
+              bench_inputs(o->set, runs, console);
             };
           }};
 }

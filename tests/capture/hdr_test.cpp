@@ -193,6 +193,74 @@ MergeTables live_tables(int shots) {
   return {{table, table, table}, shots};
 }
 
+std::vector<Shot> linear_shots(const LiveFrame& frame,
+                               const made::Scene& scene,
+                               std::span<const double> exposures_s) {
+  std::vector<Shot> shots;
+  for (std::size_t s = 0; s < exposures_s.size(); ++s) {
+    Shot shot{make_image(scene.height, scene.width), exposures_s[s]};
+    for (std::size_t i = 0; i < shot.linear.pixels.size(); ++i) {
+      shot.linear.pixels[i] =
+          static_cast<float>((frame.codes[s][i] - black_code) / (white_code - black_code));
+    }
+    shots.push_back(std::move(shot));
+  }
+  return shots;
+}
+
+std::vector<LiveShot> live_shots(std::span<const Shot> shots) {
+  std::vector<LiveShot> live;
+  for (const Shot& shot : shots) live.push_back({&shot.linear, shot.exposure_s});
+  return live;
+}
+
+TEST(MergeLiveShots, AgreesWithMergeShotsWithinTheNoise) {
+  const made::Scene scene = made::patches(67, 48, 6);  // no whole number of stretches
+  Image fast;
+  for (const std::vector<double>& exposures_s :
+       {std::vector<double>{0.1}, {1, 0.1}, {0.01, 1, 0.1}, {2, 1, .5, .1, .01}}) {
+    const auto shots = linear_shots(live_frame(scene, exposures_s), scene, exposures_s);
+    Image deviation;
+    const Image exact = merge_shots(shots, {}, &deviation);
+    merge_live_shots(live_shots(shots), {}, fast);
+    ASSERT_EQ(fast.pixels.size(), exact.pixels.size());
+    for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
+      const float allowed =
+          std::isinf(deviation.pixels[i]) ? exact.pixels[i] * 1e-6F : deviation.pixels[i];
+      ASSERT_NEAR(fast.pixels[i], exact.pixels[i], allowed);
+    }
+  }
+}
+
+TEST(MergeLiveShots, TakesTheShortestShotWhereAllAreSaturated) {
+  const std::vector<Shot> shots{{Image{1, 1, {1, 1, 0.5F}}, 1}, {Image{1, 1, {1, 1, 0.05F}}, 0.1}};
+  Image merged;
+  merge_live_shots(live_shots(shots), {}, merged);
+  EXPECT_FLOAT_EQ(merged.at(0, 0, 0), 10);
+  EXPECT_FLOAT_EQ(merged.at(0, 0, 2), 0.5F);
+}
+
+TEST(MergeLiveShots, LeavesOutValuesThatAreNotFinite) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  const std::vector<Shot> shots{{Image{1, 1, {nan, nan, -infinity}}, 1},
+                                {Image{1, 1, {0.25F, nan, 0.5F}}, 1}};
+  Image merged;
+  merge_live_shots(live_shots(shots), {}, merged);
+  EXPECT_FLOAT_EQ(merged.at(0, 0, 0), 0.25F);
+  EXPECT_EQ(merged.at(0, 0, 1), 0);
+  EXPECT_FLOAT_EQ(merged.at(0, 0, 2), 0.5F);
+}
+
+TEST(MergeLiveShots, RefusesWhatMergeShotsRefuses) {
+  Image merged;
+  EXPECT_THROW(merge_live_shots({}, {}, merged), std::invalid_argument);
+  const std::vector<Shot> sizes{{Image{1, 1, {0, 0, 0}}, 1}, {Image{}, 1}};
+  EXPECT_THROW(merge_live_shots(live_shots(sizes), {}, merged), std::invalid_argument);
+  const std::vector<Shot> no_time{{Image{1, 1, {0, 0, 0}}, 0}};
+  EXPECT_THROW(merge_live_shots(live_shots(no_time), {}, merged), std::invalid_argument);
+}
+
 TEST(MergeTables, AgreeWithMergeShotsWithinTheNoise) {
   const made::Scene scene = made::patches(64, 48, 6);
   for (const std::vector<double>& exposures_s : {std::vector<double>{0.1},
@@ -206,15 +274,7 @@ TEST(MergeTables, AgreeWithMergeShotsWithinTheNoise) {
     Image fast = make_image(scene.height, scene.width);
     tables.merge(frame.pointers, scene.width, 0, scene.height, fast.pixels.data());
 
-    std::vector<Shot> shots;
-    for (std::size_t s = 0; s < exposures_s.size(); ++s) {
-      Shot shot{make_image(scene.height, scene.width), exposures_s[s]};
-      for (std::size_t i = 0; i < shot.linear.pixels.size(); ++i) {
-        shot.linear.pixels[i] =
-            static_cast<float>((frame.codes[s][i] - black_code) / (white_code - black_code));
-      }
-      shots.push_back(std::move(shot));
-    }
+    const std::vector<Shot> shots = linear_shots(frame, scene, exposures_s);
     Image deviation;
     const Image exact = merge_shots(shots, {}, &deviation);
     for (std::size_t i = 0; i < exact.pixels.size(); ++i) {

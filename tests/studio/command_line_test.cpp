@@ -106,6 +106,14 @@ TEST_F(CommandLine, NamesACommandThatItDoesNotKnow) {
   EXPECT_THAT(run("chek a.toml").err, HasSubstr("chek"));
 }
 
+TEST_F(CommandLine, RefusesABenchmarkWithoutItsSubject) {
+  for (const char* words : {"bench wheels", "bench inputs"}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 2) << words;
+    expect_one_line(outcome.err);
+  }
+}
+
 TEST_F(CommandLine, ReturnsOneAndOneLineForAFileThatIsNotThere) {
   const Outcome outcome = run("check " + (dir_ / "absent.toml").string());
   EXPECT_EQ(outcome.status, 1);
@@ -178,6 +186,16 @@ TEST_F(Runs, WriteTheFiguresThatScriptsRelyOn) {
   EXPECT_EQ(json["match"], nlohmann::json::array({1.0, 1.0, 1.0}));
   EXPECT_GT(json["peak_memory_mb"], 1);
   EXPECT_LT(json["peak_memory_mb"], 1024);
+}
+
+TEST_F(Runs, TellWhatTheirInputsCost) {
+  const std::string json_path = (dir_ / "inputs.json").string();
+  const Outcome outcome = run("bench inputs --set " + write_set() + " --json " + json_path);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto json = nlohmann::json::parse(content_of(json_path));
+  EXPECT_EQ(json["frames"], 2) << "all but the first";
+  EXPECT_GT(json["cpu_ms"], 0);
+  EXPECT_TRUE(json["stage_ms"]["probe"].is_number());
 }
 
 TEST_F(Runs, RecordVideoAndExr) {

@@ -94,10 +94,10 @@ TEST(Quantiles, AreRightToOnePercent) {
 }
 
 // A shot of a scene of constant radiance, clipped at 1.
-capture::Image shot_of(double radiance, double exposure_s) {
+std::shared_ptr<const capture::Image> shot_of(double radiance, double exposure_s) {
   capture::Image shot = capture::make_image(4, 6);
   for (float& v : shot.pixels) v = static_cast<float>(std::min(1.0, radiance * exposure_s));
-  return shot;
+  return std::make_shared<const capture::Image>(std::move(shot));
 }
 
 TEST(RollingBracket, MergesRadianceFromTheNewestShotOfEachExposure) {
@@ -107,14 +107,15 @@ TEST(RollingBracket, MergesRadianceFromTheNewestShotOfEachExposure) {
     for (const double exposure_s : exposures_s) {
       bracket.add(shot_of(radiance, exposure_s), exposure_s);
     }
-    for (const float v : bracket.merge().pixels) EXPECT_NEAR(v / radiance, 1, 0.01) << radiance;
+    for (const float v : bracket.merge()->pixels) EXPECT_NEAR(v / radiance, 1, 0.01) << radiance;
   }
 }
 
 TEST(RollingBracket, RefusesShotsOfTwoSizes) {
   RollingBracket bracket({0.01, 0.1});
-  bracket.add(capture::make_image(4, 6), 0.01);
-  EXPECT_THROW(bracket.add(capture::make_image(6, 4), 0.1), std::invalid_argument);
+  bracket.add(std::make_shared<capture::Image>(capture::make_image(4, 6)), 0.01);
+  const auto turned = std::make_shared<capture::Image>(capture::make_image(6, 4));
+  EXPECT_THROW(bracket.add(turned, 0.1), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,0 +1,77 @@
+// platelight bench inputs: what a show spends on a frame before it is rendered.
+#include <algorithm>
+#include <array>
+#include <ctime>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "studio/commands/benches.h"
+#include "studio/frame_maker.h"
+#include "studio/machine.h"
+
+namespace studio {
+namespace {
+
+// Of all threads.
+double cpu_ms_so_far() {
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
+
+struct Pass {
+  int frames = 0;
+  double cpu_ms = 0;                      // a frame
+  std::array<double, stages> stage_ms{};  // a frame, by the clock
+};
+
+// All frames of a set, without the first, which builds what is kept.
+Pass make_all(const Set& set) {
+  FrameMaker maker(set);
+  maker.make(0);
+  Pass pass;
+  const double start_ms = cpu_ms_so_far();
+  while (const std::optional<PreparedFrame> frame = maker.make(pass.frames + 1)) {
+    for (std::size_t i = 0; i < stages; ++i) pass.stage_ms[i] += frame->stage_ms[i];
+    ++pass.frames;
+    if (set.show.frames && pass.frames + 1 >= *set.show.frames) break;
+  }
+  const double frames = std::max(pass.frames, 1);
+  pass.cpu_ms = (cpu_ms_so_far() - start_ms) / frames;
+  for (double& ms : pass.stage_ms) ms /= frames;
+  return pass;
+}
+
+}  // namespace
+
+void bench_inputs(const std::string& set_path, int runs, Console& console) {
+  const Set set = read_set(set_path);
+  Pass best = make_all(set);
+  for (int i = 1; i < runs; ++i) {
+    const Pass pass = make_all(set);
+    if (pass.cpu_ms < best.cpu_ms) best = pass;
+  }
+  nlohmann::ordered_json stage_ms;
+  std::string parts;
+  for (const Stage stage : {Stage::capture, Stage::probe, Stage::job}) {
+    const double ms = best.stage_ms[static_cast<std::size_t>(stage)];
+    stage_ms[std::string(name_of(stage))] = ms;
+    parts += fmt::format("  {} {:.2f} ms", name_of(stage), ms);
+  }
+  console.say(fmt::format("{} frames of {}: {:.2f} ms of CPU time a frame; by the clock{}",
+                          best.frames, set_path, best.cpu_ms, parts));
+  const Machine machine = this_machine();
+  console.figures(nlohmann::ordered_json{
+      {"set", set_path},
+      {"frames", best.frames},
+      {"cpu_ms", best.cpu_ms},
+      {"stage_ms", stage_ms},
+      {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}}}}
+                      .dump(2));
+}
+
+}  // namespace studio

@@ -1,0 +1,17 @@
+// The benchmarks of `platelight bench`, one function each.
+#pragma once
+
+#include <string>
+
+#include "studio/console.h"
+
+namespace studio {
+
+// The kernel against bare Embree over the same rays, the best of `runs`.
+void bench_kernel(int runs, Console& console);
+
+// CPU time a frame that a set's inputs take: plate, probe, light table; the best of `runs` passes.
+// Throws SetError.
+void bench_inputs(const std::string& set_path, int runs, Console& console);
+
+}  // namespace studio
