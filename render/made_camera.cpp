@@ -96,7 +96,7 @@ class MadeStream final : public capture::Camera {
       fail(uri, "the crop reaches beyond its picture of " + std::to_string(lens.width) + "x" +
                     std::to_string(lens.height));
     }
-    const Scene court(studio_.court);
+    const Scene court(studio_.place);
     parts_ = photograph_parts(studio_, court, calibrate::make_direction_table(lens),
                               camera_.cam_from_set, request.samples);
     const int codes = 1 << camera_.sensor.bits;

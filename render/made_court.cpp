@@ -1,15 +1,13 @@
 // The made court, piece by piece.
 #include "render/made_court.h"
 
-#include <algorithm>
 #include <array>
-#include <memory>
 #include <string>
 #include <utility>
 
+#include "render/made_scene.h"
 #include "render/made_shapes.h"
 #include "render/made_surfaces.h"
-#include "render/standard.h"
 
 namespace render {
 namespace {
@@ -25,45 +23,9 @@ constexpr float far_m = 150;  // where the ground ends
 // Rough ground hides its own glints: hardly any mirrored light leaves it.
 constexpr float rough_ground = 0.1F;
 
-class Builder {
- public:
-  std::int32_t add(Texture texture) {
-    scene_.textures.push_back(std::make_shared<const Texture>(std::move(texture)));
-    return static_cast<std::int32_t>(scene_.textures.size()) - 1;
-  }
-
-  // A thing of one material: a textured one if `texture` is not -1.
-  void add(const std::string& name,
-           Mesh mesh,
-           std::array<float, 3> base,
-           float roughness,
-           std::int32_t texture = -1,
-           float specular = 1,
-           float metallic = 0) {
-    StandardParameters parameters;
-    std::ranges::copy(base, parameters.base_color);
-    parameters.roughness = roughness;
-    parameters.metallic = metallic;
-    parameters.specular = specular;
-    parameters.base_color_texture = texture;
-    mesh.materials = {static_cast<std::uint32_t>(scene_.materials.size())};
-    scene_.materials.push_back(make_standard_material(name, parameters));
-    Instance instance;
-    instance.name = name;
-    instance.mesh = static_cast<std::uint32_t>(scene_.meshes.size());
-    scene_.instances.push_back(std::move(instance));
-    scene_.meshes.push_back(std::make_shared<const Mesh>(std::move(mesh)));
-  }
-
-  SceneDescription take() { return std::move(scene_); }
-
- private:
-  SceneDescription scene_;
-};
-
 constexpr std::array<float, 3> white{1, 1, 1};
 
-void add_ground(Builder& court, int texture_size, std::uint32_t seed) {
+void add_ground(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
   const auto asphalt = court.add(make_court_texture(texture_size, seed));
   const auto paving = court.add(make_paving_texture(std::max(texture_size / 4, 1), seed + 1));
   court.add("court",
@@ -82,7 +44,7 @@ void add_ground(Builder& court, int texture_size, std::uint32_t seed) {
   court.add("paving", std::move(around), white, 0.9F, paving, rough_ground);
 }
 
-void add_concrete(Builder& court, int texture_size, std::uint32_t seed) {
+void add_concrete(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
   const auto concrete = court.add(make_concrete_texture(std::max(texture_size / 8, 1), seed + 2));
   const auto wall = court.add(make_wall_texture(std::max(texture_size / 4, 1), seed + 3));
   Mesh kerbs;
@@ -117,7 +79,7 @@ void add_concrete(Builder& court, int texture_size, std::uint32_t seed) {
             white, 0.8F, concrete, rough_ground);
 }
 
-void add_things(Builder& court, int texture_size, std::uint32_t seed) {
+void add_things(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
   const auto boards = court.add(make_board_texture(std::max(texture_size / 4, 1), seed + 4));
   Mesh crates;
   const Vec3f half = court_crate.size * 0.5F;
@@ -177,13 +139,11 @@ void add_things(Builder& court, int texture_size, std::uint32_t seed) {
 }  // namespace
 
 SceneDescription make_court(const MadeCourtSettings& settings) {
-  Builder court;
+  MadeSceneBuilder court;
   add_ground(court, settings.texture_size, settings.seed);
   add_concrete(court, settings.texture_size, settings.seed);
   add_things(court, settings.texture_size, settings.seed);
-  SceneDescription scene = court.take();
-  scene.version = 1;
-  return scene;
+  return court.take();
 }
 
 }  // namespace render

@@ -19,7 +19,6 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 constexpr capture::Rational plate_rate{25, 1};
-constexpr capture::Rational probe_rate{75, 1};
 
 // A cloud's shadow takes at most this share of the sun's light.
 constexpr double cloud_share = 0.35;
@@ -48,31 +47,6 @@ MadeCamera make_plate_camera(const MadeStudioSettings& settings) {
                    .seed = settings.seed * 2 + 1};
   camera.exposures_s = {exposure_s};
   camera.rate = plate_rate;
-  return camera;
-}
-
-MadeCamera make_probe_camera(const MadeStudioSettings& settings) {
-  MadeCamera camera;
-  constexpr double max_angle = 93 * degree;
-  const double centre = (settings.probe_size - 1) / 2.0;
-  camera.lens.model = "equisolid";
-  camera.lens.width = settings.probe_size;
-  camera.lens.height = settings.probe_size;
-  camera.lens.parameters = {(centre - 0.5) / (2 * std::sin(max_angle / 2)), centre, centre};
-  camera.lens.max_angle_rad = max_angle;
-  camera.cam_from_set = calibrate::pose_from_axis({0, 0, 0.45}, {0, 0, 1}, 0);
-  // The longest exposure shows trees well, the shortest does not clip the sun.
-  camera.exposures_s = {1.0 / 100, 1.0 / 2500, 1.0 / 100000};
-  camera.sensor = {.saturation = 10.0 / 100,
-                   .full_well_e = 15000,
-                   .read_noise_e = 6,
-                   .bits = 8,
-                   .transfer = capture::Transfer::srgb,
-                   .seed = settings.seed * 2 + 2};
-  camera.rate = probe_rate;
-  // A whole bracket is there when the plate begins.
-  camera.start =
-      -capture::time_of_frame(static_cast<std::int64_t>(camera.exposures_s.size()) - 1, probe_rate);
   return camera;
 }
 
@@ -138,21 +112,59 @@ double exposure_of_picture(const MadeCamera& camera, std::int64_t n) {
   return camera.exposures_s[static_cast<std::size_t>(((n % count) + count) % count)];
 }
 
-MadeStudio make_studio(const MadeStudioSettings& settings) {
+calibrate::Pose pose_of_picture(const MadeCamera& camera, std::int64_t n) {
+  if (camera.track.keys.empty()) return camera.cam_from_set;
+  const capture::Time since = time_of_picture(camera, n) - camera.start;
+  return pose_at(camera.track, std::chrono::duration<double>(since).count()).cam_from_set;
+}
+
+MadeCamera make_fisheye(int size, std::vector<double> exposures_s, std::uint32_t seed) {
+  MadeCamera camera;
+  constexpr double max_angle = 93 * degree;
+  const double centre = (size - 1) / 2.0;
+  camera.lens.model = "equisolid";
+  camera.lens.width = size;
+  camera.lens.height = size;
+  camera.lens.parameters = {(centre - 0.5) / (2 * std::sin(max_angle / 2)), centre, centre};
+  camera.lens.max_angle_rad = max_angle;
+  camera.cam_from_set = calibrate::pose_from_axis({0, 0, 0.45}, {0, 0, 1}, 0);
+  camera.exposures_s = std::move(exposures_s);
+  camera.sensor = {.saturation = 10.0 / 100,
+                   .full_well_e = 15000,
+                   .read_noise_e = 6,
+                   .bits = 8,
+                   .transfer = capture::Transfer::srgb,
+                   .seed = seed};
+  const auto shots = static_cast<std::int64_t>(camera.exposures_s.size());
+  camera.rate = {plate_rate.num * shots, plate_rate.den};
+  // A whole bracket is there when the plate begins.
+  camera.start = -capture::time_of_frame(shots - 1, camera.rate);
+  return camera;
+}
+
+void check(const MadeStudioSettings& settings) {
   if (std::min({settings.width, settings.height, settings.probe_size, settings.texture_size}) <
       16) {
     throw std::invalid_argument("a made studio's pictures are at least 16 pixels wide and high");
   }
   if (settings.frames < 1) throw std::invalid_argument("a made studio needs at least one frame");
+}
+
+MadeStudio make_studio(const MadeStudioSettings& settings) {
+  check(settings);
   MadeStudio studio;
   studio.settings = settings;
   studio.sky = make_sky({.height = settings.sky_height,
                          .sun_azimuth_rad = static_cast<float>(172 * degree),
                          .sun_elevation_rad = static_cast<float>(38 * degree),
                          .seed = settings.seed});
-  studio.court = make_court({.texture_size = settings.texture_size, .seed = settings.seed});
+  studio.place = make_court({.texture_size = settings.texture_size, .seed = settings.seed});
+  studio.car_yaw_deg = court_car_yaw_deg;
+  studio.cloud_share = cloud_share;
   studio.plate = make_plate_camera(settings);
-  studio.probe = make_probe_camera(settings);
+  // The longest exposure shows trees well, the shortest does not clip the sun.
+  studio.probe = make_fisheye(settings.probe_size, {1.0 / 100, 1.0 / 2500, 1.0 / 100000},
+                              settings.seed * 2 + 2);
   studio.period = capture::time_of_frame(settings.frames, plate_rate);
   return studio;
 }
@@ -160,7 +172,8 @@ MadeStudio make_studio(const MadeStudioSettings& settings) {
 float sun_strength(const MadeStudio& studio, capture::Time time) {
   const double turn =
       std::chrono::duration<double>(time) / std::chrono::duration<double>(studio.period);
-  return static_cast<float>(1 - cloud_share * (0.5 - 0.5 * std::cos(2 * std::numbers::pi * turn)));
+  return static_cast<float>(1 - studio.cloud_share *
+                                    (0.5 - 0.5 * std::cos(2 * std::numbers::pi * turn)));
 }
 
 std::array<int, 4> picture_of_card(const MadeStudio& studio) {
@@ -216,8 +229,9 @@ LightParts photograph_parts(const MadeStudio& studio,
                             const Scene& scene,
                             const calibrate::DirectionTable& directions,
                             const calibrate::Pose& cam_from_set,
-                            int samples) {
-  ReferenceSettings settings{.samples = samples, .seed = studio.settings.seed, .bounces = true};
+                            int samples,
+                            std::uint32_t seed) {
+  ReferenceSettings settings{.samples = samples, .seed = seed, .bounces = true};
   const auto take = [&](const capture::Image& light, const calibrate::DirectionTable& seen) {
     const Environment environment = as_environment(light);
     return photograph({&scene, &seen, &environment}, cam_from_set, settings);

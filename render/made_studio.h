@@ -1,4 +1,4 @@
-// The made studio: a court under a made sky, seen by a made plate camera and a made fish-eye.
+// The made studio: a place and its light, seen by a made plate camera and a made fish-eye.
 #pragma once
 
 #include <array>
@@ -7,6 +7,7 @@
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
+#include "calibrate/track.h"
 #include "capture/frame.h"
 #include "capture/made_sensor.h"
 #include "render/made_court.h"
@@ -19,15 +20,17 @@ namespace render {
 // its exposures in turn; picture 0 is exposed about `start`.
 struct MadeCamera {
   calibrate::Lens lens;
-  calibrate::Pose cam_from_set;
+  calibrate::Pose cam_from_set;  // of picture 0
+  calibrate::Track track;        // of a camera that moves, from picture 0 on; no keys = it stands
   capture::MadeSensor sensor;
   std::vector<double> exposures_s;
   capture::Rational rate;
   capture::Time start{};
 };
 
-// The middle of the exposure of picture n, and its exposure.
+// The middle of the exposure of picture n, where the camera was, and the exposure.
 capture::Time time_of_picture(const MadeCamera& camera, std::int64_t n);
+calibrate::Pose pose_of_picture(const MadeCamera& camera, std::int64_t n);
 double exposure_of_picture(const MadeCamera& camera, std::int64_t n);
 
 struct MadeStudioSettings {
@@ -40,27 +43,37 @@ struct MadeStudioSettings {
   std::uint32_t seed = 1;
 };
 
-// Everything of the studio but time. The set's origin is the spot on the court where a car is to
+// Throws std::invalid_argument for sizes below 16, or frames below 1.
+void check(const MadeStudioSettings& settings);
+
+// Everything of the studio but time. The set's origin is the spot on the ground where a car is to
 // stand; radiance is in the plate's units, 1 = display white.
 struct MadeStudio {
   MadeStudioSettings settings;
   MadeSky sky;
-  SceneDescription court;
-  MadeCamera plate;  // 25 pictures a second, Rec.1886 codes of 8 bits
-  MadeCamera
-      probe;  // 75 a second, three exposures in turn, sRGB codes of 8 bits, looking straight up
+  SceneDescription place;  // its first instance is the ground around the origin
+  double car_yaw_deg = 0;  // how the car is to stand
+  MadeCamera plate;        // 25 pictures a second, Rec.1886 codes of 8 bits
+  MadeCamera probe;        // exposures in turn, sRGB codes of 8 bits, looking straight up
+  double cloud_share = 0;  // of the sun's light that a passing cloud takes at most
   capture::Time period{};  // of the light
 };
 
-// The same settings give the same studio. Throws std::invalid_argument for sizes below 16.
+// The court under a made sky with a passing cloud. The plate camera stands; the probe takes 75
+// pictures a second in three exposures. The same settings give the same studio. Throws as check().
 MadeStudio make_studio(const MadeStudioSettings& settings);
 
-// How strong the sun is at a time: 1, less while a thin cloud passes before it. Smooth, the same
+// The probe's camera: a fish-eye of 186 degrees that looks straight up from the car's place, and
+// shows radiance up to sensor.saturation / exposure. Each of its brackets fits one picture of the
+// plate.
+MadeCamera make_fisheye(int size, std::vector<double> exposures_s, std::uint32_t seed);
+
+// How strong the sun is at a time: 1, less while a cloud passes before it. Smooth, the same
 // again after studio.period.
 float sun_strength(const MadeStudio& studio, capture::Time time);
 
-// Where the plate shows the inside of the grey card: x, y, width, height of a rectangle of pixels
-// that lies in it.
+// Where the court's plate shows the inside of the grey card: x, y, width, height of a rectangle of
+// pixels that lies in it.
 std::array<int, 4> picture_of_card(const MadeStudio& studio);
 
 // What is seen of a still scene, by where its light came from: at any strength of the sun, the
@@ -72,13 +85,14 @@ struct LightParts {
 capture::Image add_light(const LightParts& parts, float sun_strength);
 
 // A scene in the studio's light through `directions`, path-traced with `samples` paths a pixel for
-// each part of the light, and more where the sun itself is seen. Noise does not depend on the number
-// of threads.
+// each part of the light, and more where the sun itself is seen. Noise depends on `seed` alone, not
+// on the number of threads.
 LightParts photograph_parts(const MadeStudio& studio,
                             const Scene& scene,
                             const calibrate::DirectionTable& directions,
                             const calibrate::Pose& cam_from_set,
-                            int samples);
+                            int samples,
+                            std::uint32_t seed = 1);
 
 // Directions of a latitude-longitude map (height, 2 * height) as render::Environment has them, for
 // a camera that is not turned against the set.

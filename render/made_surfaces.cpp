@@ -126,6 +126,17 @@ Texture make_court_texture(int size, std::uint32_t seed) {
   });
 }
 
+Texture make_lawn_texture(int size, std::uint32_t seed) {
+  return paint_texture(size, [=](int x, int y, float u, float v) {
+    const float patches = fractal_noise(u * 8, v * 8, 4, seed, 8);
+    const float tufts = fractal_noise(u * 96, v * 96, 3, seed + 1, 96);
+    const float blades = grain(x, y / 2, seed + 2);
+    const float dry = smooth_step(0.05F, 0.5F, fractal_noise(u * 5, v * 5, 4, seed + 3, 5));
+    const Vec3f green = mix({0.235F, 0.300F, 0.056F}, {0.36F, 0.32F, 0.11F}, 0.3F * dry);
+    return green * ((1 + 0.20F * patches) * (1 + 0.35F * tufts) * (1 + 0.22F * blades));
+  });
+}
+
 Texture make_paving_texture(int size, std::uint32_t seed) {
   return paint_texture(size, [=](int x, int y, float u, float v) {
     constexpr float slabs = 4;

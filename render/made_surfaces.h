@@ -15,6 +15,9 @@ namespace render {
 inline constexpr float court_m = 16;
 Texture make_court_texture(int size, std::uint32_t seed);
 
+// A mown lawn in summer; repeats.
+Texture make_lawn_texture(int size, std::uint32_t seed);
+
 // Concrete slabs, four to a side.
 Texture make_paving_texture(int size, std::uint32_t seed);
 

@@ -23,7 +23,7 @@ const MadeStudio& shared_studio() {
 }
 
 const Scene& shared_court() {
-  static const Scene scene(shared_studio().court);
+  static const Scene scene(shared_studio().place);
   return scene;
 }
 
@@ -171,9 +171,9 @@ TEST(CoverageOf, SharesThePictureOutAmongAllThings) {
   const MadeStudio& studio = shared_studio();
   const auto directions = calibrate::make_direction_table(studio.plate.lens);
   const auto cover = [&](const std::vector<bool>& seen) {
-    return coverage_of(studio.court, seen, directions, studio.plate.cam_from_set, 16);
+    return coverage_of(studio.place, seen, directions, studio.plate.cam_from_set, 16);
   };
-  std::vector<bool> ground(studio.court.instances.size(), false);
+  std::vector<bool> ground(studio.place.instances.size(), false);
   ground.front() = true;
   std::vector<bool> rest = ground;
   rest.flip();
