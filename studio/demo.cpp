@@ -4,30 +4,22 @@
 #include <algorithm>
 #include <numbers>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "calibrate/lens.h"
+#include "capture/camera.h"
 #include "capture/exr.h"
 #include "render/join_scenes.h"
 #include "render/made_car.h"
+#include "render/made_park.h"
 #include "studio/demo_files.h"
 
 namespace studio {
 namespace {
 
 namespace fs = std::filesystem;
-
-// The court with the car really at its origin. `is_car` tells the car's parts from the rest.
-render::SceneDescription court_with_car(const render::MadeStudio& studio,
-                                        std::vector<bool>& is_car) {
-  constexpr double degree = std::numbers::pi / 180;
-  render::SceneDescription scene = studio.court;
-  is_car.assign(scene.instances.size(), false);
-  render::join(scene, render::made_car(),
-               render::placed({}, static_cast<float>(render::court_car_yaw_deg * degree)));
-  is_car.resize(scene.instances.size(), true);
-  return scene;
-}
 
 double mean_of(const capture::Image& image) {
   return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) /
@@ -44,53 +36,90 @@ std::uintmax_t bytes_in(const fs::path& dir) {
 
 }  // namespace
 
-DemoFigures write_court_demo(const DemoSettings& settings, const DemoProgress& progress) {
+render::MadeStudio make_demo_studio(const DemoSettings& settings) {
+  if (settings.world == DemoWorld::court) return render::make_studio(settings.studio);
+  const std::string map = settings.map.string();
+  const auto picture = capture::open_camera("file:" + map)->next();
+  if (!picture || !picture->image) throw std::runtime_error(map + ": holds no picture");
+  try {
+    return render::make_park(*picture->image, settings.studio);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(map + ": cannot light the park: " + error.what());
+  }
+}
+
+render::SceneDescription place_with_car(const render::MadeStudio& studio,
+                                        std::vector<bool>& is_car) {
+  constexpr double degree = std::numbers::pi / 180;
+  render::SceneDescription scene = studio.place;
+  is_car.assign(scene.instances.size(), false);
+  render::join(scene, render::made_car(),
+               render::placed({}, static_cast<float>(studio.car_yaw_deg * degree)));
+  is_car.resize(scene.instances.size(), true);
+  return scene;
+}
+
+DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progress) {
   const fs::path truth = settings.dir / "truth";
   fs::create_directories(truth);
   DemoFigures figures;
   figures.frames = settings.studio.frames;
 
-  progress(0, "the court");
-  const render::MadeStudio studio = render::make_studio(settings.studio);
-  const render::Scene court(studio.court);
+  progress(0, "the place");
+  const render::MadeStudio studio = make_demo_studio(settings);
+  const render::Scene place(studio.place);
   const auto plate_directions = calibrate::make_direction_table(studio.plate.lens);
-  const calibrate::Pose& plate_pose = studio.plate.cam_from_set;
+  const auto photograph = [&](const render::Scene& scene, int n) {
+    // Frame 0 has a truth to be compared with; the others' noise need only stay below the sensor's.
+    const int samples = n == 0 ? settings.samples : (settings.samples + 1) / 2;
+    return render::photograph_parts(studio, scene, plate_directions,
+                                    render::pose_of_picture(studio.plate, n), samples,
+                                    studio.settings.seed + static_cast<std::uint32_t>(n));
+  };
+  const auto strength_at = [&](int n) {
+    return render::sun_strength(studio, render::time_of_picture(studio.plate, n));
+  };
 
-  progress(0.08, "the plate");
-  const render::LightParts plate =
-      render::photograph_parts(studio, court, plate_directions, plate_pose, settings.samples);
-  const float strength = render::sun_strength(studio, render::time_of_picture(studio.plate, 0));
-  capture::write_exr((truth / "plate_linear_0000.exr").string(),
-                     render::add_light(plate, strength));
-  write_demo_plate(settings.dir / "plate.mkv", studio, plate);
-  write_demo_clap(settings.dir / "clap.mkv", studio, plate);
+  progress(0.05, "the plate");
+  const render::LightParts first = photograph(place, 0);
+  const capture::Image first_radiance = render::add_light(first, strength_at(0));
+  capture::write_exr((truth / "plate_linear_0000.exr").string(), first_radiance);
+  const bool moves = !studio.plate.track.keys.empty();
+  write_demo_plate(settings.dir / "plate.mkv", studio, [&](int n) {
+    return render::add_light(moves && n > 0 ? photograph(place, n) : first, strength_at(n));
+  });
+  const bool court = settings.world == DemoWorld::court;
+  if (court) write_demo_clap(settings.dir / "clap.mkv", studio, first_radiance);
 
   progress(0.5, "the probe");
   const calibrate::Pose& probe_pose = studio.probe.cam_from_set;
   const render::LightParts probe =
-      render::photograph_parts(studio, court, calibrate::make_direction_table(studio.probe.lens),
-                               probe_pose, settings.samples);
+      render::photograph_parts(studio, place, calibrate::make_direction_table(studio.probe.lens),
+                               probe_pose, settings.samples, studio.settings.seed);
   figures.shots = write_demo_probe(settings.dir / "probe", studio, probe);
   const calibrate::Pose unturned{{}, -calibrate::position_of(probe_pose)};
   const render::LightParts around = render::photograph_parts(
-      studio, court, render::latlong_directions(settings.studio.sky_height), unturned,
-      std::max(1, settings.samples / 4));
-  capture::write_exr((truth / "environment.exr").string(), render::add_light(around, strength));
-  write_demo_set(settings.dir, studio);
+      studio, place, render::latlong_directions(settings.studio.sky_height), unturned,
+      std::max(1, settings.samples / 4), studio.settings.seed);
+  capture::write_exr((truth / "environment.exr").string(),
+                     render::add_light(around, strength_at(0)));
+  write_demo_cameras(settings.dir, studio);
+  figures.set = settings.dir / (court ? "car.toml" : "park_car.toml");
+  write_text(figures.set, court ? court_set(studio, "") : park_set(studio, ""));
   write_demo_truth(truth / "truth.json", studio, settings.samples);
 
   progress(0.6, "the photograph");
   std::vector<bool> is_car;
-  const render::SceneDescription with_car = court_with_car(studio, is_car);
+  const render::SceneDescription with_car = place_with_car(studio, is_car);
   {
     const render::Scene scene(with_car);
-    const render::LightParts photograph =
-        render::photograph_parts(studio, scene, plate_directions, plate_pose, settings.samples);
-    capture::write_exr((truth / "photograph_0000.exr").string(),
-                       render::add_light(photograph, strength));
+    const capture::Image radiance = render::add_light(photograph(scene, 0), strength_at(0));
+    capture::write_exr((truth / "photograph_0000.exr").string(), radiance);
+    write_demo_picture(truth / "photograph_0000.png", studio, radiance, 0);
   }
   const auto coverage = [&](const std::vector<bool>& seen) {
-    return render::coverage_of(with_car, seen, plate_directions, plate_pose, settings.samples);
+    return render::coverage_of(with_car, seen, plate_directions, studio.plate.cam_from_set,
+                               settings.samples);
   };
   const capture::Image car = coverage(is_car);
   capture::write_exr((truth / "coverage_0000.exr").string(), car);

@@ -6,18 +6,26 @@
 #include <filesystem>
 #include <functional>
 #include <string_view>
+#include <vector>
 
 #include "render/made_studio.h"
 
 namespace studio {
 
+// The made worlds: a court under a made sky that a camera on a stand films, and a parking place in
+// a park with a real map as its light, which a camera pans over (render/made_park.h).
+enum class DemoWorld { court, park };
+
 struct DemoSettings {
   std::filesystem::path dir;
+  DemoWorld world = DemoWorld::court;
+  std::filesystem::path map;  // of the park: a latitude-longitude picture, .hdr or .exr
   render::MadeStudioSettings studio;
   int samples = 16;  // paths per pixel and part of the light
 };
 
 struct DemoFigures {
+  std::filesystem::path set;  // the set file
   int frames = 0;
   int shots = 0;             // of the probe
   double car_share = 0;      // of the plate's pixels
@@ -28,20 +36,31 @@ struct DemoFigures {
 // Called with the share that is done, 0 to 1, and what comes next.
 using DemoProgress = std::function<void(double share, std::string_view what)>;
 
-// Makes the court with its car. Writes into settings.dir, which is made if it is not there:
+// The world without its car. Throws std::runtime_error with path and reason for a map that cannot
+// be read or used.
+render::MadeStudio make_demo_studio(const DemoSettings& settings);
+
+// The same with the car really standing at the origin. `is_car` tells the car's instances from the
+// rest.
+render::SceneDescription place_with_car(const render::MadeStudio& studio,
+                                        std::vector<bool>& is_car);
+
+// Makes a world with its car. Writes into settings.dir, which is made if it is not there:
 //
-//   car.toml               the set
-//   plate.mkv              the plate, with a clap at truth.json's clap_s; clap.mkv the same clap
-//                          beside a flash in the picture
+//   car.toml or park_car.toml   the set
+//   plate.mkv              the plate, with a clap at truth.json's clap_s
+//   clap.mkv               of the court: the same clap beside a flash in the picture
+//   plate.csv              of the park: where the camera was
 //   probe/                 the fish-eye's shots and frames.csv
 //   scene.cameramodel, probe.toml   the lenses
 //   truth/truth.json       what all of it was made with
 //   truth/environment.exr  the light at the probe, latitude-longitude, at time 0
 //   truth/plate_linear_0000.exr   frame 0 without noise
 //   truth/photograph_0000.exr     the same with the car really there
+//   truth/photograph_0000.png     and as the camera would have coded it, with noise
 //   truth/coverage_0000.exr       which share of each pixel the car covers
 //
 // The same settings write the same bytes. Throws std::runtime_error with path and reason.
-DemoFigures write_court_demo(const DemoSettings& settings, const DemoProgress& progress);
+DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progress);
 
 }  // namespace studio

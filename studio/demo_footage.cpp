@@ -11,6 +11,7 @@
 
 #include "capture/files.h"
 #include "capture/made_sound.h"
+#include "capture/png.h"
 #include "compositing/video_writer.h"
 #include "studio/demo_files.h"
 
@@ -34,11 +35,10 @@ void write_ppm(const fs::path& file, const capture::MadeShot& shot) {
   capture::write_file(file.string(), std::as_bytes(std::span(bytes)));
 }
 
-std::vector<std::uint8_t> plate_frame(const render::MadeStudio& studio,
-                                      const render::LightParts& picture,
-                                      std::int64_t n) {
-  const float strength = render::sun_strength(studio, render::time_of_picture(studio.plate, n));
-  return codes8(capture::expose(studio.plate.sensor, render::add_light(picture, strength),
+std::vector<std::uint8_t> plate_codes(const render::MadeStudio& studio,
+                                      const capture::Image& radiance,
+                                      int n) {
+  return codes8(capture::expose(studio.plate.sensor, radiance,
                                 render::exposure_of_picture(studio.plate, n),
                                 static_cast<std::uint64_t>(n)));
 }
@@ -90,21 +90,29 @@ void write_video(const fs::path& file,
 
 void write_demo_plate(const fs::path& file,
                       const render::MadeStudio& studio,
-                      const render::LightParts& picture) {
+                      const PlateRadiance& radiance) {
   write_video(file, studio.plate, studio.settings.frames, demo_clap_s,
-              [&](int n) { return plate_frame(studio, picture, n); });
+              [&](int n) { return plate_codes(studio, radiance(n), n); });
 }
 
 void write_demo_clap(const fs::path& file,
                      const render::MadeStudio& studio,
-                     const render::LightParts& picture) {
+                     const capture::Image& radiance) {
   constexpr int frames = 25;
   constexpr int flash = 12;
   write_video(file, studio.plate, frames, flash / studio.plate.rate.value(), [&](int n) {
-    std::vector<std::uint8_t> codes = plate_frame(studio, picture, n);
+    std::vector<std::uint8_t> codes = plate_codes(studio, radiance, n);
     if (n == flash) std::ranges::fill(codes, std::uint8_t{235});
     return codes;
   });
+}
+
+void write_demo_picture(const fs::path& file,
+                        const render::MadeStudio& studio,
+                        const capture::Image& radiance,
+                        int n) {
+  capture::write_png(file, radiance.width, radiance.height, radiance.channels,
+                     plate_codes(studio, radiance, n));
 }
 
 int write_demo_probe(const fs::path& dir,

@@ -6,6 +6,7 @@
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
+#include "calibrate/track.h"
 #include "capture/files.h"
 #include "studio/demo_files.h"
 
@@ -13,10 +14,6 @@ namespace studio {
 namespace {
 
 namespace fs = std::filesystem;
-
-void write_text(const fs::path& file, const std::string& text) {
-  capture::write_file(file.string(), std::as_bytes(std::span(text)));
-}
 
 // Nine digits: what is left out is far below a pixel.
 std::string number(double value) { return fmt::format("{:.9g}", value + 0.0); }
@@ -35,52 +32,105 @@ std::string rotation(const calibrate::Pose& pose) {
   return list + "]";
 }
 
+std::string show_section(const render::MadeStudio& studio) {
+  return fmt::format("[show]\nwidth = {}\nheight = {}\nfps = {}\n\n", studio.plate.lens.width,
+                     studio.plate.lens.height, studio.plate.rate.num);
+}
+
+std::string camera_section(const render::MadeStudio& studio, const std::string& prefix) {
+  const render::MadeCamera& plate = studio.plate;
+  const std::string pose = plate.track.keys.empty()
+                               ? fmt::format("{{ position = {}, rotation = {} }}",
+                                             numbers(calibrate::position_of(plate.cam_from_set)),
+                                             rotation(plate.cam_from_set))
+                               : fmt::format("{{ track = \"{}plate.csv\" }}", prefix);
+  return fmt::format(
+      "[camera]\nsource = \"file:{0}plate.mkv\"\nlens = \"{0}scene.cameramodel\"\n"
+      "pose = {1}\ncolour = \"{2}\"\nexposure_s = {3}\n\n",
+      prefix, pose, capture::name_of(plate.sensor.transfer), plate.exposures_s.front());
+}
+
+std::string probe_section(const render::MadeStudio& studio,
+                          const std::string& prefix,
+                          const std::string& match) {
+  return fmt::format(
+      "[probe]\nsource = \"replay:{0}probe\"\nlens = \"{0}probe.toml\"\n"
+      "pose = {{ position = {1}, axis = [0, 0, 1] }}\n"
+      "colour = \"{2}\"\nexposures = \"auto\"\n"
+      "offset_s = {3:.9f}  # the recording of the probe began so much before the plate\n"
+      "unseen = \"floor\"\nmatch = {4}\n\n",
+      prefix, numbers(calibrate::position_of(studio.probe.cam_from_set)),
+      capture::name_of(studio.probe.sensor.transfer),
+      -static_cast<double>(studio.probe.start.count()) * 1e-9, match);
+}
+
+std::string car_section(const render::MadeStudio& studio) {
+  return fmt::format(
+      "[[object]]\nname = \"car\"\nmade = \"car\"\n"
+      "pose = {{ position = [0, 0, 0], yaw = {} }}\n\n",
+      studio.car_yaw_deg);
+}
+
 }  // namespace
 
-void write_demo_set(const fs::path& dir, const render::MadeStudio& studio) {
-  calibrate::write_lens((dir / "scene.cameramodel").string(), studio.plate.lens);
-  calibrate::write_lens((dir / "probe.toml").string(), studio.probe.lens);
+void write_text(const fs::path& file, std::string_view text) {
+  capture::write_file(file.string(), std::as_bytes(std::span(text)));
+}
+
+std::string court_set(const render::MadeStudio& studio, const std::string& prefix) {
   const auto& card = render::court_card;
   const auto patch = render::picture_of_card(studio);
   const auto& crate = render::court_crate;
   constexpr double degrees_per_rad = 57.29577951308232;
   std::string text = "# A made car on a made court. truth/ holds what a camera would have seen.\n";
-  text += fmt::format(
-      "name = \"made car on the court\"\n\n"
-      "[show]\nwidth = {}\nheight = {}\nfps = {}\n\n"
-      "[camera]\nsource = \"file:plate.mkv\"\nlens = \"scene.cameramodel\"\n"
-      "pose = {{ position = {}, rotation = {} }}\n"
-      "colour = \"{}\"\nexposure_s = {}\n\n",
-      studio.plate.lens.width, studio.plate.lens.height, studio.plate.rate.num,
-      numbers(calibrate::position_of(studio.plate.cam_from_set)),
-      rotation(studio.plate.cam_from_set), capture::name_of(studio.plate.sensor.transfer),
-      studio.plate.exposures_s.front());
-  text += fmt::format(
-      "[probe]\nsource = \"replay:probe\"\nlens = \"probe.toml\"\n"
-      "pose = {{ position = {}, axis = [0, 0, 1] }}\n"
-      "colour = \"{}\"\nexposures = \"auto\"\n"
-      "offset_s = {:.9f}  # the recording of the probe began so much before the plate\n"
-      "unseen = \"floor\"\n"
-      "match = {{ patch = [{}, {}, {}, {}], albedo = {} }}  # a grey card on the ground\n\n",
-      numbers(calibrate::position_of(studio.probe.cam_from_set)),
-      capture::name_of(studio.probe.sensor.transfer),
-      -static_cast<double>(studio.probe.start.count()) * 1e-9, patch[0], patch[1], patch[2],
-      patch[3], number(card.albedo));
-  text += fmt::format(
-      "[[object]]\nname = \"car\"\nmade = \"car\"\n"
-      "pose = {{ position = [0, 0, 0], yaw = {} }}\n\n",
-      render::court_car_yaw_deg);
+  text += "name = \"made car on the court\"\n\n";
+  text += show_section(studio) + camera_section(studio, prefix);
+  text += probe_section(
+      studio, prefix,
+      fmt::format("{{ patch = [{}, {}, {}, {}], albedo = {} }}  # a grey card on the ground",
+                  patch[0], patch[1], patch[2], patch[3], number(card.albedo)));
+  text += car_section(studio);
   text +=
       "[[stand_in]]\nname = \"court\"\nshape = \"plane\"\nsize = [16, 16]\n"
       "pose = { position = [0, 1.8, 0] }\ncatches = [\"shadow\", \"light\"]\nalbedo = 0.16\n\n";
   text += fmt::format(
       "[[stand_in]]\nname = \"crate\"\nshape = \"box\"\nsize = {}\n"
       "pose = {{ position = {}, yaw = {:.4f} }}\nblocks_light = true\n",
-      fmt::format("[{:.6g}, {:.6g}, {:.6g}]", crate.size.x, crate.size.y, crate.size.z), fmt::format("[{:.6g}, {:.6g}, {:.6g}]", crate.middle.x, crate.middle.y,
-                  crate.middle.z),
+      fmt::format("[{:.6g}, {:.6g}, {:.6g}]", crate.size.x, crate.size.y, crate.size.z),
+      fmt::format("[{:.6g}, {:.6g}, {:.6g}]", crate.middle.x, crate.middle.y, crate.middle.z),
       crate.yaw_rad * degrees_per_rad);
   text += "\n[record]\nfile = \"take.mkv\"\n";
-  write_text(dir / "car.toml", text);
+  return text;
+}
+
+std::string park_set(const render::MadeStudio& studio, const std::string& prefix) {
+  std::string text =
+      "# A made car on a made parking place, in the light of a real park: its map is the distance\n"
+      "# behind the place and the light on it, so plate and probe are of one world, under one "
+      "real\n"
+      "# sun. The camera pans. The footage, with its truth and with this set, is made by\n"
+      "#\n"
+      "#     platelight demo demo/park --world park --map ../shared/data/env/park.hdr\n"
+      "#\n"
+      "# in the project's directory. Of the same map, turned the same way: its middle lies to "
+      "+x.\n";
+  text += "name = \"made car in the park\"\n\n";
+  text += show_section(studio) + camera_section(studio, prefix);
+  text += probe_section(studio, prefix, "\"auto\"  # from the sky that both cameras see");
+  text += car_section(studio);
+  text +=
+      "# The sun is low: the shadow is more than five times as long as the car is high.\n"
+      "[[stand_in]]\nname = \"ground\"\nshape = \"plane\"\nsize = [24, 24]\n"
+      "pose = { position = [0, 1.8, 0] }\ncatches = [\"shadow\", \"light\"]\nalbedo = 0.16\n";
+  return text;
+}
+
+void write_demo_cameras(const fs::path& dir, const render::MadeStudio& studio) {
+  calibrate::write_lens((dir / "scene.cameramodel").string(), studio.plate.lens);
+  calibrate::write_lens((dir / "probe.toml").string(), studio.probe.lens);
+  if (!studio.plate.track.keys.empty()) {
+    calibrate::write_track((dir / "plate.csv").string(), studio.plate.track);
+  }
 }
 
 void write_demo_truth(const fs::path& file, const render::MadeStudio& studio, int samples) {
@@ -89,10 +139,10 @@ void write_demo_truth(const fs::path& file, const render::MadeStudio& studio, in
   truth["samples"] = samples;
   truth["seed"] = studio.settings.seed;
   truth["clap_s"] = demo_clap_s;
+  truth["car_yaw_deg"] = studio.car_yaw_deg;
   truth["sun_direction"] = plain(studio.sky.sun_direction);
   // Plate units for one unit of the probe's light per second.
   truth["match"] = studio.probe.sensor.saturation;
-  truth["card_albedo"] = render::court_card.albedo;
   auto& strengths = truth["sun_strength"] = nlohmann::json::array();
   for (int n = 0; n < studio.settings.frames; ++n) {
     strengths.push_back(render::sun_strength(studio, render::time_of_picture(studio.plate, n)));

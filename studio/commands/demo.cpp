@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "render/made_park.h"
 #include "studio/commands/commands.h"
 #include "studio/demo.h"
 
@@ -15,6 +16,8 @@ namespace {
 
 struct DemoOptions {
   std::string dir;
+  std::string world = "court";
+  std::string map;
   std::optional<std::int64_t> samples;
   std::optional<std::int64_t> frames;
   std::optional<std::int64_t> seed;
@@ -23,11 +26,21 @@ struct DemoOptions {
 void demo(const DemoOptions& options, Console& console) {
   DemoSettings settings;
   settings.dir = options.dir;
+  if (options.world == "park") {
+    if (options.map.empty()) throw UsageError("the park is lit by a map: --map FILE.hdr");
+    settings.world = DemoWorld::park;
+    settings.map = options.map;
+    settings.studio = render::park_settings();
+  } else if (options.world != "court") {
+    throw UsageError("there is no world \"" + options.world + "\": there are court, park");
+  } else if (!options.map.empty()) {
+    throw UsageError("the court has a sky of its own: --map is for the park");
+  }
   if (options.samples) settings.samples = static_cast<int>(*options.samples);
   if (options.frames) settings.studio.frames = static_cast<int>(*options.frames);
   if (options.seed) settings.studio.seed = static_cast<std::uint32_t>(*options.seed);
   const auto start = std::chrono::steady_clock::now();
-  const DemoFigures made = write_court_demo(
+  const DemoFigures made = write_demo(
       settings, [&](double share, std::string_view what) { console.progress(share, what); });
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -41,24 +54,28 @@ void demo(const DemoOptions& options, Console& console) {
   console.say(
       fmt::format("{}: {} frames, {} probe shots, {:.0f} MB in {:.1f} s; the car "
                   "covers {:.0f} % of the picture",
-                  (settings.dir / "car.toml").string(), made.frames, made.shots,
+                  made.set.string(), made.frames, made.shots,
                   static_cast<double>(made.bytes) * 1e-6, seconds, 100 * made.car_share));
 }
 
 }  // namespace
 
 Command demo_command() {
-  return {"demo", "Make footage, a set and their truth", "platelight demo made",
-          [](Arguments& arguments) -> std::function<void(Console&)> {
-            auto options = std::make_shared<DemoOptions>();
-            arguments.positional("DIR", options->dir, "where to write");
-            arguments.option("--samples", options->samples, 1, 65536,
-                             "paths per pixel of the truth, for each part of the light (16)");
-            arguments.option("--frames", options->frames, 1, 100000, "frames of the plate (60)");
-            arguments.option("--seed", options->seed, 1, 1'000'000,
-                             "another one makes another sky");
-            return [options](Console& console) { demo(*options, console); };
-          }};
+  return {
+      "demo", "Make footage, a set and their truth", "platelight demo made",
+      [](Arguments& arguments) -> std::function<void(Console&)> {
+        auto options = std::make_shared<DemoOptions>();
+        arguments.positional("DIR", options->dir, "where to write");
+        arguments.option("--world", options->world,
+                         "court (a made sky) or park (a real map of light; the camera pans)");
+        arguments.option("--map", options->map, "of the park: a latitude-longitude .hdr or .exr");
+        arguments.option("--samples", options->samples, 1, 65536,
+                         "paths per pixel of the truth, for each part of the light (16)");
+        arguments.option("--frames", options->frames, 1, 100000,
+                         "frames of the plate (court 60, park 8)");
+        arguments.option("--seed", options->seed, 1, 1'000'000, "another one makes another sky");
+        return [options](Console& console) { demo(*options, console); };
+      }};
 }
 
 }  // namespace studio
