@@ -12,6 +12,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "calibrate/vignetting.h"
+
 namespace render {
 namespace {
 
@@ -22,8 +24,6 @@ using calibrate::Vec3;
 constexpr double pi = std::numbers::pi;
 constexpr int least_height = 8;
 constexpr int largest_height = 4096;
-// Below this sensitivity, a correction would show noise only.
-constexpr double least_sensitivity = 0.05;
 // One register: left to itself, the compiler gathers channels from many pixels, at twice the time.
 using FourFloats = float __attribute__((vector_size(16)));
 
@@ -40,13 +40,6 @@ double upward_weight(int row, int height) {
   return std::max(bottom * bottom - top * top, 0.0) / 2 * pi / height;
 }
 
-double sensitivity(const std::vector<double>& vignetting, double angle_rad) {
-  const double squared = angle_rad * angle_rad;
-  double sum = 0;
-  for (std::size_t i = vignetting.size(); i > 0; --i) sum = (sum + vignetting[i - 1]) * squared;
-  return 1 + sum;
-}
-
 void check(const ProbeSettings& settings, double max_angle_rad) {
   if (settings.height < least_height || settings.height > largest_height) {
     throw std::invalid_argument("an environment's height must be from 8 to 4096, not " +
@@ -55,12 +48,7 @@ void check(const ProbeSettings& settings, double max_angle_rad) {
   if (!(settings.floor_albedo >= 0 && settings.floor_albedo <= 1)) {
     throw std::invalid_argument("the albedo of the floor must be from 0 to 1");
   }
-  constexpr int steps = 100;
-  for (int i = 0; i <= steps; ++i) {
-    if (!(sensitivity(settings.vignetting, max_angle_rad * i / steps) > least_sensitivity)) {
-      throw std::invalid_argument("a lightprobe's vignetting must stay above 0.05 up to its rim");
-    }
-  }
+  calibrate::check_vignetting(settings.vignetting, max_angle_rad);
 }
 
 }  // namespace
@@ -99,7 +87,7 @@ void ProbeMapper::correct_vignetting(const Lens& lens) {
                               pixel / gather_.width * gather_.shrink + to_middle};
       const Vec3 v = calibrate::unproject(lens, q).value_or(Vec3{0, 0, 1});
       const double angle_rad = std::atan2(std::hypot(v.x, v.y), v.z);
-      factor = static_cast<float>(1 / sensitivity(settings_.vignetting, angle_rad));
+      factor = static_cast<float>(1 / calibrate::sensitivity(settings_.vignetting, angle_rad));
     }
     gather_.weight[i] *= factor;
   }

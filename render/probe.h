@@ -16,9 +16,8 @@ struct ProbeSettings {
   int height = 256;  // of the environment
   Unseen unseen = Unseen::floor;
   float floor_albedo = 0.2F;  // of Unseen::floor
-  // The sensitivity of the lens at an angle off its axis: 1 + v1 angle^2 + v2 angle^4 + ..., in
-  // radians. Empty = even. Radiance is divided by it; it must stay above 0.05 up to the largest
-  // angle.
+  // The lens's terms (calibrate/vignetting.h); empty = even. Radiance is divided by its
+  // sensitivity.
   std::vector<double> vignetting{};
 };
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calibrate/vignetting.h"
+
 namespace studio {
 namespace {
 
@@ -35,8 +37,9 @@ void scale(render::Environment& env, const std::array<float, 3>& gain) {
 
 // The mean of the plate's pixels that look down: what the floor sends. Every eighth row and column
 // will do.
-std::optional<calibrate::Vec3f> floor_of_plate(const LightRequest& request) {
-  if (request.plate == nullptr || request.directions == nullptr) return std::nullopt;
+std::optional<calibrate::Vec3f> floor_of_plate(const capture::Image* plate,
+                                               const LightRequest& request) {
+  if (plate == nullptr || request.directions == nullptr) return std::nullopt;
   constexpr int step = 8;
   constexpr double level = -0.05;  // z of a direction just under the horizon
   const calibrate::DirectionTable& directions = *request.directions;
@@ -49,7 +52,7 @@ std::optional<calibrate::Vec3f> floor_of_plate(const LightRequest& request) {
       const double up = m[2] * directions.x[i] + m[5] * directions.y[i] + m[8] * directions.z[i];
       if (!(up < level)) continue;
       for (int c = 0; c < 3; ++c) {
-        sum[static_cast<std::size_t>(c)] += render::counted_radiance(request.plate->at(y, x, c));
+        sum[static_cast<std::size_t>(c)] += render::counted_radiance(plate->at(y, x, c));
       }
       ++pixels;
     }
@@ -60,7 +63,8 @@ std::optional<calibrate::Vec3f> floor_of_plate(const LightRequest& request) {
 
 }  // namespace
 
-LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
+LightFeed::LightFeed(const Set& set)
+    : settings_(set.probe), plate_vignetting_(set.camera.vignetting) {
   if (!settings_) {
     environment_ = darkness();
     return;
@@ -93,11 +97,31 @@ LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
   }
 }
 
+// What light is measured by. The picture itself keeps its vignetting.
+const capture::Image* LightFeed::even_plate(const LightRequest& request) {
+  if (plate_vignetting_.empty() || request.plate == nullptr || request.directions == nullptr) {
+    return request.plate;
+  }
+  const calibrate::DirectionTable& directions = *request.directions;
+  if (evening_.size() != directions.z.size()) {
+    evening_.resize(directions.z.size());
+    for (std::size_t i = 0; i < evening_.size(); ++i) {
+      const double angle_rad =
+          std::atan2(std::hypot(directions.x[i], directions.y[i]), directions.z[i]);
+      evening_[i] = static_cast<float>(1 / calibrate::sensitivity(plate_vignetting_, angle_rad));
+    }
+  }
+  evened_ = *request.plate;
+  for (std::size_t i = 0; i < evened_.pixels.size(); ++i) evened_.pixels[i] *= evening_[i / 3];
+  return &evened_;
+}
+
 void LightFeed::build_environment(const LightRequest& request) {
   std::shared_ptr<render::Environment> env = environments_.lend();
   if (mapper_) {
     render::ProbeFrame frame{match_.gain, {}};
-    if (settings_->unseen == render::Unseen::floor) frame.floor_radiance = floor_of_plate(request);
+    if (settings_->unseen == render::Unseen::floor)
+      frame.floor_radiance = floor_of_plate(plate_, request);
     mapper_->map(*radiance_, frame, *env);
   } else {
     *env = render::environment_from_map(*radiance_, settings_->yaw_rad, environment_height);
@@ -112,10 +136,10 @@ render::MatchResult LightFeed::measure_match(const LightRequest& request) const 
   if (match.method == MatchSettings::Method::patch) {
     const auto [x, y, width, height] = match.patch;
     const calibrate::Vec3f normal = calibrate::to_float(calibrate::normalize(match.normal));
-    return render::match_by_patch(*request.plate, {x, y, width, height}, match.albedo,
+    return render::match_by_patch(*plate_, {x, y, width, height}, match.albedo,
                                   render::irradiance_of(*environment_, normal));
   }
-  return render::match_by_overlap(*request.plate, *request.directions, request.cam_from_set,
+  return render::match_by_overlap(*plate_, *request.directions, request.cam_from_set,
                                   *environment_);
 }
 
@@ -157,6 +181,7 @@ Light LightFeed::at(const LightRequest& request) {
   Light light;
   light.time = request.time;
   if (settings_) {
+    plate_ = even_plate(request);
     update_environment(request);
     light.time = source_->at(request.time).time;
     if (settings_->albedo_patch && request.plate != nullptr) {
@@ -164,7 +189,7 @@ Light LightFeed::at(const LightRequest& request) {
       render::Vec3f unmatched = render::irradiance_of(*environment_, {0, 0, 1});
       unmatched = {unmatched.x / match_.gain[0], unmatched.y / match_.gain[1],
                    unmatched.z / match_.gain[2]};
-      render::imply_albedo(*request.plate, {x, y, width, height}, unmatched, match_);
+      render::imply_albedo(*plate_, {x, y, width, height}, unmatched, match_);
     }
   }
   if (table_count_ != request.light_samples) {

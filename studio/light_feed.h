@@ -46,12 +46,17 @@ class LightFeed {
   Light at(const LightRequest& request);
 
  private:
+  const capture::Image* even_plate(const LightRequest& request);
   void update_environment(const LightRequest& request);
   void build_environment(const LightRequest& request);
   render::MatchResult measure_match(const LightRequest& request) const;
   bool follow_match(const LightRequest& request);
 
   std::optional<ProbeSettings> settings_;
+  std::vector<double> plate_vignetting_;
+  std::vector<float> evening_;  // per pixel of the plate: 1 / the lens's sensitivity; empty = even
+  capture::Image evened_;       // the present plate times that
+  const capture::Image* plate_ = nullptr;  // as a lens without vignetting would take it
   std::unique_ptr<ProbeSource> source_;
   std::unique_ptr<render::ProbeMapper> mapper_;  // null = latitude-longitude
   render::LightFollower follower_;

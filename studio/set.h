@@ -53,6 +53,7 @@ struct CameraSettings {
   std::optional<std::array<int, 4>> crop;  // x, y, width, height in source pixels
   capture::Transfer colour = capture::Transfer::rec1886;
   std::string response;              // .rsp file; "" = none
+  std::vector<double> vignetting;    // of the lens (calibrate/vignetting.h); empty = even
   std::optional<double> exposure_s;  // where the source does not tell it
   bool loop = false;
 };
@@ -81,7 +82,7 @@ struct ProbeSettings {
   render::Unseen unseen = render::Unseen::floor;
   MatchSettings match;
   std::optional<std::array<int, 4>> albedo_patch;  // a level spot whose implied albedo is reported
-  std::vector<double> vignetting;  // 1 + v1 theta^2 + v2 theta^4 + ... divides the radiance
+  std::vector<double> vignetting;  // of the lens (calibrate/vignetting.h); empty = even
   std::string response;            // .rsp file of the shots; "" = recovered where needed
   capture::Transfer colour = capture::Transfer::linear;
   double offset_s = 0;  // how much later than the plate its frames are stamped

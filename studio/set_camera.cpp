@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 #include <system_error>
 
 #include <fmt/format.h>
 
 #include "calibrate/track.h"
+#include "calibrate/vignetting.h"
 #include "studio/set_sections.h"
 
 namespace studio {
@@ -168,6 +170,28 @@ void read_probe_pose(Section table, calibrate::Pose& probe_from_set) {
   table.finish();
 }
 
+void read_vignetting(Section& section, std::vector<double>& vignetting) {
+  section.numbers("vignetting", vignetting, {1, 2, 3, 4}, {-1e3, 1e3});
+}
+
+// Up to the corners of the picture, or to the lens's rim if that lies inside.
+void check_vignetting(Section& section, const CameraSettings& camera) {
+  const calibrate::Lens& lens = camera.lens;
+  double angle_rad = 0;
+  for (const double x : {0.0, lens.width - 1.0}) {
+    for (const double y : {0.0, lens.height - 1.0}) {
+      const auto v = calibrate::unproject(lens, {x, y});
+      angle_rad =
+          std::max(angle_rad, v ? std::atan2(std::hypot(v->x, v->y), v->z) : lens.max_angle_rad);
+    }
+  }
+  try {
+    calibrate::check_vignetting(camera.vignetting, angle_rad);
+  } catch (const std::invalid_argument& error) {
+    section.fault("vignetting", fmt::format("cannot be used: {}", error.what()));
+  }
+}
+
 // A list of pictures, a directory of pictures, a map, or a camera of brackets.
 void read_probe_source(Section& section, const fs::path& base, ProbeSettings& probe) {
   section.need("source", "a map, a list or directory of shots, or a camera's URI");
@@ -253,6 +277,9 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
     section.need("lens", "objects are seen through it: a file, or model and focal_px");
   }
 
+  read_vignetting(section, camera.vignetting);
+  if (camera.lens.width > 0) check_vignetting(section, camera);
+
   camera.pose_place = section.place_of("pose");
   if (context.has_scene) section.need("pose", "where the camera is in the set");
   if (auto table = section.table("pose")) read_camera_pose(*table, context.base, camera.pose);
@@ -292,7 +319,7 @@ ProbeSettings read_probe_section(Section section, const SetContext& context) {
   const std::array picture{context.show.width, context.show.height};
   read_match(section, picture, probe.match);
   read_rectangle(section, "albedo_patch", picture, probe.albedo_patch);
-  section.numbers("vignetting", probe.vignetting, {1, 2, 3, 4}, {-1e3, 1e3});
+  read_vignetting(section, probe.vignetting);
   section.file("response", context.base, probe.response);
   read_colour(section, probe.colour);
   section.number("offset_s", probe.offset_s, {-60, 60});

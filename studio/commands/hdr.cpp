@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct HdrCommandOptions {
   std::vector<std::string> shots;
   std::string out;
   std::string response = "auto";
+  std::string response_out;
 };
 
 nlohmann::ordered_json to_json(const capture::HdrResult& result) {
@@ -37,9 +39,19 @@ nlohmann::ordered_json to_json(const capture::HdrResult& result) {
           {"time_ms", result.time_ms}};
 }
 
+void save_response(const HdrCommandOptions& options, const capture::HdrResult& result) {
+  try {
+    capture::write_rsp(options.response_out, result.response);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(
+        fmt::format("cannot write {}: {}", options.response_out, error.what()));
+  }
+}
+
 void hdr(const HdrCommandOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) throw UsageError("-o must name an .exr file");
   const capture::HdrResult result = capture::make_hdr(options.shots, {{}, options.response});
+  if (!options.response_out.empty()) save_response(options, result);
   capture::write_exr(options.out, result.radiance);
   console.figures(to_json(result).dump(2));
   console.say(fmt::format("{}: {}x{}, {:.1f} stops from {} files, response {}", options.out,
@@ -60,6 +72,8 @@ Command hdr_command() {
             arguments.required("--out");
             arguments.option("--response", o->response,
                              "auto (recovered), sRGB, linear, or a .rsp file");
+            arguments.option("--response-out", o->response_out,
+                             "write the response to this .rsp file, for sets and other shots");
             return [o](Console& console) { hdr(*o, console); };
           }};
 }

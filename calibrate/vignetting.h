@@ -1,0 +1,16 @@
+// How much a lens dims towards its rim.
+#pragma once
+
+#include <span>
+
+namespace calibrate {
+
+// The sensitivity of a lens at an angle off its axis, 1 on it: 1 + v1 angle^2 + v2 angle^4 + ...,
+// in radians. No terms = even.
+double sensitivity(std::span<const double> vignetting, double angle_rad);
+
+// Throws std::invalid_argument unless the sensitivity stays above 0.05 up to an angle: below, a
+// correction would show noise only.
+void check_vignetting(std::span<const double> vignetting, double max_angle_rad);
+
+}  // namespace calibrate
