@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <future>
 #include <stdexcept>
+#include <thread>
 
 #include "capture/exif.h"
 #include "capture/exr.h"
@@ -163,7 +164,15 @@ void merge_stills(std::vector<ShotFile> files, const HdrOptions& options, HdrRes
   for (const CodedShot& shot : shots) codes.push_back(shot.still.texels.data());
   const Still8& first = shots[0].still;
   result.radiance = make_image(first.height, first.width, 3);
-  tables.merge(codes, first.width, 0, first.height, result.radiance.pixels.data());
+  std::vector<std::future<void>> merging;
+  const int strips = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 16);
+  for (int i = 0; i < strips; ++i) {
+    merging.push_back(std::async(std::launch::async, [&, i] {
+      tables.merge(codes, first.width, first.height * i / strips, first.height * (i + 1) / strips,
+                   result.radiance.pixels.data());
+    }));
+  }
+  for (std::future<void>& strip : merging) strip.get();
 }
 
 void merge_pictures(std::vector<ShotFile> files, HdrResult& result) {
@@ -197,7 +206,6 @@ HdrResult make_hdr(std::span<const std::string> paths, const HdrOptions& options
     result.exposures_s = exposures_of(paths, files, options);
     merge_pictures(std::move(files), result);
   }
-  result.stops = range_stops(result.radiance);
   result.time_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   return result;

@@ -25,7 +25,6 @@ struct HdrResult {
   Response response;                // light of codes; unused for HDR pictures
   double heldout_error = 0;         // of a recovered response (ResponseFit), else 0
   std::vector<ResponseCandidate> candidates;  // that were tried, if it was recovered
-  double stops = 0;                           // range_stops of the radiance
   double time_ms = 0;
 };
 

@@ -2,6 +2,7 @@
 #include "studio/frame_maker.h"
 
 #include <algorithm>
+#include <future>
 #include <stdexcept>
 #include <utility>
 
@@ -110,17 +111,19 @@ std::string_view name_of(Stage stage) {
   return "";
 }
 
-FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate)
-    : set_(std::move(set)),
-      plate_(open_plate(set_)),
-      light_(std::make_unique<LightFeed>(set_)),
-      track_(track_of(set_)),
-      directions_(std::make_shared<calibrate::DirectionTable>(
-          calibrate::make_direction_table(lens_of(set_)))) {
+FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(std::move(set)) {
+  // Beside all else: the probe's pictures take the longest.
+  std::future<std::unique_ptr<LightFeed>> light =
+      std::async(std::launch::async, [this] { return std::make_unique<LightFeed>(set_); });
+  plate_ = open_plate(set_);
+  track_ = track_of(set_);
+  directions_ =
+      std::make_shared<calibrate::DirectionTable>(calibrate::make_direction_table(lens_of(set_)));
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
   rate_ = rate.value_or(set_.show.fps.value_or(own));
   build_scene();
+  light_ = light.get();
 }
 
 void FrameMaker::build_scene() {

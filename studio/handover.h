@@ -23,10 +23,20 @@ class Handover {
     return !value_;
   }
 
+  // Waits until the taker has dealt with what it took and asks again. False once closed.
+  bool wait_for_taker() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || asks_; });
+    return !closed_;
+  }
+
   // Waits for a value. Nothing once closed and empty.
   std::optional<T> take() {
     std::unique_lock lock(mutex_);
+    asks_ = true;
+    changed_.notify_all();
     changed_.wait(lock, [&] { return closed_ || value_; });
+    asks_ = false;
     std::optional<T> value = std::exchange(value_, std::nullopt);
     changed_.notify_all();
     return value;
@@ -43,6 +53,7 @@ class Handover {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::optional<T> value_;
+  bool asks_ = false;
   bool closed_ = false;
 };
 

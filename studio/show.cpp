@@ -140,6 +140,9 @@ class Show::Stages {
       work.dropped = dropped;
       work.plate = maker_.plate().statistics();
       if (!work_.give(std::move(work))) return;
+      // The first frame is rendered with nothing kept, several times as long as the next ones: what
+      // was made meanwhile would be late.
+      if (made == 0 && !work_.wait_for_taker()) return;
     }
   }
 

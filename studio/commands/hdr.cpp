@@ -23,7 +23,7 @@ struct HdrCommandOptions {
   std::string response_out;
 };
 
-nlohmann::ordered_json to_json(const capture::HdrResult& result) {
+nlohmann::ordered_json to_json(const capture::HdrResult& result, double stops) {
   auto candidates = nlohmann::ordered_json::array();
   for (const capture::ResponseCandidate& c : result.candidates) {
     candidates.push_back(
@@ -35,7 +35,7 @@ nlohmann::ordered_json to_json(const capture::HdrResult& result) {
             {"coefficients", result.response.coefficients},
             {"heldout_error", result.heldout_error},
             {"candidates", candidates}}},
-          {"stops", result.stops},
+          {"stops", stops},
           {"time_ms", result.time_ms}};
 }
 
@@ -53,9 +53,10 @@ void hdr(const HdrCommandOptions& options, Console& console) {
   const capture::HdrResult result = capture::make_hdr(options.shots, {{}, options.response});
   if (!options.response_out.empty()) save_response(options, result);
   capture::write_exr(options.out, result.radiance);
-  console.figures(to_json(result).dump(2));
+  const double stops = capture::range_stops(result.radiance);
+  console.figures(to_json(result, stops).dump(2));
   console.say(fmt::format("{}: {}x{}, {:.1f} stops from {} files, response {}", options.out,
-                          result.radiance.width, result.radiance.height, result.stops,
+                          result.radiance.width, result.radiance.height, stops,
                           options.shots.size(), result.response.name));
 }
 

@@ -69,6 +69,23 @@ TEST(Handover, LetsTheGiverWorkOneValueAheadAndNoMore) {
   EXPECT_EQ(expected, 50);
 }
 
+TEST(Handover, TellsTheGiverWhenTheTakerAsksAgain) {
+  Handover<int> handover;
+  std::atomic<bool> dealt_with = false;
+  std::thread taker([&] {
+    EXPECT_EQ(handover.take(), 1);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    dealt_with = true;
+    EXPECT_EQ(handover.take(), std::nullopt);
+  });
+  EXPECT_TRUE(handover.give(1));
+  EXPECT_TRUE(handover.wait_for_taker());
+  EXPECT_TRUE(dealt_with);
+  handover.close();
+  EXPECT_FALSE(handover.wait_for_taker());
+  taker.join();
+}
+
 TEST(Handover, FreesAGiverWhenItIsClosed) {
   Handover<int> handover;
   std::jthread giver([&] { EXPECT_FALSE(handover.give(1)); });
