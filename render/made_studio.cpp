@@ -5,12 +5,14 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "render/environment.h"
+#include "render/photograph_behind.h"
 #include "render/reference.h"
 #include "render/standard.h"
 
@@ -99,6 +101,20 @@ calibrate::DirectionTable cut_out(const calibrate::DirectionTable& whole, const 
     }
   }
   return part;
+}
+
+// The same scene with all that glows dark; null if nothing does.
+std::unique_ptr<Scene> without_glow(const Scene& scene) {
+  SceneDescription description = scene.description();
+  bool glows = false;
+  for (Material& material : description.materials) {
+    StandardParameters parameters = standard_parameters(material, description.textures.size());
+    if (std::ranges::all_of(parameters.emission, [](float e) { return e == 0; })) continue;
+    glows = true;
+    std::ranges::fill(parameters.emission, 0.0F);
+    material = make_standard_material(material.name, parameters);
+  }
+  return glows ? std::make_unique<Scene>(std::move(description)) : nullptr;
 }
 
 }  // namespace
@@ -230,16 +246,24 @@ LightParts photograph_parts(const MadeStudio& studio,
                             const calibrate::DirectionTable& directions,
                             const calibrate::Pose& cam_from_set,
                             int samples,
-                            std::uint32_t seed) {
+                            std::uint32_t seed,
+                            Seen seen) {
   ReferenceSettings settings{.samples = samples, .seed = seed, .bounces = true};
-  const auto take = [&](const capture::Image& light, const calibrate::DirectionTable& seen) {
+  // What glows by itself is part of the rest, whatever the sun does.
+  const std::unique_ptr<Scene> dark = without_glow(scene);
+  const Scene& sunlit = dark ? *dark : scene;
+  const auto take = [&](const Scene& seen_scene, const capture::Image& light,
+                        const calibrate::DirectionTable& towards) {
     const Environment environment = as_environment(light);
-    return photograph({&scene, &seen, &environment}, cam_from_set, settings);
+    const FrameInputs inputs{&seen_scene, &towards, &environment};
+    return seen == Seen::everything ? photograph(inputs, cam_from_set, settings)
+                                    : photograph_behind(inputs, cam_from_set, settings);
   };
-  LightParts parts{take(studio.sky.sun, directions), take(studio.sky.rest, directions)};
+  LightParts parts{take(sunlit, studio.sky.sun, directions),
+                   take(scene, studio.sky.rest, directions)};
   if (const auto rect = find_sun(parts.sun)) {
     settings.samples = samples * sun_samples_factor;
-    const capture::Image finer = take(studio.sky.sun, cut_out(directions, *rect));
+    const capture::Image finer = take(sunlit, studio.sky.sun, cut_out(directions, *rect));
     for (int y = 0; y < finer.height; ++y) {
       std::copy_n(&finer.pixels[finer.index(y, 0)], finer.width * 3,
                   &parts.sun.pixels[parts.sun.index(rect->y0 + y, rect->x0)]);

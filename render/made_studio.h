@@ -84,6 +84,9 @@ struct LightParts {
 };
 capture::Image add_light(const LightParts& parts, float sun_strength);
 
+// What a photograph shows: all there is, or what is behind virtual objects (photograph_behind.h).
+enum class Seen { everything, behind_virtual };
+
 // A scene in the studio's light through `directions`, path-traced with `samples` paths a pixel for
 // each part of the light, and more where the sun itself is seen. Noise depends on `seed` alone, not
 // on the number of threads.
@@ -92,7 +95,8 @@ LightParts photograph_parts(const MadeStudio& studio,
                             const calibrate::DirectionTable& directions,
                             const calibrate::Pose& cam_from_set,
                             int samples,
-                            std::uint32_t seed = 1);
+                            std::uint32_t seed = 1,
+                            Seen seen = Seen::everything);
 
 // Directions of a latitude-longitude map (height, 2 * height) as render::Environment has them, for
 // a camera that is not turned against the set.

@@ -9,6 +9,9 @@
 
 #include "capture/hdr.h"
 #include "render/environment.h"
+#include "render/made_scene.h"
+#include "render/made_shapes.h"
+#include "render/standard.h"
 
 namespace render {
 namespace {
@@ -129,6 +132,22 @@ TEST(PhotographParts, AddUpToThePictureUnderBothLights) {
     total += whole.pixels[i];
   }
   EXPECT_LT(std::abs(difference), 0.01 * total);
+}
+
+TEST(PhotographParts, HaveWhatGlowsOnceAndNotDimmedWithTheSun) {
+  MadeSceneBuilder builder;
+  builder.add("lamp", make_rectangle({-9, -9, 0}, {18, 0, 0}, {0, 18, 0}, 1), {0, 0, 0}, 1, -1, 0);
+  SceneDescription description = builder.take();
+  StandardParameters glow = standard_parameters(description.materials[0], 0);
+  std::ranges::fill(glow.emission, 3.0F);
+  description.materials[0] = make_standard_material("lamp", glow);
+  const Scene scene(std::move(description));
+  const auto directions = calibrate::make_direction_table({"pinhole", 4, 4, {4, 4, 1.5, 1.5}});
+  const auto camera = calibrate::look_at({0, 0, 2}, {0, 0, 0}, 0);
+  const LightParts parts = photograph_parts(shared_studio(), scene, directions, camera, 8);
+  for (const float strength : {0.0F, 1.0F}) {
+    EXPECT_NEAR(add_light(parts, strength).at(2, 2, 1), 3, 1e-4) << strength;
+  }
 }
 
 TEST(PhotographParts, RepeatThemselves) {
