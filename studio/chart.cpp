@@ -121,13 +121,21 @@ std::string chart_json(const Chart& chart) {
     stressors.push_back({{"stressor", s.stressor}, {"unit", s.unit}, {"samples", samples}});
   }
   const Machine machine = this_machine();
-  return Json{
-      {"stage", chart.stage},
-      {"title", chart.title},
-      {"points", points},
-      {"stressors", stressors},
-      {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}}}}
-      .dump(2);
+  Json json{{"stage", chart.stage},
+            {"title", chart.title},
+            {"subtitle", chart.subtitle},
+            {"points", points},
+            {"stressors", stressors}};
+  for (const ErrorSteps& s : chart.steps) {
+    Json steps = Json::array();
+    for (const ErrorStep& step : s.steps) {
+      steps.push_back(
+          {{"name", step.name}, {"error", step.error}, {"standard_error", step.standard_error}});
+    }
+    json["steps"].push_back({{"title", s.title}, {"steps", steps}});
+  }
+  json["machine"] = {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}};
+  return json.dump(2);
 }
 
 std::string chart_csv(const Chart& chart) {

@@ -39,6 +39,17 @@ struct Stressor {
   std::vector<StressorSample> samples;  // by rising value
 };
 
+// What an error is made of: it falls from step to step as one thing after the other is made true.
+struct ErrorStep {
+  std::string name;  // "light"
+  double error = 0;  // after the step
+  double standard_error = 0;
+};
+struct ErrorSteps {
+  std::string title;
+  std::vector<ErrorStep> steps;
+};
+
 struct Chart {
   std::string stage;  // file name: "lights"
   std::string title;
@@ -47,6 +58,7 @@ struct Chart {
   std::string error_name = "relative RMS error";
   std::vector<ChartPoint> points;
   std::vector<Stressor> stressors;
+  std::vector<ErrorSteps> steps;
 };
 
 // Marks the points of our own that no other of our own beats in both time and error.
@@ -56,8 +68,8 @@ void mark_front(Chart& chart);
 std::string chart_json(const Chart& chart);
 // One row a point: method, peer, every setting and figure that any point has, time, errors, front.
 std::string chart_csv(const Chart& chart);
-// The picture: error against time on logarithmic axes, then one panel for each stressor. The same
-// chart always gives the same text.
+// The picture: error against time on logarithmic axes, then one panel for each split into steps and
+// each stressor. The same chart always gives the same text.
 std::string chart_svg(const Chart& chart);
 
 // Writes STAGE.json, .csv, .svg and .png into a directory, which is made if need be. Throws

@@ -4,11 +4,12 @@
 #include <vector>
 
 #include "studio/charts/lights.h"
+#include "studio/charts/photograph.h"
 
 namespace studio {
 
 std::span<const ChartStage> chart_stages() {
-  static const std::vector<ChartStage> all{lights_chart()};
+  static const std::vector<ChartStage> all{lights_chart(), photograph_chart()};
   return all;
 }
 

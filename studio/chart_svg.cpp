@@ -339,10 +339,38 @@ void draw_stressor(Svg& svg, const Stressor& stressor, double left, double top) 
   }
 }
 
+// One bar a step, from 0, with its standard error.
+void draw_steps(Svg& svg, const ErrorSteps& split, double left, double top) {
+  svg.text(left, top - 12, split.title, {12.5, Anchor::start, ink, true});
+  constexpr double name_width = 150;
+  constexpr double value_width = 96;
+  const double from = left + name_width;
+  const double room = stressor_width + 66 - name_width - value_width;
+  double most = 0;
+  for (const ErrorStep& s : split.steps) most = std::max(most, s.error + s.standard_error);
+  const auto across = [&](double error) { return from + (most > 0 ? error / most : 0) * room; };
+  const auto count = static_cast<double>(std::max<std::size_t>(split.steps.size(), 1));
+  const double pitch = std::min(36.0, stressor_height / count);
+  double y = top + 6;
+  for (const ErrorStep& s : split.steps) {
+    const double middle = y + pitch / 2;
+    svg.text(from - 10, middle + 4, s.name, {11.5, Anchor::end, ink});
+    svg.rectangle(from, y + pitch * 0.2, across(s.error) - from, pitch * 0.6, colours[0]);
+    svg.line(across(std::max(0.0, s.error - s.standard_error)), middle,
+             across(s.error + s.standard_error), middle, ink, 1.6);
+    svg.text(across(s.error + s.standard_error) + 8, middle + 4,
+             fmt::format("{:.2f} % ± {:.2f}", 100 * s.error, 100 * s.standard_error),
+             {11.5, Anchor::start, ink});
+    y += pitch;
+  }
+  svg.line(from, top + 6, from, y, "#999999");
+}
+
 }  // namespace
 
 std::string chart_svg(const Chart& chart) {
-  const auto rows = (chart.stressors.size() + 1) / 2;
+  const std::size_t splits = chart.steps.size();
+  const auto rows = (splits + chart.stressors.size() + 1) / 2;
   const double stressors_top = title_height + panel_height + axis_height + 46;
   const double height = title_height + panel_height + axis_height + margin / 2 +
                         static_cast<double>(rows) * stressor_row;
@@ -353,9 +381,14 @@ std::string chart_svg(const Chart& chart) {
   const std::map<std::string, Style> styles = styles_of(chart);
   draw_main_panel(svg, chart, styles);
   draw_legend(svg, chart, styles);
-  for (std::size_t i = 0; i < chart.stressors.size(); ++i) {
-    draw_stressor(svg, chart.stressors[i], panel_left + static_cast<double>(i % 2) * stressor_pitch,
-                  stressors_top + static_cast<double>(i / 2) * stressor_row);
+  for (std::size_t i = 0; i < splits + chart.stressors.size(); ++i) {
+    const double left = panel_left + static_cast<double>(i % 2) * stressor_pitch;
+    const double top = stressors_top + static_cast<double>(i / 2) * stressor_row;
+    if (i < splits) {
+      draw_steps(svg, chart.steps[i], left, top);
+    } else {
+      draw_stressor(svg, chart.stressors[i - splits], left, top);
+    }
   }
   return svg.finish();
 }

@@ -106,7 +106,7 @@ DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progres
   write_demo_cameras(settings.dir, studio);
   figures.set = settings.dir / (court ? "car.toml" : "park_car.toml");
   write_text(figures.set, court ? court_set(studio, "") : park_set(studio, ""));
-  write_demo_truth(truth / "truth.json", studio, settings.samples);
+  write_demo_truth(truth / "truth.json", settings, studio);
 
   progress(0.6, "the photograph");
   std::vector<bool> is_car;

@@ -36,6 +36,10 @@ struct DemoFigures {
 // Called with the share that is done, 0 to 1, and what comes next.
 using DemoProgress = std::function<void(double share, std::string_view what)>;
 
+// The settings that a demo was made with, from its truth.json. Throws std::runtime_error with path
+// and reason.
+DemoSettings read_demo_truth(const std::filesystem::path& file);
+
 // The world without its car. Throws std::runtime_error with path and reason for a map that cannot
 // be read or used.
 render::MadeStudio make_demo_studio(const DemoSettings& settings);

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "render/made_studio.h"
+#include "studio/demo.h"
 
 namespace studio {
 
@@ -46,10 +47,10 @@ std::string park_set(const render::MadeStudio& studio, const std::string& prefix
 // The lenses, and the camera's track if it moves.
 void write_demo_cameras(const std::filesystem::path& dir, const render::MadeStudio& studio);
 
-// What everything was made with, as JSON.
+// What everything was made with, as JSON. read_demo_truth() (demo.h) reads it again.
 void write_demo_truth(const std::filesystem::path& file,
-                      const render::MadeStudio& studio,
-                      int samples);
+                      const DemoSettings& settings,
+                      const render::MadeStudio& studio);
 
 void write_text(const std::filesystem::path& file, std::string_view text);
 

@@ -1,5 +1,7 @@
 // The made set in words: set file, lenses, truth.
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -133,11 +135,22 @@ void write_demo_cameras(const fs::path& dir, const render::MadeStudio& studio) {
   }
 }
 
-void write_demo_truth(const fs::path& file, const render::MadeStudio& studio, int samples) {
+void write_demo_truth(const fs::path& file,
+                      const DemoSettings& settings,
+                      const render::MadeStudio& studio) {
   const auto plain = [](render::Vec3f v) { return nlohmann::json{v.x, v.y, v.z}; };
+  const render::MadeStudioSettings& made = settings.studio;
   nlohmann::ordered_json truth;
-  truth["samples"] = samples;
-  truth["seed"] = studio.settings.seed;
+  truth["world"] = settings.world == DemoWorld::court ? "court" : "park";
+  if (!settings.map.empty()) truth["map"] = fs::absolute(settings.map).lexically_normal().string();
+  truth["width"] = made.width;
+  truth["height"] = made.height;
+  truth["probe_size"] = made.probe_size;
+  truth["sky_height"] = made.sky_height;
+  truth["texture_size"] = made.texture_size;
+  truth["frames"] = made.frames;
+  truth["samples"] = settings.samples;
+  truth["seed"] = made.seed;
   truth["clap_s"] = demo_clap_s;
   truth["car_yaw_deg"] = studio.car_yaw_deg;
   truth["sun_direction"] = plain(studio.sky.sun_direction);
@@ -157,6 +170,35 @@ void write_demo_truth(const fs::path& file, const render::MadeStudio& studio, in
                    {"transfer", capture::name_of(camera->sensor.transfer)}};
   }
   write_text(file, truth.dump(2) + "\n");
+}
+
+DemoSettings read_demo_truth(const fs::path& file) {
+  const std::vector<std::byte> bytes = capture::read_file(file.string());
+  try {
+    const auto truth =
+        nlohmann::json::parse(reinterpret_cast<const char*>(bytes.data()),
+                              reinterpret_cast<const char*>(bytes.data()) + bytes.size());
+    DemoSettings settings;
+    settings.dir = file.parent_path().parent_path();
+    const std::string world = truth.at("world");
+    if (world != "court" && world != "park") {
+      throw std::runtime_error("there is no world \"" + world + "\"");
+    }
+    settings.world = world == "court" ? DemoWorld::court : DemoWorld::park;
+    settings.map = truth.value("map", "");
+    settings.studio = {.width = truth.at("width"),
+                       .height = truth.at("height"),
+                       .probe_size = truth.at("probe_size"),
+                       .sky_height = truth.at("sky_height"),
+                       .texture_size = truth.at("texture_size"),
+                       .frames = truth.at("frames"),
+                       .seed = truth.at("seed")};
+    settings.samples = truth.at("samples");
+    return settings;
+  } catch (const std::exception& error) {
+    throw std::runtime_error(file.string() +
+                             ": is no truth of \"platelight demo\": " + error.what());
+  }
 }
 
 }  // namespace studio

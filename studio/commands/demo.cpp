@@ -18,6 +18,7 @@ struct DemoOptions {
   std::string dir;
   std::string world = "court";
   std::string map;
+  std::optional<std::int64_t> width;
   std::optional<std::int64_t> samples;
   std::optional<std::int64_t> frames;
   std::optional<std::int64_t> seed;
@@ -35,6 +36,11 @@ void demo(const DemoOptions& options, Console& console) {
     throw UsageError("there is no world \"" + options.world + "\": there are court, park");
   } else if (!options.map.empty()) {
     throw UsageError("the court has a sky of its own: --map is for the park");
+  }
+  if (options.width) {
+    const int width = static_cast<int>(*options.width);
+    settings.studio.height = width * settings.studio.height / settings.studio.width;
+    settings.studio.width = width;
   }
   if (options.samples) settings.samples = static_cast<int>(*options.samples);
   if (options.frames) settings.studio.frames = static_cast<int>(*options.frames);
@@ -69,6 +75,8 @@ Command demo_command() {
         arguments.option("--world", options->world,
                          "court (a made sky) or park (a real map of light; the camera pans)");
         arguments.option("--map", options->map, "of the park: a latitude-longitude .hdr or .exr");
+        arguments.option("--width", options->width, 32, 8192,
+                         "of the plate (court 640, park 1280); its shape stays");
         arguments.option("--samples", options->samples, 1, 65536,
                          "paths per pixel of the truth, for each part of the light (16)");
         arguments.option("--frames", options->frames, 1, 100000,

@@ -58,6 +58,8 @@ Chart made_chart() {
     }
     chart.stressors.push_back(s);
   }
+  chart.steps.push_back({"true one after the other",
+                         {{"as it runs", 0.05, 0.002}, {"+ light", 0.03, 0.002}, {"+ all", 0, 0}}});
   mark_front(chart);
   return chart;
 }
@@ -121,6 +123,9 @@ TEST(ChartJson, HasWhatScriptsRelyOn) {
   EXPECT_EQ(stressor["samples"][0]["status"], "refused");
   EXPECT_TRUE(stressor["samples"][0]["reported_error"].is_number());
   EXPECT_GT(json["machine"]["threads"], 0);
+  const auto& split = json["steps"][0];
+  EXPECT_EQ(split["steps"][1]["name"], "+ light");
+  EXPECT_EQ(split["steps"][1]["standard_error"], 0.002);
 }
 
 TEST(ChartCsv, HasARowForEveryPoint) {
