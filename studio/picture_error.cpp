@@ -4,27 +4,39 @@
 #include <cstddef>
 
 namespace studio {
+namespace {
 
-render::PictureError error_of(const ShownFrame& shown, int samples) {
+// The first three of four channels.
+capture::Image colour_of(const capture::Image& rgba) {
+  capture::Image colour = capture::make_image(rgba.height, rgba.width, 3);
+  for (std::size_t i = 0; i < colour.pixels.size(); ++i) {
+    colour.pixels[i] = rgba.pixels[i / 3 * 4 + i % 3];
+  }
+  return colour;
+}
+
+}  // namespace
+
+Truth truth_of(const ShownFrame& shown, int samples) {
   const capture::Image plate = capture::to_float(*shown.prepared.plate);
   render::ReferenceSettings settings;
   settings.samples = samples;
   const capture::Image reference =
       render::render_reference(shown.prepared.inputs(), shown.prepared.job, plate, settings);
-  const capture::Image rgba = capture::to_float(shown.result->rgba);
-  capture::Image picture = capture::make_image(rgba.height, rgba.width, 3);
-  capture::Image truth = capture::make_image(rgba.height, rgba.width, 3);
-  capture::Image mask = capture::make_image(rgba.height, rgba.width, 1);
-  for (std::size_t i = 0; i < mask.pixels.size(); ++i) {
+  Truth truth{colour_of(reference), capture::make_image(reference.height, reference.width, 1)};
+  for (std::size_t i = 0; i < truth.mask.pixels.size(); ++i) {
     bool affected = reference.pixels[i * 4 + 3] > 0;
     for (std::size_t c = 0; c < 3; ++c) {
-      picture.pixels[i * 3 + c] = rgba.pixels[i * 4 + c];
-      truth.pixels[i * 3 + c] = reference.pixels[i * 4 + c];
-      affected = affected || truth.pixels[i * 3 + c] != plate.pixels[i * 3 + c];
+      affected = affected || truth.picture.pixels[i * 3 + c] != plate.pixels[i * 3 + c];
     }
-    mask.pixels[i] = affected ? 1.0F : 0.0F;
+    truth.mask.pixels[i] = affected ? 1.0F : 0.0F;
   }
-  return render::picture_error(picture, truth, mask);
+  return truth;
+}
+
+render::PictureError error_against(const Truth& truth, const ShownFrame& shown) {
+  return render::picture_error(colour_of(capture::to_float(shown.result->rgba)), truth.picture,
+                               truth.mask);
 }
 
 }  // namespace studio

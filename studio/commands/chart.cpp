@@ -1,24 +1,46 @@
 // platelight chart: measures what settings cost and what they buy.
 #include <algorithm>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "studio/chart_stages.h"
+#include "studio/charts/set.h"
 #include "studio/commands/commands.h"
+#include "studio/effort_points.h"
 
 namespace studio {
 namespace {
 
 struct ChartOptions {
   std::vector<std::string> stages;
-  std::string out = ".";
+  std::string out;  // "" = here; of a set, beside its file
   ChartRequest request;
+  std::optional<std::int64_t> samples;
 };
 
+// "set SET.toml": beside the set file, where `run` looks for it, if nothing else is said.
+void chart_of_set(const ChartOptions& options, Console& console) {
+  if (options.stages.size() != 2) throw UsageError("chart set needs one set file: set SET.toml");
+  const std::string& set = options.stages[1];
+  SetChartSettings settings;
+  settings.quick = options.request.quick;
+  if (options.samples) settings.samples = static_cast<int>(*options.samples);
+  Chart measured = chart_set(set, settings, console);
+  mark_front(measured);
+  const std::string beside = std::filesystem::path(effort_points_file(set)).parent_path().string();
+  const std::string out = !options.out.empty() ? options.out : beside.empty() ? "." : beside;
+  write_chart(measured, out);
+  console.figures(chart_json(measured));
+  console.say(fmt::format("{0}/{1}.svg, .png, .csv, .json", out, measured.stage));
+}
+
 void chart(const ChartOptions& options, Console& console) {
+  if (!options.stages.empty() && options.stages[0] == "set") return chart_of_set(options, console);
   const bool all = options.stages == std::vector<std::string>{"all"};
   std::vector<const ChartStage*> wanted;
   for (const ChartStage& stage : chart_stages()) {
@@ -32,6 +54,7 @@ void chart(const ChartOptions& options, Console& console) {
     }
     std::string known;
     for (const ChartStage& stage : chart_stages()) known += fmt::format(" {},", stage.name);
+    known += " set SET.toml,";
     throw UsageError(fmt::format("there is no chart of \"{}\": there are{} all", name, known));
   }
   if (wanted.size() > 1 && console.wants_figures()) {
@@ -40,9 +63,10 @@ void chart(const ChartOptions& options, Console& console) {
   for (const ChartStage* stage : wanted) {
     Chart measured = stage->measure(options.request, console);
     mark_front(measured);
-    write_chart(measured, options.out);
+    const std::string out = options.out.empty() ? "." : options.out;
+    write_chart(measured, out);
     console.figures(chart_json(measured));
-    console.say(fmt::format("{0}/{1}.svg, .png, .csv, .json", options.out, measured.stage));
+    console.say(fmt::format("{0}/{1}.svg, .png, .csv, .json", out, measured.stage));
   }
 }
 
@@ -57,9 +81,14 @@ Command chart_command() {
             for (const ChartStage& stage : chart_stages()) {
               stages += fmt::format("\n{} ({})", stage.name, stage.summary);
             }
+            stages += "\nset SET.toml (a whole set on this machine, for run --fps and --error)";
             arguments.positionals("STAGE", o->stages, stages);
-            arguments.option("--out", o->out, "directory that the charts are written to");
+            arguments.option(
+                "--out", o->out,
+                "directory that the charts are written to (this one; of a set, its own)");
             arguments.option("--set", o->request.set, "measure with this set file's scene");
+            arguments.option("--samples", o->samples, 1, 1 << 20,
+                             "of a set's reference, paths per pixel (256)");
             arguments.flag("--quick", o->request.quick, "fewer points, for a first look");
             return [o](Console& console) { chart(*o, console); };
           }};

@@ -3,10 +3,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "studio/commands/commands.h"
+#include "studio/effort_points.h"
 #include "studio/figures.h"
 #include "studio/picture_error.h"
 #include "studio/set_watch.h"
@@ -21,6 +23,7 @@ struct RunOptions {
   bool watch = false;
   std::optional<std::int64_t> frames;
   std::optional<double> fps;
+  std::optional<double> error;
   std::optional<std::int64_t> check_error;
   std::string record;
   std::string exr;
@@ -31,6 +34,29 @@ std::string absolute(const std::string& path) { return std::filesystem::absolute
 void apply_options(const RunOptions& options, Set& set) {
   if (!options.record.empty()) set.record.file = absolute(options.record);
   if (!options.exr.empty()) set.record.exr = absolute(options.exr);
+}
+
+// The effort that a chart of the set found best for what was asked.
+void choose_effort(const RunOptions& options, Set& set, Console& console) {
+  const std::vector<EffortPoint> points = read_effort_points(options.set, set.effort);
+  const EffortChoice choice =
+      options.fps ? most_accurate_at(points, *options.fps) : fastest_within(points, *options.error);
+  const auto& [effort, time_ms, error] = choice.point;
+  const std::string chosen = fmt::format(
+      "{} samples at edges, {} lights, interleave {}, accuracy {:.3g}: {:.1f} ms a frame at error "
+      "{:.2f} %",
+      effort.aa_samples, effort.light_samples, effort.interleave, effort.accuracy, time_ms,
+      error * 100);
+  if (choice.holds) {
+    console.say(chosen);
+  } else if (options.fps) {
+    console.warn(fmt::format("no measured setting holds {} fps here; the fastest is {}",
+                             *options.fps, chosen));
+  } else {
+    console.warn(fmt::format("no measured setting is within {} %; the most accurate is {}",
+                             *options.error * 100, chosen));
+  }
+  set.effort = effort;
 }
 
 void report_progress(const ShowStatus& status,
@@ -67,6 +93,8 @@ void report_end(const ShowStatus& status, const Set& set, Console& console) {
 void run(const RunOptions& options, Console& console) {
   Set set = read_set(options.set);
   apply_options(options, set);
+  if (options.fps || options.error) choose_effort(options, set, console);
+  const render::Effort effort = set.effort;
   ShowOptions show_options;
   show_options.live = options.live;
   show_options.frames = options.frames;
@@ -79,6 +107,7 @@ void run(const RunOptions& options, Console& console) {
         options.set,
         [&](Set changed) {
           apply_options(options, changed);
+          if (options.fps || options.error) changed.effort = effort;
           console.say(fmt::format("{} has changed: on air", options.set));
           show.post(ChangeSet{std::move(changed)});
         },
@@ -96,7 +125,7 @@ void run(const RunOptions& options, Console& console) {
   report_end(status, set, console);
   std::optional<render::PictureError> error;
   if (options.check_error && last.result) {
-    error = error_of(last, static_cast<int>(*options.check_error));
+    error = error_against(truth_of(last, static_cast<int>(*options.check_error)), last);
     console.say(fmt::format("error {:.3f} % (p99 {:.3f} %, delta E {:.2f}) over {} pixels",
                             error->relative_rms * 100, error->p99 * 100, error->delta_e_mean,
                             error->pixels));
@@ -121,7 +150,16 @@ Command run_command() {
             arguments.option("--check-error", o->check_error, 1, 1 << 20,
                              "render the reference of the last frame with so many samples and "
                              "report the error");
-            return [o](Console& console) { run(*o, console); };
+            arguments.option("--fps", o->fps, 0.01, 1000,
+                             "the most accurate effort that holds so many frames per second here, "
+                             "by the chart of this set");
+            arguments.option("--error", o->error, 0, 1,
+                             "the fastest effort within this error (.01 = 1 %), by the chart of "
+                             "this set");
+            return [o](Console& console) {
+              if (o->fps && o->error) throw UsageError("--fps and --error: only one can be held");
+              run(*o, console);
+            };
           }};
 }
 

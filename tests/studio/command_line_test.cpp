@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -186,6 +187,36 @@ TEST_F(Runs, WriteTheFiguresThatScriptsRelyOn) {
   EXPECT_EQ(json["match"], nlohmann::json::array({1.0, 1.0, 1.0}));
   EXPECT_GT(json["peak_memory_mb"], 1);
   EXPECT_LT(json["peak_memory_mb"], 1024);
+}
+
+TEST_F(Runs, NameTheCommandThatMeasuresEffortIfItWasNotMeasured) {
+  const Outcome outcome = run("run " + write_set() + " --fps 25");
+  EXPECT_EQ(outcome.status, 1);
+  expect_one_line(outcome.err);
+  EXPECT_THAT(outcome.err, HasSubstr("platelight chart set"));
+}
+
+TEST_F(Runs, TakeTheEffortThatTheChartOfTheirSetFoundBest) {
+  const std::string set = write_set();
+  const Outcome chart = run("chart set " + set + " --quick --samples 4");
+  ASSERT_EQ(chart.status, 0) << chart.err;
+  const std::string json_path = (dir_ / "run.json").string();
+  const Outcome slow = run("run " + set + " --frames 1 --fps 0.01 --json " + json_path);
+  ASSERT_EQ(slow.status, 0) << slow.err;
+  const auto points =
+      nlohmann::json::parse(content_of(set.substr(0, set.size() - 5) + ".chart.json"))["points"];
+  ASSERT_GE(points.size(), 2);
+  const auto best =
+      std::min_element(points.begin(), points.end(),
+                       [](const auto& a, const auto& b) { return a["error"] < b["error"]; });
+  const auto taken = nlohmann::json::parse(content_of(json_path))["effort"];
+  for (const char* name : {"aa_samples", "light_samples", "interleave"}) {
+    EXPECT_EQ(taken[name].get<int>(), (*best)["settings"][name].get<int>()) << name;
+  }
+  const Outcome hopeless = run("run " + set + " --frames 1 --error 0");
+  EXPECT_EQ(hopeless.status, 0);
+  EXPECT_THAT(hopeless.err, HasSubstr("no measured setting is within 0 %"));
+  EXPECT_EQ(run("run " + set + " --fps 25 --error .01").status, 2);
 }
 
 TEST_F(Runs, TellWhatTheirInputsCost) {

@@ -1,0 +1,119 @@
+// Efforts picked from a chart: the best of those that do what was asked.
+#include "studio/effort_points.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "studio/machine.h"
+
+namespace studio {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+EffortPoint point(int lights, double time_ms, double error) {
+  EffortPoint p{{}, time_ms, error};
+  p.effort.light_samples = lights;
+  return p;
+}
+
+const std::vector<EffortPoint> points{point(16, 20, 0.04), point(32, 45, 0.05), point(64, 38, 0.02),
+                                      point(256, 90, 0.008)};
+
+TEST(MostAccurateAt, TakesTheLeastErrorAmongThoseThatAreFastEnough) {
+  EXPECT_EQ(most_accurate_at(points, 25).point.effort.light_samples, 64);
+  EXPECT_EQ(most_accurate_at(points, 40).point.effort.light_samples, 16);
+  EXPECT_EQ(most_accurate_at(points, 1).point.effort.light_samples, 256);
+  EXPECT_TRUE(most_accurate_at(points, 50).holds) << "20 ms hold 50 fps";
+}
+
+TEST(MostAccurateAt, TakesTheFastestAndSaysSoIfNoneIsFastEnough) {
+  const EffortChoice choice = most_accurate_at(points, 60);
+  EXPECT_FALSE(choice.holds);
+  EXPECT_EQ(choice.point.effort.light_samples, 16);
+}
+
+TEST(FastestWithin, TakesTheLeastTimeAmongThoseThatAreAccurateEnough) {
+  EXPECT_EQ(fastest_within(points, 0.01).point.effort.light_samples, 256);
+  EXPECT_EQ(fastest_within(points, 0.02).point.effort.light_samples, 64);
+  EXPECT_EQ(fastest_within(points, 0.5).point.effort.light_samples, 16);
+}
+
+TEST(FastestWithin, TakesTheMostAccurateAndSaysSoIfNoneIsAccurateEnough) {
+  const EffortChoice choice = fastest_within(points, 0.001);
+  EXPECT_FALSE(choice.holds);
+  EXPECT_EQ(choice.point.effort.light_samples, 256);
+}
+
+class EffortPointsFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    dir_ = fs::path(testing::TempDir()) /
+           (std::string("platelight_effort_") + info->name() + std::to_string(getpid()));
+    fs::create_directories(dir_);
+  }
+  void TearDown() override { fs::remove_all(dir_); }
+  std::string set() const { return (dir_ / "car.toml").string(); }
+  void write(const std::string& content) const {
+    std::ofstream(effort_points_file(set())) << content;
+  }
+
+  fs::path dir_;
+};
+
+TEST_F(EffortPointsFile, GivesBackWhatTheChartMeasured) {
+  Chart chart;
+  chart.stage = "car.chart";
+  render::Effort base;
+  base.max_depth = 5;
+  for (const EffortPoint& p : points) {
+    ChartPoint measured;
+    measured.settings = settings_of(p.effort);
+    measured.time_ms = p.time_ms;
+    measured.error = p.error;
+    chart.points.push_back(measured);
+  }
+  write_chart(chart, dir_.string());
+  const std::vector<EffortPoint> read = read_effort_points(set(), base);
+  ASSERT_EQ(read.size(), points.size());
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    render::Effort effort = points[i].effort;
+    effort.max_depth = 5;
+    EXPECT_EQ(read[i].effort, effort) << i;
+    EXPECT_EQ(read[i].time_ms, points[i].time_ms);
+    EXPECT_EQ(read[i].error, points[i].error);
+  }
+}
+
+TEST_F(EffortPointsFile, IsRefusedWithTheCommandThatMakesItAnew) {
+  const std::string here = "\"machine\": {\"cpu\": \"" + this_machine().cpu +
+                           "\", \"threads\": " + std::to_string(this_machine().threads) + "}";
+  const std::string settings =
+      "\"settings\": {\"aa_samples\": 4, \"light_samples\": 99999, \"interleave\": 1, "
+      "\"accuracy\": 0.95}";
+  for (const auto& [content, reason] : {
+           std::pair<std::string, std::string>{"{", "is no chart of a set"},
+           {"{\"points\": []}", "is no chart of a set"},
+           {"{\"points\": [], " + here + "}", "has no points"},
+           {"{\"points\": [{}], " + here + "}", "is no chart of a set"},
+           {"{\"points\": [{" + settings + "}], " + here + "}", "light_samples is 99999"},
+           {"{\"points\": [], \"machine\": {\"cpu\": \"another\", \"threads\": 2}}",
+            "was measured on another machine"},
+       }) {
+    write(content);
+    const auto read = [&] { read_effort_points(set(), {}); };
+    EXPECT_THAT(read, ThrowsMessage<std::runtime_error>(HasSubstr(reason))) << content;
+    EXPECT_THAT(read, ThrowsMessage<std::runtime_error>(HasSubstr("platelight chart set")));
+  }
+}
+
+}  // namespace
+}  // namespace studio
