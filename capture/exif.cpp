@@ -26,16 +26,21 @@ struct Mark {
 constexpr double third = 1.0 / 3;
 
 // ISO 2721 and the cameras' own marks. Those from 0.3 s to 0.8 s are shown as decimals.
-constexpr std::array slow_marks{
-    Mark{60, 6},           Mark{30, 5},           Mark{25, 5 - third}, Mark{20, 4 + third},
-    Mark{15, 4},           Mark{13, 4 - third},   Mark{10, 3 + third}, Mark{8, 3},
-    Mark{6, 3 - third},    Mark{5, 2 + third},    Mark{4, 2},          Mark{3.2, 2 - third},
-    Mark{3, 1.5},          Mark{2.5, 1 + third},  Mark{2, 1},          Mark{1.6, 1 - third},
-    Mark{1.5, 0.5},        Mark{1.3, third},      Mark{1, 0},          Mark{0.8, -third},
-    Mark{0.7, -0.5},       Mark{0.6, -1 + third}, Mark{0.5, -1},       Mark{0.4, -1 - third},
+constexpr std::array marks{
     Mark{0.3, -2 + third},
-};
-constexpr std::array fast_marks{
+    Mark{0.4, -1 - third},
+    Mark{0.5, -1},
+    Mark{0.6, -1 + third},
+    Mark{0.7, -0.5},
+    Mark{0.8, -third},
+    Mark{1, 0},
+    Mark{1.3, third},
+    Mark{1.5, 0.5},
+    Mark{1.6, 1 - third},
+    Mark{2, 1},
+    Mark{2.5, 1 + third},
+    Mark{3, 1.5},
+    Mark{3.2, 2 - third},
     Mark{4, 2},
     Mark{5, 2 + third},
     Mark{6, 3 - third},
@@ -79,10 +84,13 @@ constexpr std::array fast_marks{
     Mark{6400, 13 - third},
     Mark{8000, 13},
 };
+// The longest mark in seconds, and the first one in 1/seconds.
+constexpr double slowest = 60;
+constexpr double first_fast = 4;
 
-template <std::size_t N>
-const Mark* nearest_mark(const std::array<Mark, N>& marks, double shown) {
-  constexpr double tolerance = 0.005;  // EXIF rationals such as 0.3 = 3/10 or 10/33 are inexact
+constexpr double tolerance = 0.005;  // EXIF rationals such as 0.3 = 3/10 or 10/33 are inexact
+
+const Mark* nearest_mark(double shown) {
   for (const Mark& mark : marks) {
     if (std::abs(shown / mark.shown - 1) < tolerance) return &mark;
   }
@@ -90,10 +98,10 @@ const Mark* nearest_mark(const std::array<Mark, N>& marks, double shown) {
 }
 
 double snapped_f_number(double marked) {
-  constexpr double tolerance = 0.09;  // stops of area: f/22 means f/22.6
+  constexpr double tolerance_stops = 0.09;  // of area: f/22 means f/22.6
   const double stops = 2 * std::log2(marked);
   const double snapped = std::round(stops * 3) / 3;
-  return std::abs(snapped - stops) < tolerance ? std::exp2(snapped / 2) : marked;
+  return std::abs(snapped - stops) < tolerance_stops ? std::exp2(snapped / 2) : marked;
 }
 
 using ExifDataOwner = std::unique_ptr<ExifData, void (*)(ExifData*)>;
@@ -138,8 +146,13 @@ double snapped_exposure_s(double marked_s) {
   if (!(marked_s > 0) || !std::isfinite(marked_s)) {
     throw std::invalid_argument("an exposure time is above 0");
   }
-  if (const Mark* mark = nearest_mark(slow_marks, marked_s)) return std::exp2(mark->exponent);
-  if (const Mark* mark = nearest_mark(fast_marks, 1 / marked_s)) return std::exp2(-mark->exponent);
+  const double fast = 1 / marked_s;
+  if (marked_s < slowest * (1 + tolerance)) {
+    if (const Mark* mark = nearest_mark(marked_s)) return std::exp2(mark->exponent);
+  }
+  if (fast > first_fast * (1 - tolerance)) {
+    if (const Mark* mark = nearest_mark(fast)) return std::exp2(-mark->exponent);
+  }
   return marked_s;
 }
 

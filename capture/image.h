@@ -43,7 +43,7 @@ struct HalfImage {
   }
 };
 
-// Rounded to half, and back. Values beyond half's range become infinity: clamp before if that hurts.
+// Rounded to half, and back. Values beyond half's range become infinity: clamp if that hurts.
 HalfImage to_half(const Image& image);
 Image to_float(const HalfImage& image);
 

@@ -11,8 +11,6 @@
 
 namespace render {
 
-namespace {
-
 Placement product(const Placement& a, const Placement& b) {
   Placement c{};
   for (std::size_t row = 0; row < 3; ++row) {
@@ -24,8 +22,6 @@ Placement product(const Placement& a, const Placement& b) {
   }
   return c;
 }
-
-}  // namespace
 
 Placement placed(Vec3f position, float yaw_rad) {
   const float c = std::cos(yaw_rad);

@@ -11,6 +11,9 @@ namespace render {
 using Placement = std::array<float, 12>;
 inline constexpr Placement as_it_stands{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
+// A point moved by `b`, and then by `a`.
+Placement product(const Placement& a, const Placement& b);
+
 // Turned by yaw_rad about z (counter-clockwise, seen from above), then moved.
 Placement placed(Vec3f position, float yaw_rad);
 

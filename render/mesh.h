@@ -17,11 +17,11 @@ using calibrate::Vec3f;
 
 struct Mesh {
   std::vector<Vec3f> positions;
-  std::vector<Vec3f> normals;            // per vertex, unit; empty = flat
-  std::vector<std::array<float, 2>> uvs;  // per vertex; empty = none
+  std::vector<Vec3f> normals;                  // per vertex, unit; empty = flat
+  std::vector<std::array<float, 2>> uvs;       // per vertex; empty = none
   std::vector<std::array<float, 4>> tangents;  // per vertex, xyz + handedness; empty = none
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::vector<std::uint32_t> materials;  // per triangle, into SceneDescription::materials; or one for all
+  std::vector<std::uint32_t> materials;  // per triangle, or one for all: of the scene
 };
 
 // 8-bit texels, 1 to 4 channels, repeated in both directions, with mip levels.
@@ -29,7 +29,7 @@ struct Texture {
   int width = 0;
   int height = 0;
   int channels = 0;
-  bool srgb = false;  // colour: the first three channels are decoded to linear light
+  bool srgb = false;                 // colour: the first three channels are decoded to linear light
   std::vector<std::uint8_t> texels;  // every level after the other, level 0 first
 
   friend bool operator==(const Texture&, const Texture&) = default;

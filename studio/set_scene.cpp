@@ -2,7 +2,6 @@
 #include "studio/set_scene.h"
 
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <stdexcept>
 #include <tuple>
@@ -10,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "compositing/stand_in.h"
+#include "render/join_scenes.h"
 #include "render/load_mesh.h"
 #include "render/made_car.h"
-#include "render/standard.h"
 
 namespace studio {
 namespace {
@@ -21,52 +20,17 @@ using render::Instance;
 using render::Mesh;
 using render::SceneDescription;
 
-using Matrix = std::array<float, 12>;
-
-// a * b of rows of 3x4 matrices whose fourth row is 0 0 0 1.
-Matrix product(const Matrix& a, const Matrix& b) {
-  Matrix c{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 4; ++j) {
-      float sum = j == 3 ? a[i * 4 + 3] : 0;
-      for (std::size_t k = 0; k < 3; ++k) sum += a[i * 4 + k] * b[k * 4 + j];
-      c[i * 4 + j] = sum;
-    }
-  }
-  return c;
-}
-
-// The materials of a model whose textures now start at `offset`.
-void shift_textures(render::Material& material, std::int32_t offset) {
-  if (material.shader != "standard") return;
-  render::StandardParameters p;
-  std::memcpy(&p, material.parameters.data(), sizeof p);
-  for (std::int32_t* texture :
-       {&p.base_color_texture, &p.metallic_roughness_texture, &p.normal_texture,
-        &p.clearcoat_texture, &p.transmission_texture, &p.emission_texture}) {
-    if (*texture >= 0) *texture += offset;
-  }
-  std::memcpy(material.parameters.data(), &p, sizeof p);
-}
+using render::Placement;
+using render::product;
 
 // Adds a model's meshes, textures and materials to the scene, and returns its instances, whose
 // meshes are the scene's.
-std::vector<Instance> add_model(SceneDescription& scene, SceneDescription model) {
-  const auto first_mesh = static_cast<std::uint32_t>(scene.meshes.size());
-  const auto first_texture = static_cast<std::int32_t>(scene.textures.size());
-  const auto first_material = static_cast<std::uint32_t>(scene.materials.size());
-  for (const auto& mesh : model.meshes) {
-    Mesh moved = *mesh;
-    for (std::uint32_t& material : moved.materials) material += first_material;
-    scene.meshes.push_back(std::make_shared<Mesh>(std::move(moved)));
-  }
-  for (auto& texture : model.textures) scene.textures.push_back(std::move(texture));
-  for (render::Material& material : model.materials) {
-    shift_textures(material, first_texture);
-    scene.materials.push_back(std::move(material));
-  }
-  for (Instance& instance : model.instances) instance.mesh += first_mesh;
-  return std::move(model.instances);
+std::vector<Instance> add_model(SceneDescription& scene, const SceneDescription& model) {
+  const auto first = static_cast<std::ptrdiff_t>(scene.instances.size());
+  render::join(scene, model);
+  std::vector<Instance> parts(scene.instances.begin() + first, scene.instances.end());
+  scene.instances.erase(scene.instances.begin() + first, scene.instances.end());
+  return parts;
 }
 
 SceneDescription load_object(const ObjectSettings& object) {
@@ -143,7 +107,7 @@ void add_stand_in(SceneDescription& scene, const StandInSettings& stand_in, std:
     parts.push_back(part);
   }
   scene.materials.push_back(stand_in_material(stand_in, name));
-  const Matrix set_from_stand_in = matrix_of(stand_in.pose);
+  const Placement set_from_stand_in = matrix_of(stand_in.pose);
   for (Instance& part : parts) {
     part.name = name;
     part.kind = render::ObjectKind::stand_in;
@@ -157,15 +121,15 @@ void place_copies(SceneDescription& scene,
                   const ObjectSettings& object,
                   const std::string& name,
                   const std::vector<Instance>& parts) {
-  const Matrix set_from_object = matrix_of(object.pose);
+  const Placement set_from_object = matrix_of(object.pose);
   for (int row = 0; row < object.copies[1]; ++row) {
     for (int column = 0; column < object.copies[0]; ++column) {
       // Steps are metres of the set, so the object's scale does not count.
       const double scale = object.pose.scale;
-      Matrix step{1, 0, 0, static_cast<float>(column * object.spacing_m[0] / scale),
-                  0, 1, 0, static_cast<float>(row * object.spacing_m[1] / scale),
-                  0, 0, 1, 0};
-      const Matrix set_from_copy = product(set_from_object, step);
+      const Placement step{1, 0, 0, static_cast<float>(column * object.spacing_m[0] / scale),
+                           0, 1, 0, static_cast<float>(row * object.spacing_m[1] / scale),
+                           0, 0, 1, 0};
+      const Placement set_from_copy = product(set_from_object, step);
       for (Instance part : parts) {
         part.name = fmt::format("{}/{}", name, part.name);
         part.set_from_object = product(set_from_copy, part.set_from_object);
