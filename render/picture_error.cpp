@@ -1,5 +1,6 @@
 // The design's error of a picture.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <vector>
@@ -38,41 +39,50 @@ void check(const capture::Image& image, const capture::Image& mask, int channels
     throw std::invalid_argument("picture_error: pictures and mask must be of one size");
 }
 
-}  // namespace
-
-PictureError picture_error(const capture::Image& x,
-                           const capture::Image& r,
-                           const capture::Image& mask,
-                           float clamp) {
+// Against two references, which may be the same one.
+PictureError compare(const capture::Image& x,
+                     const capture::Image& a,
+                     const capture::Image& b,
+                     const capture::Image& mask,
+                     float clamp) {
   check(x, mask, 3);
-  check(r, mask, 3);
+  check(a, mask, 3);
+  check(b, mask, 3);
   PictureError error;
   std::vector<double> differences;
   std::vector<double> delta_es;
-  double squares = 0, reference_squares = 0, unclamped_squares = 0;
+  double squares = 0, reference_squares = 0, unclamped_squares = 0, noise_squares = 0;
   for (int row = 0; row < mask.height; ++row) {
     for (int column = 0; column < mask.width; ++column) {
       if (!(mask.at(row, column) > 0)) continue;
       ++error.pixels;
+      std::array<float, 3> truth;
       for (int c = 0; c < 3; ++c) {
-        const double value = x.at(row, column, c);
-        const double truth = r.at(row, column, c);
-        const double difference = std::min<double>(value, clamp) - std::min<double>(truth, clamp);
-        squares += difference * difference;
-        reference_squares += std::min<double>(truth, clamp) * std::min<double>(truth, clamp);
-        unclamped_squares += truth * truth;
-        const double plain = std::abs(value - truth);
+        const float value = x.at(row, column, c);
+        const float truth_a = a.at(row, column, c), truth_b = b.at(row, column, c);
+        const double shown = std::min(value, clamp);
+        const double shown_a = std::min(truth_a, clamp), shown_b = std::min(truth_b, clamp);
+        squares += (shown - shown_a) * (shown - shown_b);
+        reference_squares += shown_a * shown_b;
+        noise_squares += (shown_a - shown_b) * (shown_a - shown_b) / 4;
+        const double mean = 0.5 * (static_cast<double>(truth_a) + truth_b);
+        truth[static_cast<std::size_t>(c)] = static_cast<float>(mean);
+        unclamped_squares += mean * mean;
+        const double plain = std::abs(value - mean);
         differences.push_back(std::isnan(plain) ? HUGE_VAL : plain);
       }
-      const Lab a = ok_lab(&x.pixels[x.index(row, column)]);
-      const Lab b = ok_lab(&r.pixels[r.index(row, column)]);
-      delta_es.push_back(100 * std::hypot(a.l - b.l, a.a - b.a, a.b - b.b));
+      const Lab of_x = ok_lab(&x.pixels[x.index(row, column)]);
+      const Lab of_truth = ok_lab(truth.data());
+      delta_es.push_back(100 *
+                         std::hypot(of_x.l - of_truth.l, of_x.a - of_truth.a, of_x.b - of_truth.b));
     }
   }
   if (error.pixels == 0) return error;
   // Where the reference is black, any light is an infinite error.
-  const auto relative = [](double value, double unit) { return value == 0 ? 0 : value / unit; };
-  error.relative_rms = relative(std::sqrt(squares), std::sqrt(reference_squares));
+  const auto relative = [](double sum, double unit) { return sum == 0 ? 0 : sum / unit; };
+  // Two references that hardly agree may leave less than nothing; not-a-number stays.
+  error.relative_rms = std::sqrt(squares < 0 ? 0 : relative(squares, reference_squares));
+  error.reference_noise = std::sqrt(relative(noise_squares, reference_squares));
   error.p99 = relative(percentile(differences, 0.99),
                        std::sqrt(unclamped_squares / static_cast<double>(differences.size())));
   for (const double e : delta_es) error.delta_e_mean += e;
@@ -80,6 +90,41 @@ PictureError picture_error(const capture::Image& x,
   error.delta_e_p95 = percentile(delta_es, 0.95);
   error.delta_e_p99 = percentile(delta_es, 0.99);
   return error;
+}
+
+}  // namespace
+
+capture::Image affected_mask(const capture::Image& reference, const capture::Image& plate) {
+  if (reference.width != plate.width || reference.height != plate.height ||
+      reference.channels != 4 || plate.channels < 3) {
+    throw std::invalid_argument("affected_mask: the reference and its plate must be of one size");
+  }
+  capture::Image mask = capture::make_image(reference.height, reference.width, 1);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      bool affected = reference.at(y, x, 3) > 0;
+      for (int c = 0; c < 3; ++c) {
+        const float behind = plate.at(y, x, c);
+        affected = affected || std::abs(reference.at(y, x, c) - behind) > 1e-3F * behind;
+      }
+      mask.at(y, x) = affected ? 1.0F : 0.0F;
+    }
+  }
+  return mask;
+}
+
+PictureError picture_error(const capture::Image& x,
+                           const capture::Image& r,
+                           const capture::Image& mask,
+                           float clamp) {
+  return compare(x, r, r, mask, clamp);
+}
+
+PictureError picture_error(const capture::Image& x,
+                           const std::array<capture::Image, 2>& references,
+                           const capture::Image& mask,
+                           float clamp) {
+  return compare(x, references[0], references[1], mask, clamp);
 }
 
 }  // namespace render

@@ -123,20 +123,4 @@ BenchScene make_bench_scene(int width, int height) {
   return shot;
 }
 
-capture::Image affected_mask(const BenchScene& shot, const capture::Image& reference) {
-  capture::Image mask = capture::make_image(reference.height, reference.width, 1);
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      bool changed = reference.at(y, x, 3) > 0;
-      for (int c = 0; c < 3; ++c) {
-        // A thousandth of light lost is below what an eye or eight bits can tell.
-        changed |= std::abs(reference.at(y, x, c) - shot.plate.at(y, x, c)) >
-                   1e-3F * shot.plate.at(y, x, c);
-      }
-      mask.at(y, x) = changed ? 1.0F : 0.0F;
-    }
-  }
-  return mask;
-}
-
 }  // namespace studio

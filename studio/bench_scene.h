@@ -38,8 +38,4 @@ render::Environment make_bench_sky(const BenchSky& sky);
 // Throws std::invalid_argument if a side is below 16.
 BenchScene make_bench_scene(int width, int height);
 
-// Where the picture shows anything but the plate: (height, width, 1), 1 where the reference says
-// so.
-capture::Image affected_mask(const BenchScene& shot, const capture::Image& reference);
-
 }  // namespace studio

@@ -1,42 +1,29 @@
 // Errors of shown frames.
 #include "studio/picture_error.h"
 
-#include <cstddef>
+#include <algorithm>
 
 namespace studio {
-namespace {
-
-// The first three of four channels.
-capture::Image colour_of(const capture::Image& rgba) {
-  capture::Image colour = capture::make_image(rgba.height, rgba.width, 3);
-  for (std::size_t i = 0; i < colour.pixels.size(); ++i) {
-    colour.pixels[i] = rgba.pixels[i / 3 * 4 + i % 3];
-  }
-  return colour;
-}
-
-}  // namespace
 
 Truth truth_of(const ShownFrame& shown, int samples) {
   const capture::Image plate = capture::to_float(*shown.prepared.plate);
+  Truth truth;
+  truth.mask = capture::make_image(plate.height, plate.width, 1);
   render::ReferenceSettings settings;
-  settings.samples = samples;
-  const capture::Image reference =
-      render::render_reference(shown.prepared.inputs(), shown.prepared.job, plate, settings);
-  Truth truth{colour_of(reference), capture::make_image(reference.height, reference.width, 1)};
-  for (std::size_t i = 0; i < truth.mask.pixels.size(); ++i) {
-    bool affected = reference.pixels[i * 4 + 3] > 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      affected = affected || truth.picture.pixels[i * 3 + c] != plate.pixels[i * 3 + c];
-    }
-    truth.mask.pixels[i] = affected ? 1.0F : 0.0F;
+  settings.samples = samples / 2;
+  for (capture::Image& reference : truth.references) {
+    reference =
+        render::render_reference(shown.prepared.inputs(), shown.prepared.job, plate, settings);
+    const capture::Image affected = render::affected_mask(reference, plate);
+    std::ranges::transform(truth.mask.pixels, affected.pixels, truth.mask.pixels.begin(),
+                           std::ranges::max);
+    ++settings.seed;
   }
   return truth;
 }
 
 render::PictureError error_against(const Truth& truth, const ShownFrame& shown) {
-  return render::picture_error(colour_of(capture::to_float(shown.result->rgba)), truth.picture,
-                               truth.mask);
+  return render::picture_error(capture::to_float(shown.result->rgba), truth.references, truth.mask);
 }
 
 }  // namespace studio

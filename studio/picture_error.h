@@ -1,21 +1,25 @@
 // How far a shown frame is from the truth.
 #pragma once
 
+#include <array>
+
 #include "render/reference.h"
 #include "studio/show.h"
 
 namespace studio {
 
-// The reference of a frame, and where anything virtual changed it.
+// Two references of a frame, with independent noise, and where anything virtual changed it.
 struct Truth {
-  capture::Image picture;  // (height, width, 3)
-  capture::Image mask;     // (height, width, 1)
+  std::array<capture::Image, 2> references;  // (height, width, 4)
+  capture::Image mask;                       // (height, width, 1)
 };
 
-// Renders the reference of a frame with `samples` paths per pixel. Takes minutes at high samples.
+// Renders the reference of a frame twice, with half of `samples` (at least 2) paths per pixel each.
+// Takes minutes at high samples.
 Truth truth_of(const ShownFrame& shown, int samples);
 
-// The same frame at another effort may be compared as well.
+// The same frame at another effort may be compared as well. The references' noise is reported, and
+// is no part of the error.
 render::PictureError error_against(const Truth& truth, const ShownFrame& shown);
 
 }  // namespace studio

@@ -57,7 +57,7 @@ class LightsChart {
     render::ReferenceSettings settings;
     settings.samples = quick_ ? 64 : 400;
     reference_ = render_reference(shot_.inputs(), shot_.job, shot_.plate, settings);
-    mask_ = affected_mask(shot_, reference_);
+    mask_ = render::affected_mask(reference_, shot_.plate);
     for (std::uint32_t i = 0; i < 2; ++i) {
       BenchSky sky;
       sky.noise = 0.1F;
@@ -174,8 +174,8 @@ class LightsChart {
     job.lights = make_light_table(small.environment, {count, LightMethod::split});
     render::FrameResult result;
     render_frame(small.inputs(), job, small.half_plate, result);
-    const render::PictureError error =
-        render::picture_error(capture::to_float(result.rgba), truth, affected_mask(small, truth));
+    const render::PictureError error = render::picture_error(
+        capture::to_float(result.rgba), truth, render::affected_mask(truth, small.plate));
     return {value, error.relative_rms, job.lights.error_estimate, "ok"};
   }
 

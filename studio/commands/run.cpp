@@ -126,9 +126,11 @@ void run(const RunOptions& options, Console& console) {
   std::optional<render::PictureError> error;
   if (options.check_error && last.result) {
     error = error_against(truth_of(last, static_cast<int>(*options.check_error)), last);
-    console.say(fmt::format("error {:.3f} % (p99 {:.3f} %, delta E {:.2f}) over {} pixels",
-                            error->relative_rms * 100, error->p99 * 100, error->delta_e_mean,
-                            error->pixels));
+    console.say(
+        fmt::format("error {:.3f} % (p99 {:.3f} %, delta E {:.2f}) over {} pixels; the "
+                    "reference's own noise is {:.3f} %",
+                    error->relative_rms * 100, error->p99 * 100, error->delta_e_mean, error->pixels,
+                    error->reference_noise * 100));
   }
   console.figures(show_figures(set, status, error));
   if (!status.recorder.error.empty()) throw std::runtime_error(status.recorder.error);
@@ -147,7 +149,7 @@ Command run_command() {
             arguments.option("--record", o->record, "record video to this .mkv file");
             arguments.option("--exr", o->exr, "record EXR frames to this directory");
             arguments.flag("--watch", o->watch, "take the set file over whenever it changes");
-            arguments.option("--check-error", o->check_error, 1, 1 << 20,
+            arguments.option("--check-error", o->check_error, 2, 1 << 20,
                              "render the reference of the last frame with so many samples and "
                              "report the error");
             arguments.option("--fps", o->fps, 0.01, 1000,
