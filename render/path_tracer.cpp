@@ -19,6 +19,9 @@ constexpr float pi = std::numbers::pi_v<float>;
 constexpr float certain =
     std::numeric_limits<float>::infinity();  // density of a mirror's direction
 constexpr int roulette_depth = 4;
+// So many surfaces that a camera path meets straight on are split into their lobes, so that a weak
+// mirror over a dull ground shows its sun in every path, not in a few very bright ones.
+constexpr int split_depth = 2;
 // After a diffuse bounce or a lobe of this roughness, lobes are taken as at least this rough:
 // caustics are blurred by about two degrees, and keep their light, but a small sun's no longer come
 // as single white dots.
@@ -40,13 +43,18 @@ Vec3f cosine_direction(Vec3f normal, std::array<float, 2> random) {
   return dot(direction, direction) > 0.5F ? direction : normal;
 }
 
-// The shares of light by which the lobes of a surface are chosen, and their densities.
-struct Lobes {
-  float diffuse = 0, coat = 0, specular = 0,
-        transmission = 0;  // chances; they sum to 1, or are all 0
+}  // namespace
+
+// How many times each lobe of a surface is followed: in the mean once all together, chosen by their
+// shares of the light; or, split, every lobe that has a share once.
+struct PathLobes {
+  float diffuse = 0, coat = 0, specular = 0, transmission = 0;
   bool coat_mirror = false, specular_mirror = false;
 
-  Lobes(const StandardSurface& surface, const StandardWeights& weights, bool with_diffuse)
+  PathLobes(const StandardSurface& surface,
+            const StandardWeights& weights,
+            bool with_diffuse,
+            bool split)
       : diffuse(with_diffuse ? mean(weights.diffuse) : 0),
         coat(weights.coat),
         specular(mean(weights.specular)),
@@ -54,13 +62,32 @@ struct Lobes {
         coat_mirror(surface.clearcoat_roughness < mirror_roughness),
         specular_mirror(surface.roughness < mirror_roughness) {
     const float sum = diffuse + coat + specular + transmission;
-    if (!(sum > 0)) {
-      diffuse = coat = specular = transmission = 0;
-      return;
+    for (float* times : {&diffuse, &coat, &specular, &transmission}) {
+      *times = !(*times > 0) ? 0.0F : split ? 1.0F : *times / sum;
     }
-    diffuse /= sum, coat /= sum, specular /= sum, transmission /= sum;
   }
 };
+
+enum class PathLobe : std::uint8_t { none, diffuse, coat, specular, transmission };
+
+namespace {
+
+// One of them, in proportion.
+PathLobe chosen(const PathLobes& lobes, float choice) {
+  const std::array<std::pair<PathLobe, float>, 4> chances{
+      {{PathLobe::transmission, lobes.transmission},
+       {PathLobe::coat, lobes.coat},
+       {PathLobe::specular, lobes.specular},
+       {PathLobe::diffuse, lobes.diffuse}}};
+  PathLobe last = PathLobe::none;
+  for (const auto& [lobe, chance] : chances) {
+    if (!(chance > 0)) continue;
+    if (choice < chance) return lobe;
+    choice -= chance;
+    last = lobe;
+  }
+  return last;
+}
 
 // `direction` mirrored at the triangle itself.
 Vec3f other_side(const HitPoint& hit, Vec3f direction) {
@@ -75,7 +102,7 @@ struct LobeValue {
 };
 LobeValue lobe_value(const StandardSurface& surface,
                      const StandardWeights& weights,
-                     const Lobes& lobes,
+                     const PathLobes& lobes,
                      Vec3f view,
                      Vec3f direction,
                      bool with_diffuse) {
@@ -103,7 +130,7 @@ LobeValue lobe_value(const StandardSurface& surface,
 LobeValue folded_lobe_value(const HitPoint& hit,
                             const StandardSurface& surface,
                             const StandardWeights& weights,
-                            const Lobes& lobes,
+                            const PathLobes& lobes,
                             Vec3f view,
                             Vec3f direction,
                             bool with_diffuse) {
@@ -186,6 +213,7 @@ Vec3f PathTracer::lamp_irradiance(const HitPoint& hit, Vec3f normal) const {
 Vec3f PathTracer::environment_light(const HitPoint& hit,
                                     const StandardSurface& surface,
                                     const StandardWeights& weights,
+                                    const PathLobes& lobes,
                                     Vec3f view,
                                     SampleSequence& numbers) const {
   const auto sky = environment_.sample(numbers.next_pair());
@@ -193,7 +221,6 @@ Vec3f PathTracer::environment_light(const HitPoint& hit,
   const Vec3f l = sky->direction;
   if (!(dot(hit.geometric_normal, l) > 0)) return {};
   const float cosine = dot(surface.normal, l);
-  const Lobes lobes(surface, weights, rules_.diffuse_bounces);
   const LobeValue lobe =
       folded_lobe_value(hit, surface, weights, lobes, view, l, rules_.diffuse_bounces);
   Vec3f value = lobe.value * (1 / (sky->density + lobe.density));
@@ -214,21 +241,17 @@ Vec3f PathTracer::environment_light(const HitPoint& hit,
   return times(times(value, sky->radiance), passing);
 }
 
-// Chooses how the path goes on. False if it ends here.
+// Sends the path on by a lobe. False if it ends here.
 bool PathTracer::scatter(Walk& w,
                          const HitPoint& hit,
                          const StandardSurface& surface,
                          const StandardWeights& weights,
+                         const PathLobes& lobes,
+                         PathLobe by,
                          SampleSequence& numbers) const {
-  const Lobes lobes(surface, weights, rules_.diffuse_bounces);
+  if (by == PathLobe::none) return false;
   const Vec3f view = -w.direction;
-  float choice = numbers.next();
-  const auto chosen = [&choice](float chance) {
-    if (chance > 0 && choice < chance) return true;
-    choice -= chance;
-    return false;
-  };
-  if (chosen(lobes.transmission)) {
+  if (by == PathLobe::transmission) {
     // Straight through: the direction keeps the density that it was chosen with.
     const Vec3f passed = weights.transmission * (1 / lobes.transmission);
     w.share = times(w.share, passed);
@@ -247,7 +270,7 @@ bool PathTracer::scatter(Walk& w,
     return dot(direction, hit.geometric_normal) < 0 ? normalize(other_side(hit, direction))
                                                     : direction;
   };
-  const bool coat = chosen(lobes.coat);
+  const bool coat = by == PathLobe::coat;
   if (coat && lobes.coat_mirror) {
     w.share *= weights.coat / lobes.coat;
     w.glow_share = w.share;
@@ -255,7 +278,7 @@ bool PathTracer::scatter(Walk& w,
     leave(above(normalize(mirrored(view, surface.coat_normal))));
     return true;
   }
-  const bool specular = !coat && chosen(lobes.specular);
+  const bool specular = by == PathLobe::specular;
   if (specular && lobes.specular_mirror) {
     w.share = times(w.share, weights.specular) * (1 / lobes.specular);
     w.glow_share = w.share;
@@ -269,10 +292,8 @@ bool PathTracer::scatter(Walk& w,
     direction = sample_lobe(surface.coat_normal, view, surface.clearcoat_roughness, random);
   else if (specular)
     direction = sample_lobe(surface.normal, view, surface.roughness, random);
-  else if (lobes.diffuse > 0)
-    direction = cosine_direction(surface.normal, random);
   else
-    return false;
+    direction = cosine_direction(surface.normal, random);
   const float roughness = coat ? surface.clearcoat_roughness : specular ? surface.roughness : 1.0F;
   w.left_rough = w.left_rough || roughness >= caustic_roughness;
   direction = above(direction);
@@ -324,11 +345,31 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
                                         ? StandardWeights{.diffuse = surface.base}
                                         : standard_weights(surface, view);
     w.result.radiance += times(w.glow_share, surface.emission);
-    Vec3f light = environment_light(hit, surface, weights, view, numbers);
+    const bool split = w.kind == RayKind::camera && w.depth < split_depth;
+    const PathLobes lobes(surface, weights, rules_.diffuse_bounces, split);
+    Vec3f light = environment_light(hit, surface, weights, lobes, view, numbers);
     if (!lamps_.empty() && weights.diffuse != Vec3f{})
       light += times(weights.diffuse, lamp_irradiance(hit, surface.normal)) * (1 / pi);
     w.result.radiance += times(w.share, light);
-    if (!scatter(w, hit, surface, weights, numbers)) break;
+    if (split) {
+      // All but what goes straight on leave as paths of their own.
+      for (const auto& [lobe, times] :
+           {std::pair(PathLobe::coat, lobes.coat), std::pair(PathLobe::specular, lobes.specular),
+            std::pair(PathLobe::diffuse, lobes.diffuse)}) {
+        if (!(times > 0)) continue;
+        Walk part = w;
+        part.result = {};
+        if (!scatter(part, hit, surface, weights, lobes, lobe, numbers)) continue;
+        ++part.depth;
+        walk(part, numbers);
+        w.result.radiance += part.result.radiance;
+        w.met_virtual = w.met_virtual || part.met_virtual;
+      }
+    }
+    const PathLobe by = !split                   ? chosen(lobes, numbers.next())
+                        : lobes.transmission > 0 ? PathLobe::transmission
+                                                 : PathLobe::none;
+    if (!scatter(w, hit, surface, weights, lobes, by, numbers)) break;
     if (w.depth + 1 < roulette_depth) continue;
     const float survival = std::min(1.0F, largest(w.share));
     if (!(numbers.next() < survival)) break;

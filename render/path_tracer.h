@@ -34,6 +34,10 @@ struct CameraPath {
   Vec3f incoming;
 };
 
+// The lobes of a surface, and one of them: inside.
+struct PathLobes;
+enum class PathLobe : std::uint8_t;
+
 // Traces through one scene under one environment. Safe from any thread; all arguments must outlive
 // it. Unbiased, but for caustics of smooth surfaces on diffuse ones, which are blurred.
 //
@@ -76,12 +80,15 @@ class PathTracer {
   Vec3f environment_light(const HitPoint& hit,
                           const StandardSurface& surface,
                           const StandardWeights& weights,
+                          const PathLobes& lobes,
                           Vec3f view,
                           SampleSequence& numbers) const;
   bool scatter(Walk& w,
                const HitPoint& hit,
                const StandardSurface& surface,
                const StandardWeights& weights,
+               const PathLobes& lobes,
+               PathLobe by,
                SampleSequence& numbers) const;
   StandardSurface surface_at(const HitPoint& hit) const;
 

@@ -12,6 +12,7 @@
 
 #include "render/environment_sampler.h"
 #include "render/path_tracer.h"
+#include "render/sample_budget.h"
 #include "render/sample_sequence.h"
 #include "render/stand_in_parameters.h"
 #include "render/trace.h"
@@ -234,13 +235,52 @@ void check(const FrameInputs& inputs, const ReferenceSettings& settings) {
     throw std::invalid_argument("the reference needs at least one sample, and a depth of one");
 }
 
-// Calls pixel(x, y, sample numbers' maker) for every pixel, rows in parallel.
+// Calls pixel(x, y, index) for every pixel, rows in parallel.
 template <class F>
 void for_each_pixel(const DirectionTable& directions, F&& pixel) {
   tbb::parallel_for(0, directions.height, [&](int y) {
     prepare_thread();
-    for (int x = 0; x < directions.width; ++x) pixel(x, y);
+    for (int x = 0; x < directions.width; ++x) {
+      pixel(x, y, static_cast<std::uint32_t>(y * directions.width + x));
+    }
   });
+}
+
+constexpr int pilot_share = 8;      // of all samples, one in so many finds where noise is
+constexpr int pilot_estimates = 4;  // independent ones, whose spread is the noise
+constexpr int most_times = 64;      // a pixel may get so many times the mean
+constexpr std::uint32_t pilot_seed = 0x5EEDF00D;
+constexpr float brightest_noise = 16;  // brighter light is clipped by any display
+
+// How many samples each pixel gets. Rough estimates show where the picture is noisy; they are then
+// thrown away, as counts that depend on the samples counted would bias the picture.
+//
+// estimate(x, y, index, seed, first, count) gives RGB of a pixel from `count` samples.
+template <class F>
+std::vector<int> plan_samples(const DirectionTable& directions,
+                              const ReferenceSettings& settings,
+                              F&& estimate) {
+  const auto pixels =
+      static_cast<std::size_t>(directions.width) * static_cast<std::size_t>(directions.height);
+  const int each = settings.samples / (pilot_share * pilot_estimates);
+  if (each < 1) return std::vector<int>(pixels, settings.samples);
+  std::vector<float> variances(pixels);
+  for_each_pixel(directions, [&](int x, int y, std::uint32_t index) {
+    Vec3f sum{}, squares{};
+    for (int k = 0; k < pilot_estimates; ++k) {
+      const Vec3f rgb = estimate(x, y, index, settings.seed ^ pilot_seed, k * each, each);
+      const Vec3f v{std::min(rgb.x, brightest_noise), std::min(rgb.y, brightest_noise),
+                    std::min(rgb.z, brightest_noise)};
+      sum += v;
+      squares += times(v, v);
+    }
+    const Vec3f spread = squares - times(sum, sum) * (1.0F / pilot_estimates);
+    variances[index] = spread.x + spread.y + spread.z;
+  });
+  const auto left = static_cast<std::int64_t>(settings.samples - each * pilot_estimates) *
+                    static_cast<std::int64_t>(pixels);
+  return share_samples(variances, directions.width, left,
+                       std::max(1, settings.samples / pilot_share), settings.samples * most_times);
 }
 
 }  // namespace
@@ -263,17 +303,26 @@ capture::Image render_reference(const FrameInputs& inputs,
   const PathTracer tracer(*inputs.scene, environment, job.lights.lamps, rules);
   const Composite composite(tracer, settings.bounces);
   const PixelRays rays(directions, job.cam_from_set);
-  capture::Image picture = capture::make_image(directions.height, directions.width, 4);
-  for_each_pixel(directions, [&](int x, int y) {
+  const auto pixel_of = [&](int x, int y, std::uint32_t index, std::uint32_t seed, int first,
+                            int count) {
     Composite::Pixel pixel;
-    const auto index = static_cast<std::uint32_t>(y * directions.width + x);
-    for (int i = 0; i < settings.samples; ++i) {
-      SampleSequence numbers(settings.seed, index, static_cast<std::uint32_t>(i));
+    for (int i = first; i < first + count; ++i) {
+      SampleSequence numbers(seed, index, static_cast<std::uint32_t>(i));
       const auto [dx, dy] = numbers.next_pair();
       composite.sample(rays.origin(), rays.direction(x, y, dx - 0.5F, dy - 0.5F), numbers, pixel);
     }
     const Vec3f behind{plate.at(y, x, 0), plate.at(y, x, 1), plate.at(y, x, 2)};
-    const auto rgba = composite.finish(pixel, behind, settings.samples);
+    return composite.finish(pixel, behind, count);
+  };
+  const std::vector<int> counts = plan_samples(
+      directions, settings,
+      [&](int x, int y, std::uint32_t index, std::uint32_t seed, int first, int count) {
+        const auto rgba = pixel_of(x, y, index, seed, first, count);
+        return Vec3f{rgba[0], rgba[1], rgba[2]};
+      });
+  capture::Image picture = capture::make_image(directions.height, directions.width, 4);
+  for_each_pixel(directions, [&](int x, int y, std::uint32_t index) {
+    const auto rgba = pixel_of(x, y, index, settings.seed, 0, counts[index]);
     std::copy(rgba.begin(), rgba.end(), &picture.at(y, x));
   });
   return picture;
@@ -292,17 +341,21 @@ capture::Image photograph(const FrameInputs& inputs,
   const EnvironmentSampler environment(*inputs.environment);
   const PathTracer tracer(*inputs.scene, environment, {}, rules);
   const PixelRays rays(directions, cam_from_set);
-  capture::Image picture = capture::make_image(directions.height, directions.width, 3);
-  for_each_pixel(directions, [&](int x, int y) {
+  const auto pixel_of = [&](int x, int y, std::uint32_t index, std::uint32_t seed, int first,
+                            int count) {
     Sum sum;
-    const auto index = static_cast<std::uint32_t>(y * directions.width + x);
-    for (int i = 0; i < settings.samples; ++i) {
-      SampleSequence numbers(settings.seed, index, static_cast<std::uint32_t>(i));
+    for (int i = first; i < first + count; ++i) {
+      SampleSequence numbers(seed, index, static_cast<std::uint32_t>(i));
       const auto [dx, dy] = numbers.next_pair();
       const auto direction = rays.direction(x, y, dx - 0.5F, dy - 0.5F);
       if (direction) sum.add(tracer.camera_path(rays.origin(), *direction, numbers).radiance);
     }
-    const Vec3f rgb = sum.over(settings.samples);
+    return sum.over(count);
+  };
+  const std::vector<int> counts = plan_samples(directions, settings, pixel_of);
+  capture::Image picture = capture::make_image(directions.height, directions.width, 3);
+  for_each_pixel(directions, [&](int x, int y, std::uint32_t index) {
+    const Vec3f rgb = pixel_of(x, y, index, settings.seed, 0, counts[index]);
     picture.at(y, x, 0) = rgb.x;
     picture.at(y, x, 1) = rgb.y;
     picture.at(y, x, 2) = rgb.z;

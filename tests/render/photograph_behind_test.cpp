@@ -36,7 +36,8 @@ TEST(PhotographBehind, ShowsTheFloorInTheShadowOfWhatItLooksThrough) {
   const auto directions =
       calibrate::make_direction_table({"pinhole", 32, 32, {40, 40, 15.5, 15.5}});
   const auto camera = calibrate::look_at({0, 0, 6}, {0, 0, 0}, 0);
-  const ReferenceSettings settings{.samples = 32, .bounces = true};
+  // So few that photograph() gives every pixel as many.
+  const ReferenceSettings settings{.samples = 31, .bounces = true};
   const FrameInputs inputs{&scene, &directions, &light};
   const capture::Image behind = photograph_behind(inputs, camera, settings);
   const capture::Image before = photograph(inputs, camera, settings);

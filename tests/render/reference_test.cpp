@@ -136,6 +136,49 @@ TEST(RenderReference, ShadesAPlaneAsItsIntegralSays) {
               0.004);
 }
 
+TEST(RenderReference, SplitsTwoSurfacesIntoTheirLobesAsTheirIntegralsSay) {
+  SunAndSky made;
+  made.sun_radius_rad = 0.1F;
+  const Environment sky = make_sun_and_sky(made, 128);
+  StandardParameters paint;
+  paint.base_color[1] = 0.3F;
+  paint.roughness = 0;
+  StandardParameters glass;
+  glass.transmission = 1;
+  glass.roughness = 0;
+  glass.base_color[1] = 0.7F;
+  SceneDescription description = make_scene(make_square(5), paint);
+  auto pane = std::make_shared<Mesh>(*make_square(0.03F));
+  pane->materials = {1};
+  description.materials.push_back(make_standard_material("glass", glass));
+  description.meshes.push_back(pane);
+  // So near the camera, and so small, that it hides none of the floor's light.
+  description.instances.emplace_back().mesh = 1;
+  description.instances[1].set_from_object = {1, 0, 0, 1.9F, 0, 1, 0, 0, 0, 0, 1, 1.9F};
+  const Scene scene(description);
+  const Shot shot(1, 1, 400, {2, 0, 2}, {0, 0, 0});
+
+  StandardSurface surface{};
+  surface.base = {1, 0.3F, 1};
+  surface.normal = surface.coat_normal = {0, 0, 1};
+  const Vec3f view = normalize(Vec3f{1, 0, 1});
+  const float mirrored_sky = radiance_of(sky, normalize(Vec3f{-1, 0, 1}), 0).y;
+  const StandardWeights floor = standard_weights(surface, view);
+  const float floor_light =
+      floor.diffuse.y * irradiance_of(sky, {0, 0, 1}).y / pi + floor.specular.y * mirrored_sky;
+  surface.base = {1, 0.7F, 1};
+  surface.transmission = 1;
+  const StandardWeights through = standard_weights(surface, view);
+  const float expected = through.specular.y * mirrored_sky + through.transmission.y * floor_light;
+  ReferenceSettings settings = with_samples(4096);
+  double mean = 0;
+  for (const std::uint32_t seed : {1U, 2U, 3U, 4U}) {
+    settings.seed = seed;
+    mean += shot.reference(scene, sky, settings).at(0, 0, 1) / 4;
+  }
+  EXPECT_NEAR(mean / expected, 1, 0.01);
+}
+
 TEST(RenderReference, GathersALobeAsItsIntegralSays) {
   SunAndSky made;
   made.sun_radius_rad = 0.06F;

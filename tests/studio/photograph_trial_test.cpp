@@ -64,7 +64,7 @@ class PhotographTrialTest : public testing::Test {
     EXPECT_EQ(read.studio.width, 96);
     EXPECT_EQ(read.studio.texture_size, 128);
     EXPECT_EQ(read.world, DemoWorld::court);
-    trial_ = new PhotographTrial(set_, {.photograph_samples = 8, .reference_samples = 8}, ignore);
+    trial_ = new PhotographTrial(set_, {.photograph_samples = 8, .reference_samples = 32}, ignore);
   }
   static void TearDownTestSuite() {
     delete trial_;
