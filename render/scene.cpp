@@ -363,6 +363,29 @@ void Scene::Impl::add_part(std::uint32_t mesh_index,
   parts.push_back(std::move(part));
 }
 
+namespace {
+
+// The linear change of the normal over a triangle, made symmetric. `d1` and `d2` are its changes
+// along the edges `e1` and `e2`.
+void find_turn(Vec3f e1, Vec3f e2, Vec3f d1, Vec3f d2, HitPoint& hit) {
+  const float x1 = length(e1);
+  if (!(x1 > 0)) return;
+  const Vec3f edge = e1 * (1 / x1);
+  const Vec3f across = cross(hit.geometric_normal, edge);
+  const float x2 = dot(e2, edge), y2 = dot(e2, across);
+  // Of a sliver nothing can be said across it.
+  if (!(std::abs(y2) > 1e-3F * (x1 + std::abs(x2)))) return;
+  const float along_a = dot(d1, edge) / x1, along_b = dot(d1, across) / x1;
+  const float across_a = (dot(d2, edge) - along_a * x2) / y2;
+  const float across_b = (dot(d2, across) - along_b * x2) / y2;
+  hit.edge = edge;
+  hit.turn_along = along_a;
+  hit.turn_across = across_b;
+  hit.turn_both = 0.5F * (along_b + across_a);
+}
+
+}  // namespace
+
 HitPoint Scene::Impl::hit_point(
     unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
   HitPoint hit;
@@ -390,6 +413,13 @@ HitPoint Scene::Impl::hit_point(
     Vec3f n = normals[a] * w + normals[b] * u + normals[c] * v;
     n = placed ? normalize(n) : transform_normal(normal_matrices[hit.instance], n);
     if (dot(n, n) > 0.5F) {
+      const auto turned = [&](std::uint32_t corner) {
+        const Vec3f turned_n =
+            placed ? normals[corner]
+                   : transform_normal(normal_matrices[hit.instance], normals[corner]);
+        return dot(n, hit.geometric_normal) < 0 ? -turned_n : turned_n;
+      };
+      find_turn(p1 - p0, p2 - p0, turned(b) - turned(a), turned(c) - turned(a), hit);
       hit.normal = dot(n, hit.geometric_normal) < 0 ? -n : n;
       // An interpolated normal may lean away from the viewer near silhouettes: bend it back.
       const float away = dot(hit.normal, incoming);
@@ -425,7 +455,7 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
       hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
                 RTCHitN_v(args->hit, n, lane), incoming);
-  const ShadeContext context{&description, nullptr};
+  const ShadeContext context{&description, nullptr, {}};
   return shaders[hit.material]->transmittance(context, description.materials[hit.material], hit,
                                               incoming, kind);
 }

@@ -59,11 +59,23 @@ struct HitPoint {
   Vec3f normal;            // interpolated vertex normal, unit, flipped to the same side
   Vec3f tangent;           // unit, with handedness; zero if the mesh has none
   float handedness = 1;
-  float u = 0, v = 0;      // texture coordinates
+  float u = 0, v = 0;  // texture coordinates
+  // How the interpolated normal turns, per metre along `edge` (unit, in the triangle) and across
+  // it; 0 where it does not.
+  Vec3f edge;
+  float turn_along = 0, turn_across = 0, turn_both = 0;
   float uv_per_metre = 0;  // texture coordinate units per metre of surface, for mip levels
   std::uint32_t material = 0;
   std::uint32_t instance = 0;
 };
+
+// By how much the interpolated normal turns over a small step from the hit, in metres.
+inline Vec3f turn_of_normal(const HitPoint& hit, Vec3f step) {
+  const Vec3f across = cross(hit.geometric_normal, hit.edge);
+  const float a = dot(step, hit.edge), b = dot(step, across);
+  return hit.edge * (hit.turn_along * a + hit.turn_both * b) +
+         across * (hit.turn_both * a + hit.turn_across * b);
+}
 
 // The compiled scene. Immutable once built; safe from any thread. Meshes that are used once are
 // placed directly, those used more often through Embree instances.

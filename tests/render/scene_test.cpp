@@ -5,7 +5,9 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
+#include "plain_shapes.h"
 #include "render/standard.h"
 #include "render/trace.h"
 
@@ -47,6 +49,42 @@ TEST(Scene, GivesPositionNormalAndTextureCoordinatesOfAHit) {
   EXPECT_NEAR(point.u, 0.75F, 1e-6F);
   EXPECT_NEAR(point.v, 0.625F, 1e-6F);
   EXPECT_NEAR(point.uv_per_metre, 0.5F, 1e-6F);
+}
+
+TEST(TurnOfNormal, IsOneOverTheRadiusOnASphereWhicheverWay) {
+  for (const bool twice : {false, true}) {
+    // Twice: through Embree's instances. The second one's scale makes the radius 6.
+    SceneDescription description = make_scene(make_sphere(2, 96), {});
+    if (twice) {
+      description.instances.push_back(description.instances[0]);
+      description.instances[0].set_from_object = {3, 0, 0, 0, 0, 3, 0, 0, 0, 0, 3, 0};
+      description.instances[1].set_from_object[3] = 100;
+    }
+    const float radius = twice ? 6 : 2;
+    const Scene scene(description);
+    std::mt19937 random(1);
+    std::uniform_real_distribution<float> place(-0.6F, 0.6F);
+    for (int i = 0; i < 50; ++i) {
+      const Vec3f from{place(random) * radius, place(random) * radius, 20};
+      const auto hit = look_down(scene, from);
+      ASSERT_TRUE(hit);
+      const HitPoint point =
+          scene.hit_point(hit->geom_id, hit->prim_id, hit->inst_id, hit->u, hit->v, {0, 0, -1});
+      for (const Vec3f way : {Vec3f{1, 0, 0}, Vec3f{0, 1, 0}, Vec3f{1, -1, 0}}) {
+        const Vec3f step = normalize(cross(way, point.geometric_normal)) * 0.01F;
+        EXPECT_LE(length(turn_of_normal(point, step) * radius - step), 0.05F * length(step));
+      }
+    }
+  }
+}
+
+TEST(TurnOfNormal, IsNoneOnAFlatSurface) {
+  const Scene scene(one_square());
+  const auto hit = look_down(scene, {0.5F, -0.25F, 5});
+  ASSERT_TRUE(hit);
+  const HitPoint point =
+      scene.hit_point(hit->geom_id, hit->prim_id, hit->inst_id, hit->u, hit->v, {0, 0, -1});
+  EXPECT_EQ(turn_of_normal(point, {1, 0, 0}), Vec3f{});
 }
 
 TEST(Scene, GivesTheSameHitPlacedOnceOrAsAnInstance) {
