@@ -56,8 +56,8 @@ class StandInShader final : public render::Shader {
     for (ShadePoint* p : points) {
       const StandInParameters block = block_of(context.scene->materials[p->hit.material]);
       p->light_normal = p->hit.normal;
-      p->receives_light =
-          p->kind == RayKind::camera && (block.catches_shadow || block.catches_light);
+      p->receives_light = p->kind == RayKind::camera &&
+                          (block.catches_shadow || block.catches_light || block.catches_reflection);
     }
   }
 
@@ -77,7 +77,8 @@ class StandInShader final : public render::Shader {
       if (block.catches_light && p->irradiance_lamps != Vec3f{}) {
         p->clipped_plate = add_lamps(*p, block);
       }
-      if (block.catches_reflection && block.reflectance > 0) push_reflection(*p, block, rays);
+      if (block.catches_reflection && block.reflectance > 0)
+        push_reflection(context, *p, block, rays);
     }
   }
 
@@ -100,14 +101,23 @@ class StandInShader final : public render::Shader {
     return clipped;
   }
 
-  static void push_reflection(const ShadePoint& p,
+  static void push_reflection(const ShadeContext& context,
+                              ShadePoint& p,
                               const StandInParameters& block,
                               render::RaySink& rays) {
     const Vec3f view = -p.incoming;
     const float f = render::schlick(block.reflectance, std::abs(dot(p.hit.normal, view)));
     const Vec3f direction = normalize(render::mirrored(view, p.hit.normal));
-    rays.push(p, {render::offset_origin(p.hit, direction), direction, p.throughput * f,
-                  block.roughness, RayKind::difference});
+    // The plate shows the compact sources mirrored; those that virtual objects hide are taken out.
+    p.radiance -= render::compact_light(context, p.compact_open & ~p.compact_seen, p.hit.normal,
+                                        view, block.roughness, {}) *
+                  f;
+    rays.push(p, {render::offset_origin(p.hit, direction),
+                  direction,
+                  p.throughput * f,
+                  block.roughness,
+                  {},
+                  RayKind::difference});
   }
 };
 

@@ -83,6 +83,93 @@ Vec3f bilinear(const capture::Image& map, MapPoint at) {
   return top * (1 - fy) + bottom * fy;
 }
 
+constexpr float mirror_alpha = 4e-4F;  // of standard.h's mirror_roughness
+
+// Half of what a lobe mirrors head-on lies within 2 alpha of the mirrored direction, as half of a
+// disc of this width times alpha does.
+constexpr float lobe_width = 5.6F;
+
+// Interpolation between texels blurs as a disc of so many texels does.
+constexpr float blur_texels = 1.7F;
+constexpr float most_steps = 8;  // along a cone that is longer than wide
+
+float alpha_of(float roughness) {
+  return roughness > 0 ? std::min(roughness * roughness, 1.0F) : 0.0F;
+}
+
+// A cone as discs of one width, side by side along its longer side.
+struct ConeSteps {
+  float count = 1;
+  float width_rad = 0;
+  Vec3f step;
+};
+
+// No finer than what the lobe or the map blurs.
+ConeSteps steps_of(const Environment& env, float alpha, const Spread& spread) {
+  const float aa = dot(spread.a, spread.a), bb = dot(spread.b, spread.b);
+  if (!(aa + bb > 0) || !std::isfinite(aa + bb)) return {};
+  const float longer = std::sqrt(std::max(aa, bb)), shorter = std::sqrt(std::min(aa, bb));
+  const float texel_rad = pi / static_cast<float>(env.smoothed[0].height);
+  const float narrow = std::max({shorter, lobe_width * alpha, blur_texels * texel_rad});
+  const float count = std::clamp(std::ceil(longer / narrow), 1.0F, most_steps);
+  return {count, std::sqrt(std::max(longer / count, shorter) * shorter),
+          (aa > bb ? spread.a : spread.b) * (1 / count)};
+}
+
+// Mean over a disc of directions.
+Vec3f in_cone(const Environment& env, MapPoint at, float width_rad) {
+  const float texel_rad = pi / static_cast<float>(env.smoothed[0].height);
+  const float texels = width_rad / (blur_texels * texel_rad);
+  if (!(texels > 1) || env.halved.empty()) return bilinear(env.smoothed[0], at);
+  const float level = std::min(std::log2(texels), static_cast<float>(env.halved.size()));
+  const auto below = std::min(static_cast<std::size_t>(level), env.halved.size() - 1);
+  const float f = level - static_cast<float>(below);
+  const capture::Image& sharp = below == 0 ? env.smoothed[0] : env.halved[below - 1];
+  return bilinear(sharp, at) * (1 - f) + bilinear(env.halved[below], at) * f;
+}
+
+// GGX's lobe is a sum of discs: the share s^2 / (1 + s)^2 of its light is in those whose radius, as
+// seen by the mirrored direction, is at most 2 alpha sqrt(s). Here they stand for octaves of s:
+// radius over alpha, and share. The far ones are weak, but a sun in them is not.
+struct LobeDisc {
+  float radius, share;
+};
+constexpr std::array<LobeDisc, 6> lobe_discs{
+    {{1, .1111F}, {2, .3333F}, {4, .3457F}, {8, .1502F}, {16, .0443F}, {32, .0154F}}};
+
+// Where a lobe lies among the smoothed levels: at 1 or above it is all of them, below it mixes the
+// first of them with narrower cones.
+float level_of(const Environment& env, float alpha, float spread_rad) {
+  const float width_rad = std::hypot(lobe_width * alpha, spread_rad);
+  return std::min(std::sqrt(width_rad / lobe_width), 1.0F) *
+         static_cast<float>(env.smoothed.size() - 1);
+}
+
+float share_of_levels(const Environment& env, float alpha, float spread_rad) {
+  return std::clamp(2 * level_of(env, alpha, spread_rad) - 1, 0.0F, 1.0F);
+}
+
+// Mean over a lobe, seen by a sample whose cone is so wide.
+Vec3f in_lobe(const Environment& env, MapPoint at, float alpha, float spread_rad) {
+  const float level = level_of(env, alpha, spread_rad);
+  if (level >= 1) {
+    const auto below = std::min(static_cast<std::size_t>(level), env.smoothed.size() - 2);
+    const float f = level - static_cast<float>(below);
+    return bilinear(env.smoothed[below], at) * (1 - f) + bilinear(env.smoothed[below + 1], at) * f;
+  }
+  Vec3f narrow{};
+  if (alpha < mirror_alpha) {
+    narrow = in_cone(env, at, spread_rad);
+  } else {
+    for (const auto& [radius, share] : lobe_discs) {
+      narrow += in_cone(env, at, std::hypot(2 * radius * alpha, spread_rad)) * share;
+    }
+  }
+  if (level <= 0.5F) return narrow;
+  const float f = 2 * level - 1;
+  return narrow * (1 - f) + bilinear(env.smoothed[1], at) * f;
+}
+
 // `level` = `map` with every value as it counts.
 void copy_counted(const capture::Image& map, capture::Image& level) {
   level.height = map.height;
@@ -90,6 +177,13 @@ void copy_counted(const capture::Image& map, capture::Image& level) {
   level.channels = map.channels;
   level.pixels.resize(map.pixels.size());
   std::ranges::transform(map.pixels, level.pixels.begin(), counted_radiance);
+}
+
+// Down to 8 rows: cones as wide as those texels are lobes of the smoothed levels.
+std::size_t halvings(int height) {
+  std::size_t count = 0;
+  for (; height % 2 == 0 && height >= 16; height /= 2) ++count;
+  return count;
 }
 
 }  // namespace
@@ -119,18 +213,18 @@ double texel_solid_angle(int row, int width, int height) {
   return (std::cos(row * step_rad) - std::cos((row + 1) * step_rad)) * 2 * std::numbers::pi / width;
 }
 
-Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness) {
+Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness, const Spread& spread) {
   if (!std::isfinite(direction.x + direction.y + direction.z)) return {};
   if (env.smoothed.empty())
     return env.radiance.empty() ? Vec3f{} : bilinear(env.radiance, map_point(direction));
-  const auto last = static_cast<float>(env.smoothed.size() - 1);
-  const float level = roughness > 0 ? std::min(roughness, 1.0F) * last : 0.0F;
-  const auto below = static_cast<std::size_t>(level);
-  const float f = level - static_cast<float>(below);
-  const MapPoint at = map_point(direction);
-  const Vec3f smoother = bilinear(env.smoothed[below], at);
-  if (f == 0) return smoother;
-  return smoother * (1 - f) + bilinear(env.smoothed[below + 1], at) * f;
+  const float alpha = alpha_of(roughness);
+  const ConeSteps cone = steps_of(env, alpha, spread);
+  Vec3f at = direction - cone.step * (0.5F * (cone.count - 1));
+  Vec3f sum{};
+  for (float k = 0; k < cone.count; ++k, at += cone.step) {
+    sum += in_lobe(env, map_point(at), alpha, cone.width_rad);
+  }
+  return sum * (1 / cone.count);
 }
 
 Vec3f irradiance_of(const Environment& env, Vec3f normal) {
@@ -161,13 +255,36 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal) {
 }
 
 void smooth_for_reflections(Environment& env, int levels) {
+  smooth_for_reflections(env, {}, levels);
+}
+
+void smooth_for_reflections(Environment& env, const CompactTexels& compact, int levels) {
   check(env);
   if (levels < 2)
     throw std::invalid_argument("an environment needs at least 2 levels of roughness");
+  const int compact_height = compact.height;
+  const auto side = static_cast<std::size_t>(compact_height);
+  if (compact_height > 0 &&
+      (env.radiance.height % compact_height != 0 || compact.is_compact.size() != 2 * side * side)) {
+    throw std::invalid_argument("the map of compact sources does not fit the environment");
+  }
   env.smoothed.resize(static_cast<std::size_t>(levels));
   copy_counted(env.radiance, env.smoothed[0]);
+  env.halved.resize(halvings(env.radiance.height));
+  for (std::size_t k = 0; k < env.halved.size(); ++k) {
+    const capture::Image& from = k == 0 ? env.smoothed[0] : env.halved[k - 1];
+    area_average(from, from.height / 2, env.halved[k]);
+  }
+  env.compact_apart = compact_height > 0;
   capture::Image shrunk;
   const capture::Image* source = &env.smoothed[0];
+  if (env.compact_apart) {
+    shrunk = area_averaged(*source, compact_height);
+    for (std::size_t i = 0; i < compact.is_compact.size(); ++i) {
+      if (compact.is_compact[i] != 0) std::fill_n(&shrunk.pixels[3 * i], 3, 0.0F);
+    }
+    source = &shrunk;
+  }
   for (int k = 1; k < levels; ++k) {
     const float roughness = static_cast<float>(k) / static_cast<float>(levels - 1);
     const LobeFilter& filter = shared_lobe_filter(roughness * roughness);
@@ -178,6 +295,12 @@ void smooth_for_reflections(Environment& env, int levels) {
     }
     filter.apply(*source, env.smoothed[static_cast<std::size_t>(k)]);
   }
+}
+
+float share_without_compact(const Environment& env, float roughness, const Spread& spread) {
+  if (!env.compact_apart) return 0;
+  const float alpha = alpha_of(roughness);
+  return share_of_levels(env, alpha, steps_of(env, alpha, spread).width_rad);
 }
 
 Environment environment_from_map(const capture::Image& map, double yaw_rad, int height) {

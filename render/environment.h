@@ -23,6 +23,12 @@ struct Environment {
   // k / (levels - 1), each (level_height[k], 2 * level_height[k], 3). Level 0 is `radiance` itself,
   // with not-a-number and negative values as 0.
   std::vector<capture::Image> smoothed;
+  // Level 0 of it, averaged over 2x2, 4x4, ... texels (halved[0] is half as high), for narrow
+  // cones.
+  std::vector<capture::Image> halved;
+  // Levels from 1 on lack the light of the sources that the light table marks as compact: rough
+  // lobes see those one by one, where nothing hides them.
+  bool compact_apart = false;
   float unseen_share = 0;  // of the irradiance on a surface that faces up: filled, not measured
 };
 
@@ -46,18 +52,43 @@ std::array<float, 2> texel_of_direction(Vec3f direction, int width, int height);
 // Solid angle of each texel of a row, in steradians.
 double texel_solid_angle(int row, int width, int height);
 
-// Radiance in a direction (unit), bilinear; `roughness` 0..1 picks between smoothed levels, and
-// `radiance` where there are none. A direction that is not finite gives 0.
-Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness);
+// How directions change across a sample's cone, one way and the other: full widths in radians, both
+// perpendicular to the middle direction. Nothing: one ray.
+struct Spread {
+  Vec3f a, b;
+};
+
+// Radiance in a direction (unit), as a lobe of `roughness` 0..1 mirrors it to a sample whose cone
+// of directions has that spread: what is narrower than the first smoothed level comes from the
+// halved ones, in several steps along a cone that is longer than wide, and all from `radiance`
+// where neither is filled. A direction that is not finite gives 0; a spread that is not counts as
+// none.
+Vec3f radiance_of(const Environment& env,
+                  Vec3f direction,
+                  float roughness,
+                  const Spread& spread = {});
 
 // Irradiance on a surface that faces `normal` (unit), summed over all texels.
 Vec3f irradiance_of(const Environment& env, Vec3f normal);
 
-// Fills `smoothed` with `levels` (at least 2) levels. About 2 ms for 512x256. The lobe is that of a
-// surface seen head-on, the same all around, of alpha = roughness^2; what it would send below the
-// surface is mirrored up again, as in standard.h, so every level keeps a white map white.
-// Throws std::invalid_argument as check(), or if levels is below 2.
+// Fills `smoothed` with `levels` (at least 2) levels, and `halved`. About 2 ms for 512x256. The
+// lobe is that of a surface seen head-on, the same all around, of alpha = roughness^2; what it
+// would send below the surface is mirrored up again, as in standard.h, so every level keeps a white
+// map white. Throws std::invalid_argument as check(), or if levels is below 2.
 void smooth_for_reflections(Environment& env, int levels = 6);
+
+// Texels of compact sources: a coarse map (height, 2 * height), 1 where there is one.
+struct CompactTexels {
+  int height = 0;  // divides the environment's; 0 = none
+  std::vector<std::uint8_t> is_compact;
+};
+
+// The same with the light of those texels left out of all levels but the first (compact_apart).
+// Throws also if that map is not of its size, or its height does not divide the environment's.
+void smooth_for_reflections(Environment& env, const CompactTexels& compact, int levels = 6);
+
+// The share of a lobe's light that comes from levels that compact sources are left out of, 0..1.
+float share_without_compact(const Environment& env, float roughness, const Spread& spread);
 
 // The environment of a whole latitude-longitude map (any height, twice as wide, 3 channels), row 0
 // up and its middle column towards azimuth yaw_rad, averaged or interpolated to `height` rows. All

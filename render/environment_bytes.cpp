@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t environment_magic = 0x324E4550;  // "PEN2"
+constexpr std::uint32_t environment_magic = 0x334E4550;  // "PEN3"
 
 void put(ByteWriter& out, const capture::Image& image) {
   out.put(image.height), out.put(image.width), out.put(image.channels);
@@ -35,8 +35,11 @@ std::vector<std::byte> serialize(const Environment& environment) {
   put(out, environment.radiance);
   out.put_all(environment.seen);
   out.put(environment.unseen_share);
-  out.put(static_cast<std::uint64_t>(environment.smoothed.size()));
-  for (const capture::Image& level : environment.smoothed) put(out, level);
+  out.put(environment.compact_apart);
+  for (const auto* levels : {&environment.smoothed, &environment.halved}) {
+    out.put(static_cast<std::uint64_t>(levels->size()));
+    for (const capture::Image& level : *levels) put(out, level);
+  }
   return out.take();
 }
 
@@ -47,12 +50,15 @@ Environment parse_environment(std::span<const std::byte> bytes) {
   environment.radiance = get_image(in);
   in.get_all(environment.seen);
   in.get(environment.unseen_share);
+  in.get(environment.compact_apart);
   const std::size_t texels = environment.radiance.pixels.size() / 3;
   if (!environment.seen.empty() && environment.seen.size() != texels) {
     in.fail("has a coverage of another size than its map");
   }
-  for (std::size_t n = in.get_count(3 * sizeof(int) + sizeof(std::uint64_t)); n > 0; --n) {
-    environment.smoothed.push_back(get_image(in));
+  for (auto* levels : {&environment.smoothed, &environment.halved}) {
+    for (std::size_t n = in.get_count(3 * sizeof(int) + sizeof(std::uint64_t)); n > 0; --n) {
+      levels->push_back(get_image(in));
+    }
   }
   in.expect_end();
   return environment;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 
 #include "render/lobe_filter.h"
@@ -32,7 +33,8 @@ LightTable LightFollower::follow(const Environment& env, const LightFollowerSett
   LightTable table;
   table.unseen_share = env.unseen_share;
   std::vector<RegionLight> sums;
-  if (regions_.height == map_.height && made_with_ == settings.table) {
+  if (regions_.height == map_.height && made_height_ == env.radiance.height &&
+      made_with_ == settings.table) {
     sums = sum_regions(regions_, map_, env.radiance);
   }
   if (sums.empty() || (total_luminance(sums) > 0 && has_moved(sums, settings.tolerance_rad))) {
@@ -56,12 +58,33 @@ std::vector<RegionLight> LightFollower::make_anew(const Environment& env,
                                                   const LightTableSettings& settings) {
   regions_ = cut_light_regions(map_, settings);
   made_with_ = settings;
+  made_height_ = env.radiance.height;
   lights_.clear();
   std::vector<RegionLight> sums = sum_regions(regions_, map_, env.radiance);
   for (const RegionLight& sum : sums) lights_.push_back({make_light(sum), sum.irradiance});
   averaged_frames_ = 0;
   ++version_;
+  mark_compact();
   return sums;
+}
+
+void LightFollower::mark_compact() {
+  compact_ = {};
+  std::vector<std::size_t> bright;
+  for (std::size_t i = 0; i < lights_.size(); ++i) {
+    if (regions_.bright[i] != 0) bright.push_back(i);
+  }
+  std::ranges::sort(bright, std::greater(), [this](std::size_t i) {
+    return std::pair(luminance_of(lights_[i].irradiance), i);
+  });
+  bright.resize(std::min(bright.size(), most_compact_lights));
+  if (bright.empty() || made_height_ % regions_.height != 0) return;
+  for (const std::size_t i : bright) lights_[i].light.compact = 1;
+  compact_.height = regions_.height;
+  compact_.is_compact.reserve(regions_.light.size());
+  for (const std::size_t i : regions_.light) {
+    compact_.is_compact.push_back(static_cast<std::uint8_t>(lights_[i].light.compact));
+  }
 }
 
 bool LightFollower::has_moved(const std::vector<RegionLight>& sums, float tolerance_rad) const {

@@ -27,6 +27,9 @@ class LightFollower {
   // The table of the next frame. Its version grows when directions change. A black frame gives an
   // empty table, and directions wait. Throws as make_light_table().
   LightTable follow(const Environment& env, const LightFollowerSettings& settings);
+  // Where the lights that the last table marks as compact lie: the brightest of bright sources. To
+  // be left out of the environment's smoothed levels, else their light counts twice.
+  const CompactTexels& compact_texels() const { return compact_; }
 
  private:
   // A light with its averaged energy.
@@ -36,12 +39,15 @@ class LightFollower {
   };
 
   std::vector<RegionLight> make_anew(const Environment& env, const LightTableSettings& settings);
+  void mark_compact();
   bool has_moved(const std::vector<RegionLight>& sums, float tolerance_rad) const;
   void take_energies(const std::vector<RegionLight>& sums, const LightFollowerSettings& settings);
 
   capture::Image map_;
   LightRegions regions_;
+  CompactTexels compact_;
   LightTableSettings made_with_;
+  int made_height_ = 0;  // of the environment
   std::vector<Followed> lights_;
   int averaged_frames_ = 0;
   std::uint64_t version_ = 0;

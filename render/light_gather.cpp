@@ -421,9 +421,22 @@ class CellVisibility {
   std::array<CellMask, GatherWorkspace::group> tinted_{};
 };
 
+// Notes which pixels a compact light shines on, and which see it.
+void set_compact(Receivers& r, const CellMask& lit, const CellMask& seen, std::uint32_t flag) {
+  for (std::size_t word = 0; word < 4; ++word) {
+    for (std::uint64_t bits = lit[word]; bits != 0; bits &= bits - 1) {
+      const int bit = std::countr_zero(bits);
+      const std::size_t k = word * 64 + static_cast<std::size_t>(bit);
+      r.compact_open[k] |= flag;
+      if (seen[word] >> bit & 1) r.compact_seen[k] |= flag;
+    }
+  }
+}
+
 void clear_sums(Receivers& r) {
   r.open_r.fill(0), r.open_g.fill(0), r.open_b.fill(0);
   r.lost_r.fill(0), r.lost_g.fill(0), r.lost_b.fill(0);
+  r.compact_open.fill(0), r.compact_seen.fill(0);
 }
 
 }  // namespace
@@ -447,6 +460,7 @@ bool gather_cell(const LightContext& context,
   }
   const bool any_real_first = real_first != CellMask{};
   bool complete = memory.room != nullptr;
+  unsigned compact = 0;  // lights so far
 
   for (std::size_t first = 0; first < lights.size(); first += GatherWorkspace::group) {
     const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lights.size() - first);
@@ -494,6 +508,10 @@ bool gather_cell(const LightContext& context,
       if (complete) std::copy_n(w.seen.begin(), count, memory.room + first);
     }
     add_hidden(r, group, std::span(w.lit).first(count), std::span(w.seen).first(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      if (group[i].compact == 0) continue;
+      set_compact(r, w.lit[i], w.seen[i], std::uint32_t{1} << compact++);
+    }
     for (const auto& tint : w.tints) add_lost(r, tint.point, lights[tint.light], tint.lost_share);
   }
   return complete;
@@ -506,19 +524,27 @@ void gather_points(const LightContext& context,
   clear_sums(r);
   const auto& lights = context.table->lights;
   const bool real = context.scene->has_real_blockers();
-  const auto stride_of = [&](std::size_t k) -> std::uint32_t {
-    if (context.effort->interleave == 1 || r.share[k] >= 0.5F) return 1;
+  // Compact lights are few and strong: all points test all of them.
+  const auto stride_of = [&](std::size_t k, const DirectionalLight& light) -> std::uint32_t {
+    if (light.compact != 0 || context.effort->interleave == 1 || r.share[k] >= 0.5F) return 1;
     return r.share[k] >= 0.2F ? 2 : r.share[k] >= 0.05F ? 4 : 8;
   };
+  std::array<std::uint32_t, most_lights> flags;
+  std::uint32_t flag = 1;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    flags[i] = lights[i].compact != 0 ? flag : 0;
+    if (lights[i].compact != 0) flag <<= 1;
+  }
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
+    if (blocked) r.compact_seen[k] &= ~flags[i];
     if (!blocked && share == Vec3f{1, 1, 1}) return;
     const Vec3f lost = blocked ? Vec3f{1, 1, 1} : Vec3f{1, 1, 1} - share;
-    add_lost(r, k, lights[i], lost * static_cast<float>(stride_of(k)));
+    add_lost(r, k, lights[i], lost * static_cast<float>(stride_of(k, lights[i])));
   };
   for (std::uint32_t i = 0; i < lights.size(); ++i) {
     const Vec3f l = lights[i].direction;
     for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-      const std::uint32_t stride = stride_of(k);
+      const std::uint32_t stride = stride_of(k, lights[i]);
       if ((i + k) % stride != 0) continue;
       const float cosine = cosine_at(r, k, l);
       if (!(cosine > 0) || !(r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0)) continue;
@@ -533,6 +559,8 @@ void gather_points(const LightContext& context,
       r.open_r[k] += weight * lights[i].irradiance.x;
       r.open_g[k] += weight * lights[i].irradiance.y;
       r.open_b[k] += weight * lights[i].irradiance.z;
+      r.compact_open[k] |= flags[i];
+      r.compact_seen[k] |= flags[i];
       add_ray(w, r, k, i, l, r.mask[k]);
       if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }

@@ -28,6 +28,8 @@ struct Receivers {
       lost_b;                                      // out: what virtual objects block
   std::array<std::uint32_t, cell_pixels> surface;  // same number = same object and material
   std::array<std::uint32_t, cell_pixels> mask;     // what blocks: mask_virtual, mask_real_blocker
+  // out, bit i = the i-th compact light: shines on the point if nothing virtual hides it; is seen.
+  std::array<std::uint32_t, cell_pixels> compact_open, compact_seen;
   std::array<std::uint8_t, cell_pixels>
       real_first;                        // light that real things block does not count as open
   std::array<float, cell_pixels> share;  // of the pixel; weak points test fewer lights

@@ -10,9 +10,11 @@
 namespace render {
 
 struct DirectionalLight {
-  Vec3f direction;   // unit, towards the light
-  Vec3f irradiance;  // on a surface facing it: radiance integrated over its solid angle
-  float spread;      // angular radius of the region that it stands for, radians
+  Vec3f direction;            // unit, towards the light
+  Vec3f irradiance;           // on a surface facing it: radiance integrated over its solid angle
+  float spread;               // angular radius of the region that it stands for, radians
+  std::uint32_t compact = 0;  // 1 = part of a bright compact source, and its light is apart from
+                              // the smoothed levels of the environment (Environment::compact_apart)
   friend bool operator==(const DirectionalLight&, const DirectionalLight&) = default;
 };
 
@@ -38,6 +40,9 @@ struct LightTable {
 // the region whose shadows would err most is cut next, where its parts spread least. So sources get
 // lights in proportion to their energy and size.
 enum class LightMethod { median_cut, split };
+
+// So many lights are marked compact at most.
+inline constexpr std::size_t most_compact_lights = 32;
 
 struct LightTableSettings {
   int count = 64;

@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "render/environment.h"
+#include "render/light_table.h"
 #include "render/scene.h"
 
 namespace render {
@@ -30,7 +31,8 @@ struct ShadePoint {
   // From the kernel.
   HitPoint hit;             // unset for background()
   Vec3f incoming;           // unit, direction of the ray that arrived
-  float footprint_m = 0;    // width of the pixel's cone here
+  float footprint_m = 0;    // width of the sample's cone here
+  float spread_rad = 0;     // by how much that cone widens a metre: its full angle
   Vec3f throughput;         // share of the pixel that this ray carries
   Vec3f plate;              // the pixel's background, scene-linear
   std::uint32_t pixel = 0;  // index in the cell, for patterns
@@ -45,6 +47,8 @@ struct ShadePoint {
   Vec3f irradiance;        // of the light table, as it arrives
   Vec3f irradiance_open;   // the same if no virtual object blocked it
   Vec3f irradiance_lamps;  // of the set's own lamps, as it arrives
+  // Bit i = ShadeContext::compact[i]: shines on light_normal if nothing virtual hides it; is seen.
+  std::uint32_t compact_open = 0, compact_seen = 0;
   // From shade(): each is multiplied by throughput by the kernel.
   Vec3f radiance;              // added to the pixel
   Vec3f plate_share;           // share of the pixel's background that passes, lamps' light included
@@ -58,6 +62,7 @@ struct NewRay {
   Vec3f direction;   // unit
   Vec3f throughput;  // the point's own, times the surface's share
   float roughness;   // of the lobe, 0 = mirror: picks the environment's smoothing
+  Spread spread;     // of the sample's cone from here on
   RayKind kind;
 };
 
@@ -72,7 +77,17 @@ class RaySink {
 struct ShadeContext {
   const SceneDescription* scene = nullptr;
   const Environment* environment = nullptr;
+  // Lights that the environment's smoothed levels lack: rough lobes add those that a point sees.
+  std::span<const DirectionalLight> compact;
 };
+
+// What a lobe of `roughness` mirrors of those compact lights whose bits are set.
+Vec3f compact_light(const ShadeContext& context,
+                    std::uint32_t lights,
+                    Vec3f normal,
+                    Vec3f view,
+                    float roughness,
+                    const Spread& spread);
 
 class Shader {
  public:

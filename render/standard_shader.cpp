@@ -30,13 +30,17 @@ class StandardShader final : public Shader {
           standard_surface(block_of(context.scene->materials[p->hit.material]), *context.scene,
                            p->hit, p->footprint_m);
       p->light_normal = surface.normal;
-      p->receives_light =
+      const bool diffuse =
           surface.metallic < 1 && surface.transmission < 1 && surface.base != Vec3f{};
+      const bool glossy =
+          surface.roughness >= mirror_roughness ||
+          (surface.clearcoat > 0 && surface.clearcoat_roughness >= mirror_roughness);
+      p->receives_light = diffuse || (glossy && !context.compact.empty());
       std::memcpy(p->scratch.data(), &surface, sizeof surface);
     }
   }
 
-  void shade(const ShadeContext&,
+  void shade(const ShadeContext& context,
              std::span<ShadePoint* const> points,
              RaySink& rays) const override {
     for (ShadePoint* p : points) {
@@ -48,13 +52,17 @@ class StandardShader final : public Shader {
       p->radiance =
           surface.emission + weights.diffuse * (p->irradiance + p->irradiance_lamps) * per_pi;
       if (weights.coat > 0) {
-        mirror(*p, surface.coat_normal, view, surface.clearcoat_roughness,
-               p->throughput * weights.coat, rays);
+        mirror(context, *p, surface.coat_normal, view, surface.clearcoat_roughness,
+               {weights.coat, weights.coat, weights.coat}, rays);
       }
-      mirror(*p, surface.normal, view, surface.roughness, p->throughput * weights.specular, rays);
+      mirror(context, *p, surface.normal, view, surface.roughness, weights.specular, rays);
       if (weights.transmission != Vec3f{}) {
-        rays.push(*p, {offset_origin(p->hit, p->incoming), p->incoming,
-                       p->throughput * weights.transmission, 0, p->kind});
+        rays.push(*p, {offset_origin(p->hit, p->incoming),
+                       p->incoming,
+                       p->throughput * weights.transmission,
+                       0,
+                       {},
+                       p->kind});
       }
     }
   }
@@ -80,18 +88,42 @@ class StandardShader final : public Shader {
   }
 
  private:
-  static void mirror(const ShadePoint& p,
+  // A curved mirror widens the cone by twice the angle that its normal turns across it. Seen at a
+  // slant the cone covers a longer piece of surface that way.
+  static Spread mirrored_spread(const ShadePoint& p, Vec3f normal, Vec3f view) {
+    const float cosine = dot(normal, view);
+    const Vec3f slant = normalize(view - normal * cosine);
+    const Vec3f side = cross(normal, slant);
+    const auto mirrored_turn = [&](Vec3f step) {
+      const Vec3f turn = turn_of_normal(p.hit, step);
+      return (normal * dot(turn, view) + turn * cosine) * 2;
+    };
+    Spread spread{mirrored_turn(slant * (p.footprint_m / std::max(cosine, 0.1F))),
+                  mirrored_turn(side * p.footprint_m)};
+    spread.b += side * p.spread_rad;
+    spread.a += normalize(cross(side, mirrored(view, normal))) * p.spread_rad;
+    return spread;
+  }
+
+  static void mirror(const ShadeContext& context,
+                     ShadePoint& p,
                      Vec3f normal,
                      Vec3f view,
                      float roughness,
-                     Vec3f throughput,
+                     Vec3f weight,
                      RaySink& rays) {
     Vec3f direction = normalize(mirrored(view, normal));
     // A mapped or interpolated normal may send the ray into the surface: mirror it out again.
     const float into = dot(direction, p.hit.geometric_normal);
     if (into < 0) direction -= p.hit.geometric_normal * (2 * into);
-    rays.push(p, {offset_origin(p.hit, direction), direction, throughput, roughness,
-                  p.kind == RayKind::difference ? RayKind::difference : RayKind::reflection});
+    const Spread spread = mirrored_spread(p, normal, view);
+    if (p.compact_seen != 0) {
+      p.radiance +=
+          weight * compact_light(context, p.compact_seen, normal, view, roughness, spread);
+    }
+    rays.push(p,
+              {offset_origin(p.hit, direction), direction, p.throughput * weight, roughness, spread,
+               p.kind == RayKind::difference ? RayKind::difference : RayKind::reflection});
   }
 };
 

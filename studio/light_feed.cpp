@@ -173,7 +173,6 @@ void LightFeed::update_environment(const LightRequest& request) {
   const bool new_gain = follow_match(request);
   if (new_gain) build_environment(request);
   if (!fresh && !new_gain) return;
-  render::smooth_for_reflections(*environment_);
   table_count_ = 0;
 }
 
@@ -196,6 +195,7 @@ Light LightFeed::at(const LightRequest& request) {
     render::LightFollowerSettings following;
     following.table.count = request.light_samples;
     table_ = follower_.follow(*environment_, following);
+    render::smooth_for_reflections(*environment_, follower_.compact_texels());
     table_.unseen_share = environment_->unseen_share;
     table_count_ = request.light_samples;
   }

@@ -4,12 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
+#include <utility>
 
+#include "render/light_follower.h"
 #include "render/lobe_filter.h"
+#include "render/shader.h"
+#include "render/standard.h"
 #include "tests/render/sun_and_sky.h"
 
 namespace render {
@@ -110,6 +116,171 @@ TEST(RadianceOf, NeverReadsBesideTheMap) {
       EXPECT_NEAR(radiance_of(env, d, roughness).z, 2, 1e-5F);
     }
   }
+}
+
+// Two unit vectors across a direction.
+std::array<Vec3f, 2> across(Vec3f d) {
+  const Vec3f a = normalize(cross(d, std::abs(d.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}));
+  return {a, cross(d, a)};
+}
+
+Vec3f at_angle(Vec3f d, float angle, float azimuth) {
+  const auto [a, b] = across(d);
+  return d * std::cos(angle) + (a * std::cos(azimuth) + b * std::sin(azimuth)) * std::sin(angle);
+}
+
+// A wide lobe seen head-on, summed over the map's texels.
+double lobe_by_texels(const Environment& env, Vec3f d, float roughness) {
+  const int width = env.radiance.width, height = env.radiance.height;
+  double sum = 0, weights = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const Vec3f l =
+          direction_of_texel(static_cast<float>(x), static_cast<float>(y), width, height);
+      const double weight = lobe_density(d, d, roughness, l) * texel_solid_angle(y, width, height);
+      sum += weight * env.radiance.at(y, x, 1);
+      weights += weight;
+    }
+  }
+  return sum / weights;
+}
+
+// A lobe seen head-on, summed over one texel of light and what interpolation smears around it.
+double lobe_over_texel(Vec3f d, float roughness, int column, int row, int height, double radiance) {
+  constexpr int steps = 16;
+  const double solid_angle = texel_solid_angle(row, 2 * height, height) * 4 / (steps * steps);
+  double sum = 0;
+  for (int i = 0; i < steps * steps; ++i) {
+    const float x = (static_cast<float>(i % steps) + 0.5F) * 2 / steps - 1;
+    const float y = (static_cast<float>(i / steps) + 0.5F) * 2 / steps - 1;
+    const Vec3f l = direction_of_texel(static_cast<float>(column) + x, static_cast<float>(row) + y,
+                                       2 * height, height);
+    sum += (1 - std::abs(x)) * (1 - std::abs(y)) * lobe_density(d, d, roughness, l);
+  }
+  return sum * solid_angle * radiance;
+}
+
+// At one place the grid of the halved maps shows a sun brighter or darker than it is. In the mean
+// over places its light must be all there, and as much of it near its middle.
+TEST(RadianceOf, SpreadsATinySunAsANarrowLobeDoes) {
+  constexpr int height = 256;
+  constexpr double radiance = 2e4;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> any(0, 1);
+  for (const float alpha : {0.0025F, 0.005F, 0.01F, 0.02F, 0.04F}) {
+    const float roughness = std::sqrt(alpha);
+    const float wider = std::hypot(alpha, 0.006F);  // by half a texel
+    std::array<double, 2> found{}, expected{};      // half of the light, and the other
+    for (int place = 0; place < 16; ++place) {
+      Environment env = make_even_environment(0.5F, height);
+      const int row = 60 + static_cast<int>(random() % 136);
+      const int column = static_cast<int>(random() % 512);
+      env.radiance.at(row, column, 1) = radiance + 0.5F;
+      smooth_for_reflections(env);
+      const Vec3f sun = direction_of_texel(static_cast<float>(column), static_cast<float>(row),
+                                           2 * height, height);
+      for (int i = 0; i < 128; ++i) {
+        const Vec3f d = sample_lobe(sun, sun, std::sqrt(wider), {any(random), any(random)});
+        const double weight = 1 / lobe_density(sun, sun, std::sqrt(wider), d);
+        const std::size_t part = length(d - sun) < 2 * wider ? 0 : 1;
+        found[part] += weight * (radiance_of(env, d, roughness).y - 0.5);
+        expected[part] += weight * lobe_over_texel(d, roughness, column, row, height, radiance);
+      }
+    }
+    const double all = found[0] + found[1];
+    EXPECT_NEAR(all / (expected[0] + expected[1]), 1, 0.03) << "alpha " << alpha;
+    // Lobes between the cones and the first smoothed level are mixed of both.
+    EXPECT_NEAR(found[0] / expected[0], 1, alpha > 0.01F && alpha < 0.04F ? 0.3 : 0.15)
+        << "near its middle, alpha " << alpha;
+  }
+}
+
+// Over a disc, or over a row of them. Wider cones than these are lobes of the smoothed levels.
+TEST(RadianceOf, IsTheMeanOverANarrowCone) {
+  Environment env = make_sun_and_sky({.sun_radius_rad = 0.03F}, 256);
+  smooth_for_reflections(env);
+  const Vec3f sun = sun_direction({});
+  for (const auto& [long_rad, short_rad] : {std::pair(0.03F, 0.03F), std::pair(0.05F, 0.05F),
+                                            std::pair(0.2F, 0.04F), std::pair(0.3F, 0.02F)}) {
+    for (const float away : {0.0F, 0.02F, 0.3F}) {
+      const Vec3f d = at_angle(sun, away, 2);
+      const auto [a, b] = across(d);
+      const Vec3f i = a * long_rad, j = b * short_rad;
+      double mean = 0;
+      constexpr int steps = 64;
+      int inside = 0;
+      for (int y = 0; y < steps; ++y) {
+        for (int x = 0; x < steps; ++x) {
+          const float u = (static_cast<float>(x) + 0.5F) / steps - 0.5F;
+          const float v = (static_cast<float>(y) + 0.5F) / steps - 0.5F;
+          if (long_rad == short_rad && u * u + v * v > 0.25F) continue;
+          ++inside;
+          mean += radiance_of(env, normalize(d + i * u + j * v), 0).y;
+        }
+      }
+      mean /= inside;
+      EXPECT_NEAR(radiance_of(env, d, 0, {i, j}).y / mean, 1, 0.2)
+          << long_rad << " by " << short_rad << ", " << away << " from the sun";
+      EXPECT_EQ(radiance_of(env, d, 0, {i, j}), radiance_of(env, d, 0, {j, i}));
+    }
+  }
+}
+
+TEST(RadianceOf, KeepsAWhiteMapWhiteForEveryLobeAndCone) {
+  Environment env = make_even_environment(1, 256);
+  smooth_for_reflections(env);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> width(0, 0.5F), any(0, 1);
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3f d = random_direction(random);
+    const auto [a, b] = across(d);
+    const float roughness = any(random);
+    EXPECT_NEAR(
+        radiance_of(env, d, roughness * roughness, {a * width(random), b * width(random)}).x, 1,
+        1e-4F);
+  }
+  const float infinity = std::numeric_limits<float>::infinity();
+  EXPECT_NEAR(radiance_of(env, {0, 0, 1}, 0.1F, {{infinity, 0, 0}, {0, 1, 0}}).x, 1, 1e-4F);
+}
+
+TEST(SmoothForReflections, LeavesCompactSourcesForTheLightsThatStandForThem) {
+  Environment plain = make_sun_and_sky({}, 256);
+  Environment apart = plain;
+  LightFollower follower;
+  const LightTable table = follower.follow(plain, {});
+  smooth_for_reflections(plain);
+  smooth_for_reflections(apart, follower.compact_texels());
+  EXPECT_TRUE(apart.compact_apart);
+  std::vector<DirectionalLight> compact;
+  std::ranges::copy_if(table.lights, std::back_inserter(compact),
+                       [](const DirectionalLight& light) { return light.compact != 0; });
+  ASSERT_GE(compact.size(), 1U);
+  const ShadeContext context{nullptr, &apart, compact};
+  const Vec3f sun = sun_direction({});
+  for (const float roughness : {0.25F, 0.4F, 0.6F, 0.8F}) {
+    const float alpha = roughness * roughness;
+    for (const float away : {0.0F, 0.5F, 1.0F, 2.0F, 4.0F}) {  // half-widths of the lobe
+      const Vec3f d = at_angle(sun, std::min(2 * alpha * away, 1.2F), 0.7F);
+      const double whole = lobe_by_texels(plain, d, roughness);
+      const float sum =
+          radiance_of(apart, d, roughness).y + compact_light(context, ~0U, d, d, roughness, {}).y;
+      EXPECT_NEAR(sum / whole, 1, 0.05) << "roughness " << roughness << ", " << away;
+      if (roughness < 0.5F) continue;  // where the plain level is too coarse to compare
+      EXPECT_NEAR(sum / radiance_of(plain, d, roughness).y, 1, 0.05)
+          << "roughness " << roughness << ", " << away;
+    }
+  }
+  // Mirrors see the sun in the map itself.
+  EXPECT_EQ(radiance_of(apart, sun, 0), radiance_of(plain, sun, 0));
+  EXPECT_EQ(compact_light(context, ~0U, sun, sun, 0.05F, {}), Vec3f{});
+}
+
+TEST(SmoothForReflections, RefusesCompactTexelsOfAnotherGrid) {
+  Environment env = make_even_environment(1, 64);
+  EXPECT_THROW(smooth_for_reflections(env, CompactTexels{48, std::vector<std::uint8_t>(48 * 96)}),
+               std::invalid_argument);
+  EXPECT_THROW(smooth_for_reflections(env, CompactTexels{32, std::vector<std::uint8_t>(5)}),
+               std::invalid_argument);
 }
 
 TEST(SmoothForReflections, KeepsAWhiteMapWhiteAtEveryRoughness) {

@@ -21,12 +21,18 @@ double energy(const LightTable& table) {
   return sum;
 }
 
+// What make_light_table() makes: it tells no compact lights apart.
+std::vector<DirectionalLight> without_marks(std::vector<DirectionalLight> lights) {
+  for (DirectionalLight& light : lights) light.compact = 0;
+  return lights;
+}
+
 TEST(LightFollower, StartsWithTheTableOfTheFrame) {
   const Environment env = make_sun_and_sky({}, 128);
   LightFollower follower;
   const LightTable followed = follower.follow(env, {});
   const LightTable made = make_light_table(env, {});
-  EXPECT_EQ(followed.lights, made.lights);
+  EXPECT_EQ(without_marks(followed.lights), made.lights);
   EXPECT_EQ(followed.error_estimate, made.error_estimate);
 }
 
@@ -77,7 +83,7 @@ TEST(LightFollower, MakesDirectionsAnewWhenTheSunHasMoved) {
   const Environment moved = make_sun_and_sky(sky, 128);
   const LightTable next = follower.follow(moved, {});
   EXPECT_GT(next.version, first.version);
-  EXPECT_EQ(next.lights, make_light_table(moved, {}).lights);
+  EXPECT_EQ(without_marks(next.lights), make_light_table(moved, {}).lights);
 }
 
 TEST(LightFollower, NeverStaysFartherFromASlowSunThanItsTolerance) {
@@ -134,6 +140,44 @@ TEST(LightFollower, StartsFromABlackFrame) {
   LightFollower follower;
   EXPECT_TRUE(follower.follow(make_even_environment(0, 64), {}).lights.empty());
   EXPECT_FALSE(follower.follow(make_sun_and_sky({}, 64), {}).lights.empty());
+}
+
+TEST(LightFollower, MarksTheLightsOfTheSunAndItsTexels) {
+  const Environment env = make_sun_and_sky({}, 256);
+  LightFollower follower;
+  const LightTable table = follower.follow(env, {});
+  double marked = 0, share_of_texels = 0;
+  std::size_t count = 0;
+  for (const DirectionalLight& light : table.lights) {
+    if (light.compact == 0) continue;
+    ++count;
+    EXPECT_GT(dot(light.direction, sun_direction({})), std::cos(0.1F));
+    marked += luminance(light.irradiance.x, light.irradiance.y, light.irradiance.z);
+  }
+  EXPECT_GE(count, 1U);
+  EXPECT_LE(count, most_compact_lights);
+  // The sun's own, and the little sky in its texels.
+  const double sun = luminance(2.5F, 0.93F * 2.5F, 0.8F * 2.5F);
+  EXPECT_NEAR(marked / sun, 1, 0.02);
+  const CompactTexels& texels = follower.compact_texels();
+  ASSERT_EQ(texels.height, light_map_height);
+  for (int y = 0; y < texels.height; ++y) {
+    for (int x = 0; x < 2 * texels.height; ++x) {
+      if (texels.is_compact[static_cast<std::size_t>(y * 2 * texels.height + x)] == 0) continue;
+      share_of_texels += texel_solid_angle(y, 2 * texels.height, texels.height);
+      const Vec3f d = direction_of_texel(static_cast<float>(x), static_cast<float>(y),
+                                         2 * texels.height, texels.height);
+      EXPECT_GT(dot(d, sun_direction({})), std::cos(0.1F));
+    }
+  }
+  EXPECT_GT(share_of_texels, 0);
+}
+
+TEST(LightFollower, MarksNothingUnderAnOvercastSky) {
+  LightFollower follower;
+  const LightTable table = follower.follow(make_sun_and_sky({.sun_irradiance = 0}, 128), {});
+  for (const DirectionalLight& light : table.lights) EXPECT_EQ(light.compact, 0U);
+  EXPECT_EQ(follower.compact_texels().height, 0);
 }
 
 TEST(LightFollower, TakesNewSettingsAtOnce) {
