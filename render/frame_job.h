@@ -16,7 +16,13 @@ namespace render {
 
 // All settings of speed against accuracy.
 struct Effort {
-  int aa_samples = 9;      // camera rays in pixels where an edge passes; 1 = no anti-aliasing
+  int aa_samples = 8;  // camera rays in pixels where an edge passes; 1 = no anti-aliasing
+  // Standard error, in radiance, that a pixel of further camera rays may have before it takes more
+  // of them, up to 256; 0 = aa_samples must do.
+  float aa_tolerance = 0.1F;
+  // Radiance by which the virtual light of neighbouring pixels may differ before they are sampled
+  // like edges; 0 = it never matters.
+  float glint_contrast = 0.1F;
   int light_samples = 64;  // lights in the table
   int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae

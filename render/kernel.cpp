@@ -15,7 +15,7 @@ namespace {
 
 constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
 constexpr int ring_pixels = ring_size * ring_size;
-constexpr int samples_max = 64;  // camera rays in one pixel
+constexpr float display_limit = 4;  // brighter light than this, in display white, looks alike
 constexpr Scene::Surface no_hit{~0U, ~0U};
 
 // A stream of rays with their hits.
@@ -27,7 +27,7 @@ struct RayStream {
 
 struct QueuedRay {
   Vec3f origin, direction, throughput, environment;
-  float footprint_m;
+  float footprint_m, spread_rad;
   float roughness;
   std::uint32_t pixel, slot;
   RayKind kind;
@@ -57,6 +57,19 @@ struct Met {
   Vec3f position;
 };
 
+// Why a pixel takes further camera rays.
+enum class Edge : std::uint8_t {
+  none,
+  surface,  // another surface begins: those that meet what a neighbour met share its radiance
+  glint,    // mirrored light changes quickly: they share only the light that arrives
+};
+
+// What a point receives.
+struct Light {
+  Vec3f irradiance, open, lamps;
+  std::uint32_t compact_open = 0, compact_seen = 0;
+};
+
 // The order of camera rays in a cell's stream: 4x4 blocks one after the other.
 std::array<int, 2> pixel_of_ray(int i) {
   return {((i >> 4) & 3) * 4 + (i & 3), (i >> 6) * 4 + ((i >> 2) & 3)};
@@ -65,6 +78,12 @@ std::array<int, 2> pixel_of_ray(int i) {
 void clear_results(ShadePoint& p) {
   p.radiance = p.plate_share = p.plate_passed = {};
   p.clipped_plate = false;
+}
+
+// The mean width of a cone. What goes straight on keeps it.
+float spread_of(const Spread& spread, const ShadePoint& from) {
+  const float area = length(spread.a) * length(spread.b);
+  return area > 0 ? std::min(std::sqrt(area), 1.0F) : from.spread_rad;
 }
 
 float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
@@ -81,11 +100,15 @@ struct TileWorkspace::Impl final : RaySink {
   std::array<std::uint8_t, stream_rays> done;
   std::array<Sample, 2 * cell_pixels> samples;  // centres, then further ones shaded on their own
   std::array<Sample, cell_pixels> sums;
+  std::array<Vec3f, cell_pixels> shown_sum, squares;  // of what further samples show
   std::array<std::uint16_t, cell_pixels> counts;
+  int samples_each = 1;  // of the pixels that take further ones now
   std::array<Met, ring_pixels> met;
-  std::array<std::uint8_t, cell_pixels> edge;
+  std::array<Edge, cell_pixels> edge;
+  std::array<Light, cell_pixels> light;  // at what the centres met
+  CellMask light_known;
+  std::array<std::int16_t, stream_rays> lender;  // pixel whose light a point shares, or -1
   std::array<Vec3f, cell_pixels> plate;
-  std::array<std::array<float, 2>, samples_max> pattern;
   struct Further {
     std::uint16_t pixel;
     std::uint16_t index;
@@ -115,9 +138,15 @@ struct TileWorkspace::Impl final : RaySink {
   void collect(const ShadePoint& p);
   void bounce();
   void find_edges();
+  void find_glints();
+  CellMask edges() const;
+  CellMask uncertain(int n) const;
+  bool is_uncertain(std::size_t k, int n) const;
+  Vec3f direction_in(int x, int y, const std::array<float, 2>& offset) const;
+  void add_further(std::size_t k, const Sample& sample);
   void sample_edges();
   void finish_further(int count);
-  bool share_sample(int i, const Further& f);
+  int neighbour_of(int i, const Further& f) const;
   void write(const TileJob& tile, TileResult& result);
   template <class F>
   void for_each_shader(int count, F&& call);
@@ -161,6 +190,28 @@ std::uint64_t visibility_key(const FrameInputs& inputs, const FrameJob& job) {
 
 void TileWorkspace::log_rays(RayLog* log) { impl_->gather.log = log; }
 
+namespace {
+
+// Places in a pixel, -.5..+.5: every first 4^n of them are spread well (Sobol's sequence).
+std::array<std::array<float, 2>, samples_max> sample_pattern() {
+  std::array<std::array<float, 2>, samples_max> pattern;
+  for (std::uint32_t i = 0; i < samples_max; ++i) {
+    std::uint32_t x = 0, y = 0;
+    std::uint32_t column = 1U << 31;
+    for (std::uint32_t bits = i, place = 1U << 31; bits != 0; bits >>= 1, place >>= 1) {
+      if (bits & 1) x |= place, y ^= column;
+      column ^= column >> 1;
+    }
+    const auto middle = [](std::uint32_t v) {
+      return (static_cast<float>(v >> 24) + 0.5F) / samples_max - 0.5F;
+    };
+    pattern[i] = {middle(x), middle(y)};
+  }
+  return pattern;
+}
+
+}  // namespace
+
 FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) {
   if (!inputs.scene || !inputs.directions || !inputs.environment) {
     throw std::invalid_argument("a frame needs a scene, a lens and an environment");
@@ -168,6 +219,10 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   const Effort& e = job.effort;
   if (e.aa_samples < 1 || e.aa_samples > samples_max) {
     throw std::invalid_argument("aa_samples must be 1 to " + std::to_string(samples_max));
+  }
+  const auto is_radiance = [](float v) { return std::isfinite(v) && v >= 0; };
+  if (!is_radiance(e.aa_tolerance) || !is_radiance(e.glint_contrast)) {
+    throw std::invalid_argument("aa_tolerance and glint_contrast must be finite, and 0 or more");
   }
   if (e.interleave != 1 && e.interleave != 2 && e.interleave != 4) {
     throw std::invalid_argument("interleave must be 1, 2 or 4");
@@ -186,6 +241,14 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
     }
   }
   FrameContext context;
+  std::ranges::copy_if(job.lights.lights, std::back_inserter(context.compact),
+                       [](const DirectionalLight& light) { return light.compact != 0; });
+  if (context.compact.size() > most_compact_lights) {
+    throw std::invalid_argument("a table marks at most " + std::to_string(most_compact_lights) +
+                                " lights as compact");
+  }
+  if (!inputs.environment->compact_apart) context.compact.clear();
+  context.pattern = sample_pattern();
   context.inputs = inputs;
   context.job = &job;
   context.light = {inputs.scene, &job.lights, &job.effort};
@@ -240,7 +303,8 @@ void TileWorkspace::Impl::push(const ShadePoint& from, const NewRay& ray) {
   Sample& sample = samples[from.slot];
   const Environment& env = *frame->inputs.environment;
   const bool straight = ray.kind == RayKind::camera;
-  const Vec3f light = straight ? Vec3f{} : radiance_of(env, ray.direction, ray.roughness);
+  const Vec3f light =
+      straight ? Vec3f{} : radiance_of(env, ray.direction, ray.roughness, ray.spread);
   const Effort& effort = frame->job->effort;
   // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
   const bool deep = from.depth >= effort.max_depth || queue.size() == queue.capacity();
@@ -256,7 +320,7 @@ void TileWorkspace::Impl::push(const ShadePoint& from, const NewRay& ray) {
     return;
   }
   queue.push_back({ray.origin, ray.direction, ray.throughput, light, from.footprint_m,
-                   ray.roughness, from.pixel, from.slot, ray.kind,
+                   spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
                    static_cast<std::uint8_t>(from.depth + 1)});
 }
 
@@ -343,7 +407,8 @@ void TileWorkspace::Impl::set_point(ShadePoint& p,
     p.hit =
         frame->inputs.scene->hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i], p.incoming);
   }
-  p.footprint_m = s.far_m[i] < ray_far ? s.far_m[i] * frame->pixel_angle : 0;
+  p.spread_rad = frame->pixel_angle;
+  p.footprint_m = s.far_m[i] < ray_far ? s.far_m[i] * p.spread_rad : 0;
   p.throughput = {1, 1, 1};
   p.plate = plate[pixel];
   p.pixel = pixel;
@@ -391,11 +456,24 @@ void TileWorkspace::Impl::receive(int count, bool grid) {
     // Further samples of an edge pixel share its weight.
     r.share[k] = largest(p.throughput) * (p.slot < cell_pixels ? 1.0F : further_share);
   };
+  constexpr std::uint16_t nowhere = 0xFFFF;
   std::array<std::uint16_t, stream_rays> place;
+  std::fill_n(place.begin(), count, nowhere);
+  const auto known = [this](std::size_t k) { return (light_known[k / 64] >> (k % 64) & 1) != 0; };
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     ShadePoint& p = points[i];
     p.irradiance = p.irradiance_open = p.irradiance_lamps = {};
+    p.compact_open = p.compact_seen = 0;
     if (!p.receives_light) continue;
+    if (lender[i] >= 0 && known(static_cast<std::size_t>(lender[i]))) {
+      const Light& lent = light[static_cast<std::size_t>(lender[i])];
+      p.irradiance = lent.irradiance;
+      p.irradiance_open = lent.open;
+      p.irradiance_lamps = lent.lamps;
+      p.compact_open = lent.compact_open;
+      p.compact_seen = lent.compact_seen;
+      continue;
+    }
     const std::size_t k = grid ? p.pixel : static_cast<std::size_t>(r.count);
     place[i] = static_cast<std::uint16_t>(k);
     entry(k, p);
@@ -418,15 +496,21 @@ void TileWorkspace::Impl::receive(int count, bool grid) {
   const bool lamps = !frame->job->lights.lamps.empty();
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     ShadePoint& p = points[i];
-    if (!p.receives_light) continue;
     const std::size_t k = place[i];
+    if (k == nowhere) continue;
     p.irradiance_open = {r.open_r[k], r.open_g[k], r.open_b[k]};
     p.irradiance = p.irradiance_open - Vec3f{r.lost_r[k], r.lost_g[k], r.lost_b[k]};
+    p.compact_open = r.compact_open[k];
+    p.compact_seen = r.compact_seen[k];
     if (lamps) {
       p.irradiance_lamps =
           gather_lamps(frame->light, {r.px[k], r.py[k], r.pz[k]}, p.light_normal,
                        p.hit.geometric_normal, mask_virtual | mask_real_blocker, *statistics);
     }
+    if (!grid) continue;
+    light[k] = {p.irradiance, p.irradiance_open, p.irradiance_lamps, p.compact_open,
+                p.compact_seen};
+    light_known[k / 64] |= std::uint64_t{1} << (k % 64);
   }
 }
 
@@ -442,7 +526,7 @@ void TileWorkspace::Impl::collect(const ShadePoint& p) {
 void TileWorkspace::Impl::shade_points(int count, bool grid) {
   if (count == 0) return;
   const Scene& scene = *frame->inputs.scene;
-  const ShadeContext context{&scene.description(), frame->inputs.environment};
+  const ShadeContext context{&scene.description(), frame->inputs.environment, frame->compact};
   for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
     for (ShadePoint* p : group_points) p->receives_light = false;
     shader.surface(context, group_points);
@@ -462,7 +546,8 @@ void TileWorkspace::Impl::shade_points(int count, bool grid) {
 
 void TileWorkspace::Impl::run_background(std::span<ShadePoint* const> leaving) {
   if (leaving.empty()) return;
-  const ShadeContext context{&frame->inputs.scene->description(), frame->inputs.environment};
+  const ShadeContext context{&frame->inputs.scene->description(), frame->inputs.environment,
+                             frame->compact};
   for (ShadePoint* p : leaving) clear_results(*p);
   frame->inputs.scene->background().shade(context, leaving);
   for (ShadePoint* p : leaving) {
@@ -521,7 +606,8 @@ void TileWorkspace::Impl::bounce() {
           hit ? points[static_cast<std::size_t>(count++)] : points[stream_rays - ++leaving];
       set_point(p, static_cast<int>(i), q.pixel, q.slot);
       if (!hit) group[leaving - 1] = &p;
-      p.footprint_m += q.footprint_m;
+      p.spread_rad = q.spread_rad;
+      p.footprint_m = q.footprint_m + (hit ? stream.far_m[i] * q.spread_rad : 0);
       p.throughput = q.throughput;
       p.kind = q.kind == RayKind::camera ? RayKind::camera : RayKind::reflection;
       p.depth = q.depth;
@@ -574,11 +660,11 @@ bool continuous(const Met& a, const Met& b, float pixel_angle, Vec3f camera) {
 }  // namespace
 
 void TileWorkspace::Impl::find_edges() {
-  edge.fill(0);
+  edge.fill(Edge::none);
   const auto& table = *frame->inputs.directions;
   const auto mark = [&](int x, int y) {
     if (x >= 0 && y >= 0 && x < cell_size && y < cell_size) {
-      edge[static_cast<std::size_t>(y * cell_size + x)] = 1;
+      edge[static_cast<std::size_t>(y * cell_size + x)] = Edge::surface;
     }
   };
   const auto compare = [&](int x, int y, int dx, int dy) {
@@ -599,15 +685,40 @@ void TileWorkspace::Impl::find_edges() {
     }
   }
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (!(inside[k / 64] >> (k % 64) & 1)) edge[k] = 0;
+    if (!(inside[k / 64] >> (k % 64) & 1)) edge[k] = Edge::none;
   }
 }
 
-// Adds the sample of a neighbouring pixel's centre that shows the same surface, if there is one.
-bool TileWorkspace::Impl::share_sample(int index, const Further& f) {
+// Marks pixels whose own light differs from a neighbour's by more than the effort allows.
+void TileWorkspace::Impl::find_glints() {
+  const float least = frame->job->effort.glint_contrast;
+  if (!(least > 0)) return;
+  const auto shown = [&](std::size_t k) {
+    const Vec3f v = samples[k].added;
+    return Vec3f{std::min(v.x, display_limit), std::min(v.y, display_limit),
+                 std::min(v.z, display_limit)};
+  };
+  const auto is_inside = [&](std::size_t k) { return (inside[k / 64] >> (k % 64) & 1) != 0; };
+  const auto compare = [&](std::size_t a, std::size_t b) {
+    if (!is_inside(a) || !is_inside(b)) return;
+    const Vec3f d = shown(a) - shown(b);
+    if (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) > least)
+      edge[a] = edge[b] = Edge::glint;
+  };
+  for (std::size_t y = 0; y < cell_size; ++y) {
+    for (std::size_t x = 0; x < cell_size; ++x) {
+      const std::size_t k = y * cell_size + x;
+      if (x + 1 < cell_size) compare(k, k + 1);
+      if (y + 1 < cell_size) compare(k, k + cell_size);
+    }
+  }
+}
+
+// The nearest pixel whose centre shows the same surface as a further ray met, or -1.
+int TileWorkspace::Impl::neighbour_of(int index, const Further& f) const {
   const Met here = met_at(index);
   const int px = f.pixel % cell_size, py = f.pixel / cell_size;
-  const auto& offset = pattern[f.index];
+  const auto& offset = frame->pattern[f.index];
   float best = 1e9F;
   int found = -1;
   for (int dy = -1; dy <= 1; ++dy) {
@@ -625,10 +736,7 @@ bool TileWorkspace::Impl::share_sample(int index, const Further& f) {
       found = k;
     }
   }
-  if (found < 0) return false;
-  sums[f.pixel] += samples[static_cast<std::size_t>(found)];
-  ++counts[f.pixel];
-  return true;
+  return found;
 }
 
 void TileWorkspace::Impl::finish_further(int count) {
@@ -638,9 +746,14 @@ void TileWorkspace::Impl::finish_further(int count) {
   std::size_t leaving = 0;
   std::array<std::uint16_t, stream_rays> pixel_of;
   std::size_t used = 0;
+  const float finer = 1 / std::sqrt(static_cast<float>(samples_each));
   for (int i = 0; i < count; ++i) {
     const Further& f = further[static_cast<std::size_t>(i)];
-    if (share_sample(i, f)) continue;
+    const int neighbour = neighbour_of(i, f);
+    if (neighbour >= 0 && edge[f.pixel] == Edge::surface) {
+      add_further(f.pixel, samples[static_cast<std::size_t>(neighbour)]);
+      continue;
+    }
     const std::size_t slot = cell_pixels + used;
     samples[slot] = {};
     pixel_of[used++] = f.pixel;
@@ -648,58 +761,115 @@ void TileWorkspace::Impl::finish_further(int count) {
     ShadePoint& p =
         hit ? points[static_cast<std::size_t>(shaded++)] : points[stream_rays - ++leaving];
     set_point(p, i, f.pixel, static_cast<std::uint32_t>(slot));
+    p.spread_rad *= finer;
+    p.footprint_m *= finer;
+    if (hit && neighbour >= 0)
+      lender[static_cast<std::size_t>(shaded - 1)] = static_cast<std::int16_t>(neighbour);
     if (!hit) group[leaving - 1] = &p;
   }
   run_background({group.data(), leaving});
   shade_points(shaded, false);
+  lender.fill(-1);
   bounce();
   for (std::size_t i = 0; i < used; ++i) {
-    sums[pixel_of[i]] += samples[cell_pixels + i];
-    ++counts[pixel_of[i]];
+    add_further(pixel_of[i], samples[cell_pixels + i]);
   }
 }
 
 // More camera rays in pixels that an edge crosses. The centre's own sample makes room for them.
+// Pixels that are still uncertain take more, three times as many as they have, and again.
 void TileWorkspace::Impl::sample_edges() {
-  const int n = frame->job->effort.aa_samples;
-  for (int i = 0; i < n; ++i) {
-    float radical = 0, digit = 0.5F;
-    for (int b = i; b > 0; b >>= 1, digit *= 0.5F) radical += static_cast<float>(b & 1) * digit;
-    const auto steps = static_cast<float>(n);
-    const float low = 0.5F / static_cast<float>(std::bit_ceil(static_cast<unsigned>(n)));
-    pattern[static_cast<std::size_t>(i)] = {(static_cast<float>(i) + 0.5F) / steps - 0.5F,
-                                            radical + low - 0.5F};
-  }
-  const auto& table = *frame->inputs.directions;
-  const auto direction = [&](int x, int y, const std::array<float, 2>& offset) {
-    // Linear between the pixel's centre and the next one on that side.
-    const int sx = offset[0] < 0 ? -1 : 1, sy = offset[1] < 0 ? -1 : 1;
-    const float fx = std::abs(offset[0]), fy = std::abs(offset[1]);
-    const auto at = [&](int column, int row) {
-      const std::size_t t = table.index(row, column);
-      return Vec3f{table.x[t], table.y[t], table.z[t]};
-    };
-    const Vec3f a = at(x, y), b = at(x + sx, y), c = at(x, y + sy);
-    if (dot(a, a) < 0.5F || dot(b, b) < 0.5F || dot(c, c) < 0.5F) return a;
-    return a + (b - a) * fx + (c - a) * fy;
-  };
-  int count = 0;
+  const Effort& effort = frame->job->effort;
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (!edge[k]) continue;
+    if (edge[k] == Edge::none) continue;
     sums[k] = {};
+    squares[k] = shown_sum[k] = {};
     counts[k] = 0;
-    const int x = static_cast<int>(k % cell_size), y = static_cast<int>(k / cell_size);
-    for (int i = 0; i < n; ++i) {
-      further[static_cast<std::size_t>(count)] = {static_cast<std::uint16_t>(k),
-                                                  static_cast<std::uint16_t>(i)};
-      set_camera_ray(count, direction(x0 + x, y0 + y, pattern[static_cast<std::size_t>(i)]));
-      if (++count == stream_rays) {
-        finish_further(count);
-        count = 0;
+  }
+  int first = 0;
+  for (int end = effort.aa_samples; end <= samples_max; first = end, end *= 4) {
+    samples_each = end;
+    const CellMask chosen = first == 0 ? edges() : uncertain(first);
+    int count = 0;
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      if (!(chosen[k / 64] >> (k % 64) & 1)) continue;
+      const int x = static_cast<int>(k % cell_size), y = static_cast<int>(k / cell_size);
+      for (int i = first; i < end; ++i) {
+        further[static_cast<std::size_t>(count)] = {static_cast<std::uint16_t>(k),
+                                                    static_cast<std::uint16_t>(i)};
+        set_camera_ray(count,
+                       direction_in(x0 + x, y0 + y, frame->pattern[static_cast<std::size_t>(i)]));
+        if (++count == stream_rays) {
+          finish_further(count);
+          count = 0;
+        }
+      }
+    }
+    if (count > 0) finish_further(count);
+    if (!(effort.aa_tolerance > 0)) break;
+  }
+}
+
+CellMask TileWorkspace::Impl::edges() const {
+  CellMask mask{};
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (edge[k] != Edge::none) mask[k / 64] |= std::uint64_t{1} << (k % 64);
+  }
+  return mask;
+}
+
+// Pixels whose mean of `n` further samples is uncertain, and those beside them: what one pixel saw
+// of a small bright thing the next one may have missed.
+CellMask TileWorkspace::Impl::uncertain(int n) const {
+  CellMask mask{};
+  for (int k = 0; k < cell_pixels; ++k) {
+    if (!is_uncertain(static_cast<std::size_t>(k), n)) continue;
+    for (int y = std::max(0, k / cell_size - 1); y <= std::min(cell_size - 1, k / cell_size + 1);
+         ++y) {
+      for (int x = std::max(0, k % cell_size - 1); x <= std::min(cell_size - 1, k % cell_size + 1);
+           ++x) {
+        const auto i = static_cast<std::size_t>(y * cell_size + x);
+        if (edge[i] != Edge::none && counts[i] == n) mask[i / 64] |= std::uint64_t{1} << (i % 64);
       }
     }
   }
-  if (count > 0) finish_further(count);
+  return mask;
+}
+
+// Whether the mean of a pixel's first `n` further samples may be off by more than is allowed. A
+// pixel that took no more than before stays as it is.
+bool TileWorkspace::Impl::is_uncertain(std::size_t k, int n) const {
+  if (counts[k] != n) return false;
+  const auto samples_n = static_cast<float>(n);
+  const Vec3f shown = shown_sum[k];
+  const Vec3f spread = squares[k] - shown * shown * (1 / samples_n);
+  const float tolerance = frame->job->effort.aa_tolerance;
+  return std::max({spread.x, spread.y, spread.z}) >
+         tolerance * tolerance * samples_n * std::max(samples_n - 1, 1.0F);
+}
+
+// Through a pixel off its centre: linear between the centre and the next one on that side.
+Vec3f TileWorkspace::Impl::direction_in(int x, int y, const std::array<float, 2>& offset) const {
+  const auto& table = *frame->inputs.directions;
+  const int sx = offset[0] < 0 ? -1 : 1, sy = offset[1] < 0 ? -1 : 1;
+  const float fx = std::abs(offset[0]), fy = std::abs(offset[1]);
+  const auto at = [&](int column, int row) {
+    const std::size_t t = table.index(row, column);
+    return Vec3f{table.x[t], table.y[t], table.z[t]};
+  };
+  const Vec3f a = at(x, y), b = at(x + sx, y), c = at(x, y + sy);
+  if (dot(a, a) < 0.5F || dot(b, b) < 0.5F || dot(c, c) < 0.5F) return a;
+  return a + (b - a) * fx + (c - a) * fy;
+}
+
+void TileWorkspace::Impl::add_further(std::size_t k, const Sample& sample) {
+  sums[k] += sample;
+  ++counts[k];
+  const Vec3f v = sample.added + plate[k] * sample.plate;
+  const Vec3f shown{std::min(v.x, display_limit), std::min(v.y, display_limit),
+                    std::min(v.z, display_limit)};
+  shown_sum[k] += shown;
+  squares[k] += shown * shown;
 }
 
 void TileWorkspace::Impl::load_plate(const TileJob& tile) {
@@ -756,18 +926,21 @@ void TileWorkspace::Impl::write(const TileJob& tile, TileResult& result) {
 void TileWorkspace::Impl::render_cell(const TileJob& tile, TileResult& result) {
   samples.fill({});
   queue.clear();
+  light_known = {};
+  lender.fill(-1);
   load_plate(tile);
   trace_centres();
-  const bool edges = frame->job->effort.aa_samples > 1;
-  if (edges) keep_centres();
+  const bool smooth_edges = frame->job->effort.aa_samples > 1;
+  if (smooth_edges) keep_centres();
   shade_centres();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     sums[k] = samples[k];
     counts[k] = 1;
   }
-  if (edges) {
+  if (smooth_edges) {
     trace_ring();
     find_edges();
+    find_glints();
     sample_edges();
   }
   write(tile, result);

@@ -10,11 +10,16 @@
 
 namespace render {
 
+inline constexpr int samples_max = 256;  // camera rays in one pixel
+
 // What all tiles of one frame share, made once per frame.
 struct FrameContext {
   FrameInputs inputs;
   const FrameJob* job = nullptr;
+  std::vector<DirectionalLight> compact;  // see ShadeContext
   LightContext light;
+  // Places of further camera rays in a pixel, -0.5 to 0.5.
+  std::array<std::array<float, 2>, samples_max> pattern;
   std::array<float, 9> set_from_cam{};  // rotation
   Vec3f camera;                         // its position in the set
   float pixel_angle = 0;                // radians across a pixel at the picture's centre

@@ -11,10 +11,16 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 Json effort_json(const render::Effort& effort) {
-  return {{"aa_samples", effort.aa_samples},   {"light_samples", effort.light_samples},
-          {"interleave", effort.interleave},   {"adaptive_visibility", effort.adaptive_visibility},
-          {"cull_lights", effort.cull_lights}, {"accuracy", effort.accuracy},
-          {"max_depth", effort.max_depth},     {"tile_size", effort.tile_size}};
+  return {{"aa_samples", effort.aa_samples},
+          {"aa_tolerance", effort.aa_tolerance},
+          {"glint_contrast", effort.glint_contrast},
+          {"light_samples", effort.light_samples},
+          {"interleave", effort.interleave},
+          {"adaptive_visibility", effort.adaptive_visibility},
+          {"cull_lights", effort.cull_lights},
+          {"accuracy", effort.accuracy},
+          {"max_depth", effort.max_depth},
+          {"tile_size", effort.tile_size}};
 }
 
 Json record_json(const compositing::RecorderStatus& recorder) {
@@ -79,6 +85,7 @@ std::string show_figures(const Set& set,
   if (error) {
     json["error"] = {
         {"relative_rms", error->relative_rms},
+        {"reference_noise", error->reference_noise},
         {"p99", error->p99},
         {"delta_e",
          {{"mean", error->delta_e_mean}, {"p95", error->delta_e_p95}, {"p99", error->delta_e_p99}}},

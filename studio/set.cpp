@@ -99,7 +99,9 @@ SetError::SetError(std::vector<Diagnostic> diagnostics)
 
 render::Effort read_effort_section(Section section) {
   render::Effort effort;
-  section.integer("aa_samples", effort.aa_samples, 1, 64);
+  section.integer("aa_samples", effort.aa_samples, 1, 256);
+  section.number("aa_tolerance", effort.aa_tolerance, {0, 1000});
+  section.number("glint_contrast", effort.glint_contrast, {0, 1000});
   section.integer("light_samples", effort.light_samples, 1, 4096);
   section.integer("interleave", effort.interleave, 1, 4);
   if (effort.interleave == 3) section.fault("interleave", "must be 1, 2 or 4");

@@ -9,6 +9,7 @@
 
 #include "made_shot.h"
 #include "render/kept_visibility.h"
+#include "render/light_follower.h"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -171,6 +172,128 @@ TEST(RenderFrame, PutsTheShadowWhereTheSunSaysAndAsDeep) {
   EXPECT_NEAR(ratio_at({0, -2.2, 0}), 1.0F, 0.002F);
 }
 
+// A rough metal plate, seen where it mirrors the sun, which a roof far away may hide.
+struct RoughPlate {
+  MadeShot shot;
+  double lit = 0, without_sun = 0;
+
+  explicit RoughPlate(bool with_roof) : shot(made_shot(65, 65, describe(with_roof))) {
+    render::Environment& env = shot.environment;
+    const render::Environment sky = made_sky(64, 0.2F, 0.5F);
+    env.radiance = sky.radiance;
+    const render::Vec3f to_sun = normalize(render::Vec3f{0, 0.8F, 1});
+    const auto [x, y] = render::texel_of_direction(to_sun, 128, 64);
+    for (int c = 0; c < 3; ++c) {
+      env.radiance.at(static_cast<int>(std::lround(y)), static_cast<int>(std::lround(x)), c) = 2e3F;
+    }
+    render::LightFollower follower;
+    shot.job.lights = follower.follow(env, {});
+    render::smooth_for_reflections(env, follower.compact_texels());
+    shot.job.cam_from_set = calibrate::look_at({1.5, -4, 5}, {0, 0, 0}, 0);
+    const FrameResult with = render(shot);
+    lit = middle(with);
+    shot.environment = sky;
+    shot.job.lights = render::make_light_table(sky, {});
+    without_sun = middle(render(shot));
+  }
+  static double middle(const FrameResult& result) {
+    return float_from_half(result.rgba.pixels[result.rgba.index(32, 32, 1)]);
+  }
+  static render::SceneDescription describe(bool with_roof) {
+    render::SceneDescription scene = made_scene(false);
+    scene.instances.clear();
+    render::StandardParameters metal;
+    metal.metallic = 1;
+    metal.roughness = 0.4F;
+    scene.materials.push_back(render::make_standard_material("metal", metal));
+    const auto material = static_cast<std::uint32_t>(scene.materials.size() - 1);
+    const auto add = [&](float half_size, std::array<float, 3> at) {
+      scene.meshes.push_back(made_floor(half_size, material));
+      render::Instance& instance = scene.instances.emplace_back();
+      instance.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+      for (std::size_t i = 0; i < 3; ++i) instance.set_from_object[i * 4 + 3] = at[i];
+    };
+    add(2, {0, 0, 0});
+    if (with_roof) add(0.8F, {0, 8, 10});  // before the sun, and beside the mirrored direction
+    return scene;
+  }
+};
+
+TEST(RenderFrame, MirrorsASunInARoughPlateOnlyWhereItShines) {
+  const RoughPlate open(false), shaded(true);
+  // What a lobe mirrors of the sun: irradiance times density.
+  render::StandardSurface metal{};
+  metal.base = {1, 1, 1};
+  metal.metallic = 1;
+  metal.normal = metal.coat_normal = {0, 0, 1};
+  const render::Vec3f view = normalize(render::Vec3f{1.5F, -4, 5});
+  const auto [x, y] = render::texel_of_direction(normalize(render::Vec3f{0, 0.8F, 1}), 128, 64);
+  const int row = static_cast<int>(std::lround(y));
+  const render::Vec3f to_sun = render::direction_of_texel(std::round(x), std::round(y), 128, 64);
+  const double expected = 2e3 * render::texel_solid_angle(row, 128, 64) *
+                          render::lobe_density({0, 0, 1}, view, 0.4F, to_sun) *
+                          render::standard_weights(metal, view).specular.y;
+  EXPECT_NEAR((open.lit - open.without_sun) / expected, 1, 0.05);
+  EXPECT_NEAR(shaded.lit, shaded.without_sun, 0.02 * shaded.without_sun);
+}
+
+// A mirror ball under a small sun, whose picture in it is a few pixels or less.
+MadeShot made_glint(int size) {
+  render::SceneDescription scene = made_scene(false);
+  scene.instances.clear();
+  render::StandardParameters chrome;
+  chrome.metallic = 1;
+  chrome.roughness = 0;
+  scene.materials.push_back(render::make_standard_material("chrome", chrome));
+  scene.meshes.push_back(
+      made_ball({0.3F, 0, 0.3F}, 1, static_cast<std::uint32_t>(scene.materials.size() - 1)));
+  scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+  MadeShot shot = made_shot(size, size, std::move(scene));
+  shot.environment = made_sky(256, 0.1F, 0.2F);
+  for (int y = 40; y < 44; ++y) {
+    for (int x = 330; x < 334; ++x) {
+      for (int c = 0; c < 3; ++c) shot.environment.radiance.at(y, x, c) = 500;
+    }
+  }
+  render::smooth_for_reflections(shot.environment);
+  return shot;
+}
+
+// The rms of the difference to a picture of as many samples as there can be, clamped as a display
+// does.
+double glint_error(MadeShot& shot, const FrameResult& truth) {
+  const FrameResult result = render(shot);
+  double sum = 0;
+  for (std::size_t i = 0; i < result.rgba.pixels.size(); i += 4) {
+    const double a = std::min(float_from_half(result.rgba.pixels[i]), 4.0F);
+    const double b = std::min(float_from_half(truth.rgba.pixels[i]), 4.0F);
+    sum += (a - b) * (a - b);
+  }
+  return std::sqrt(sum / static_cast<double>(result.rgba.pixels.size() / 4));
+}
+
+TEST(RenderFrame, SamplesGlintsAndErrsLessTheLessItTolerates) {
+  MadeShot shot = made_glint(96);
+  render::Effort& effort = shot.job.effort;
+  effort.glint_contrast = 1e-3F;
+  effort.aa_tolerance = 0;
+  effort.aa_samples = 256;
+  const FrameResult truth = render(shot);
+
+  effort.aa_samples = 4;
+  effort.glint_contrast = 0;
+  const double without = glint_error(shot, truth);
+  effort.glint_contrast = 0.1F;
+  double before = glint_error(shot, truth);
+  EXPECT_LT(before, 0.8 * without);
+  for (const float tolerance : {0.2F, 0.05F, 0.01F}) {
+    effort.aa_tolerance = tolerance;
+    const double error = glint_error(shot, truth);
+    EXPECT_LT(error, 0.9 * before) << tolerance;
+    before = error;
+  }
+}
+
 TEST(RenderTile, DoesNotAllocate) {
   const MadeShot shot = made_shot(128, 96, made_scene());
   const render::FrameContext context = make_frame_context(shot.inputs(), shot.job);
@@ -198,11 +321,19 @@ TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
     shot.job = before;
   };
   refuse([](render::FrameJob& job) { job.effort.aa_samples = 0; });
+  refuse([](render::FrameJob& job) { job.effort.aa_samples = 257; });
+  refuse([](render::FrameJob& job) { job.effort.aa_tolerance = -0.1F; });
+  refuse([](render::FrameJob& job) { job.effort.aa_tolerance = std::nanf(""); });
+  refuse([](render::FrameJob& job) { job.effort.glint_contrast = -0.1F; });
+  refuse([](render::FrameJob& job) { job.effort.glint_contrast = HUGE_VALF; });
   refuse([](render::FrameJob& job) { job.effort.interleave = 3; });
   refuse([](render::FrameJob& job) { job.effort.tile_size = 20; });
   refuse([](render::FrameJob& job) { job.effort.accuracy = 2; });
   refuse([](render::FrameJob& job) { job.effort.max_depth = -1; });
   refuse([](render::FrameJob& job) { job.lights.lights[0].irradiance.x = std::nanf(""); });
+  refuse([](render::FrameJob& job) {
+    job.lights.lights.assign(render::most_compact_lights + 1, {{0, 0, 1}, {1, 1, 1}, 0, 1});
+  });
 }
 
 TEST(RenderFrame, RefusesAPlateOfAnotherSize) {

@@ -19,8 +19,11 @@ FrameJob made_job() {
   job.scene_version = 17;
   job.effort.interleave = 4;
   job.effort.adaptive_visibility = false;
+  job.effort.aa_tolerance = 0.25F;
+  job.effort.glint_contrast = 0.75F;
   job.textures = {{0, capture::Time(1)}, {1, capture::Time(2)}};
   job.lights.lights = {{{0, 0, 1}, {1, 2, 3}, 0.1F}, {{1, 0, 0}, {4, 5, 6}, 0.2F}};
+  job.lights.lights[1].compact = 1;
   job.lights.lamps = {{{1, 2, 3}, {0, 0, -1}, {7, 8, 9}}};
   job.lights.version = 5;
   job.match = {1.5F, 1, 0.5F};
@@ -55,6 +58,9 @@ Environment made_environment() {
   env.radiance.at(1, 2, 0) = 1e9F;
   env.seen.assign(8, 1);
   env.smoothed = {env.radiance};
+  env.halved = {capture::make_image(1, 2, 3)};
+  env.halved[0].at(0, 1, 1) = 3;
+  env.compact_apart = true;
   return env;
 }
 
@@ -81,7 +87,11 @@ TEST(Serialize, KeepsAnEnvironment) {
   const Environment a = made_environment(), b = parse_environment(serialize(a));
   EXPECT_EQ(b.radiance.pixels, a.radiance.pixels);
   EXPECT_EQ(b.seen, a.seen);
+  ASSERT_EQ(b.smoothed.size(), 1U);
   EXPECT_EQ(b.smoothed[0].pixels, a.smoothed[0].pixels);
+  ASSERT_EQ(b.halved.size(), 1U);
+  EXPECT_EQ(b.halved[0].pixels, a.halved[0].pixels);
+  EXPECT_TRUE(b.compact_apart);
 }
 
 // Every prefix, and thousands of changed bytes: refused, or read as something of the same kind, but

@@ -247,6 +247,8 @@ TEST_F(Runs, CheckTheErrorOfTheLastFrame) {
   const auto error = nlohmann::json::parse(content_of(json_path))["error"];
   EXPECT_GT(error["relative_rms"], 0);
   EXPECT_LT(error["relative_rms"], 0.5);
+  EXPECT_GT(error["reference_noise"], 0);
+  EXPECT_LT(error["reference_noise"], 0.5);
   EXPECT_GT(error["pixels"], 100);
 }
 

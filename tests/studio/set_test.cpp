@@ -100,6 +100,8 @@ position = [0, 0, 2]
 intensity = [1, 2, 3]
 [effort]
 aa_samples = 4
+aa_tolerance = 0.02
+glint_contrast = 0.3
 light_samples = 16
 interleave = 2
 adaptive_visibility = false
@@ -146,6 +148,8 @@ timecode = "10:00:00:00"
   ASSERT_EQ(set.lamps.size(), 1U);
   EXPECT_FLOAT_EQ(set.lamps[0].intensity[2], 3);
   EXPECT_EQ(set.effort.light_samples, 16);
+  EXPECT_FLOAT_EQ(set.effort.aa_tolerance, 0.02F);
+  EXPECT_FLOAT_EQ(set.effort.glint_contrast, 0.3F);
   EXPECT_FALSE(set.effort.adaptive_visibility);
   EXPECT_EQ(set.display.display, "sRGB");
   EXPECT_EQ(set.record.file, (dir_ / "take.mkv").string());
