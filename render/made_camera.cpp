@@ -98,7 +98,7 @@ class MadeStream final : public capture::Camera {
     }
     const Scene court(studio_.place);
     parts_ = photograph_parts(studio_, court, calibrate::make_direction_table(lens),
-                              camera_.cam_from_set, request.samples);
+                              camera_.cam_from_set, {.samples = request.samples});
     const int codes = 1 << camera_.sensor.bits;
     for (int code = 0; code < codes; ++code) {
       light_of_code_.push_back(

@@ -34,6 +34,10 @@ inline constexpr MadeCard court_card{{0.1F, -2.1F, 0.004F}, 0.5F, 0.36F, 0.9F, 0
 // How the car of the made set stands at the origin.
 inline constexpr double court_car_yaw_deg = -165;
 
+// Where a made lamp may stand, beside the car.
+inline constexpr Vec3f court_lamp_foot{1.55F, -1.5F, 0};
+inline constexpr double court_lamp_yaw_deg = 180;
+
 // Asphalt with lines and kerbs at z = 0 around the origin, where nothing but a grey card lies
 // within 3.4 m; a wall in the +y direction, a lamp post, crates, cones and bollards. Every instance
 // is a virtual object with a material of the shader "standard".

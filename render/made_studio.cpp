@@ -12,7 +12,8 @@
 #include <utility>
 
 #include "render/environment.h"
-#include "render/photograph_behind.h"
+#include "render/made_lamp.h"
+#include "render/photograph_view.h"
 #include "render/reference.h"
 #include "render/standard.h"
 
@@ -103,18 +104,20 @@ calibrate::DirectionTable cut_out(const calibrate::DirectionTable& whole, const 
   return part;
 }
 
-// The same scene with all that glows dark; null if nothing does.
-std::unique_ptr<Scene> without_glow(const Scene& scene) {
+// The same scene where only that glows whose material `glows`; null if that is so anyway.
+template <class Glows>
+std::unique_ptr<Scene> with_glow(const Scene& scene, const Glows& glows) {
   SceneDescription description = scene.description();
-  bool glows = false;
+  bool changed = false;
   for (Material& material : description.materials) {
     StandardParameters parameters = standard_parameters(material, description.textures.size());
-    if (std::ranges::all_of(parameters.emission, [](float e) { return e == 0; })) continue;
-    glows = true;
+    const bool dark = std::ranges::all_of(parameters.emission, [](float e) { return e == 0; });
+    if (dark || glows(material.name)) continue;
+    changed = true;
     std::ranges::fill(parameters.emission, 0.0F);
     material = make_standard_material(material.name, parameters);
   }
-  return glows ? std::make_unique<Scene>(std::move(description)) : nullptr;
+  return changed ? std::make_unique<Scene>(std::move(description)) : nullptr;
 }
 
 }  // namespace
@@ -237,6 +240,7 @@ capture::Image add_light(const LightParts& parts, float sun_strength) {
   capture::Image sum = parts.rest;
   for (std::size_t i = 0; i < sum.pixels.size(); ++i) {
     sum.pixels[i] += sun_strength * parts.sun.pixels[i];
+    if (!parts.lamps.empty()) sum.pixels[i] += parts.lamps.pixels[i];
   }
   return sum;
 }
@@ -245,24 +249,31 @@ LightParts photograph_parts(const MadeStudio& studio,
                             const Scene& scene,
                             const calibrate::DirectionTable& directions,
                             const calibrate::Pose& cam_from_set,
-                            int samples,
-                            std::uint32_t seed,
-                            Seen seen) {
-  ReferenceSettings settings{.samples = samples, .seed = seed, .bounces = true};
-  // What glows by itself is part of the rest, whatever the sun does.
-  const std::unique_ptr<Scene> dark = without_glow(scene);
-  const Scene& sunlit = dark ? *dark : scene;
-  const auto take = [&](const Scene& seen_scene, const capture::Image& light,
+                            const PhotographSettings& settings) {
+  ReferenceSettings paths{.samples = settings.samples, .seed = settings.seed, .bounces = true};
+  PhotographView view{.behind_virtual = settings.behind_virtual};
+  const auto take = [&](const std::unique_ptr<Scene>& other, const capture::Image& light,
                         const calibrate::DirectionTable& towards) {
     const Environment environment = as_environment(light);
-    const FrameInputs inputs{&seen_scene, &towards, &environment};
-    return seen == Seen::everything ? photograph(inputs, cam_from_set, settings)
-                                    : photograph_behind(inputs, cam_from_set, settings);
+    return photograph({other ? other.get() : &scene, &towards, &environment}, cam_from_set, paths,
+                      view);
   };
-  LightParts parts{take(sunlit, studio.sky.sun, directions),
-                   take(scene, studio.sky.rest, directions)};
+  // What glows by itself is there once, whatever the sun does: in the rest, or, where lamps stand
+  // for it, in a part of its own.
+  const auto is_lamp = [&](const std::string& name) {
+    return !settings.lamps.empty() && name == lamp_glow;
+  };
+  const auto sunlit = with_glow(scene, [](const std::string&) { return false; });
+  const auto restlit = with_glow(scene, [&](const std::string& name) { return !is_lamp(name); });
+  LightParts parts{
+      take(sunlit, studio.sky.sun, directions), take(restlit, studio.sky.rest, directions), {}};
+  if (!settings.lamps.empty()) {
+    view.lamps = settings.lamps;
+    parts.lamps = take(with_glow(scene, is_lamp), capture::make_image(16, 32), directions);
+    view.lamps = {};
+  }
   if (const auto rect = find_sun(parts.sun)) {
-    settings.samples = samples * sun_samples_factor;
+    paths.samples = settings.samples * sun_samples_factor;
     const capture::Image finer = take(sunlit, studio.sky.sun, cut_out(directions, *rect));
     for (int y = 0; y < finer.height; ++y) {
       std::copy_n(&finer.pixels[finer.index(y, 0)], finer.width * 3,

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "calibrate/lens.h"
@@ -10,6 +12,7 @@
 #include "calibrate/track.h"
 #include "capture/frame.h"
 #include "capture/made_sensor.h"
+#include "render/light_table.h"
 #include "render/made_court.h"
 #include "render/made_sky.h"
 #include "render/scene.h"
@@ -46,17 +49,24 @@ struct MadeStudioSettings {
 // Throws std::invalid_argument for sizes below 16, or frames below 1.
 void check(const MadeStudioSettings& settings);
 
+// Where something stands.
+struct MadeStand {
+  Vec3f foot;
+  double yaw_deg = 0;
+};
+
 // Everything of the studio but time. The set's origin is the spot on the ground where a car is to
 // stand; radiance is in the plate's units, 1 = display white.
 struct MadeStudio {
   MadeStudioSettings settings;
   MadeSky sky;
-  SceneDescription place;  // its first instance is the ground around the origin
-  double car_yaw_deg = 0;  // how the car is to stand
-  MadeCamera plate;        // 25 pictures a second, Rec.1886 codes of 8 bits
-  MadeCamera probe;        // exposures in turn, sRGB codes of 8 bits, looking straight up
-  double cloud_share = 0;  // of the sun's light that a passing cloud takes at most
-  capture::Time period{};  // of the light
+  SceneDescription place;         // its first instance is the ground around the origin
+  double car_yaw_deg = 0;         // how the car is to stand
+  std::optional<MadeStand> lamp;  // where a made lamp is to stand, if one is
+  MadeCamera plate;               // 25 pictures a second, Rec.1886 codes of 8 bits
+  MadeCamera probe;               // exposures in turn, sRGB codes of 8 bits, looking straight up
+  double cloud_share = 0;         // of the sun's light that a passing cloud takes at most
+  capture::Time period{};         // of the light
 };
 
 // The court under a made sky with a passing cloud. The plate camera stands; the probe takes 75
@@ -77,26 +87,27 @@ float sun_strength(const MadeStudio& studio, capture::Time time);
 std::array<int, 4> picture_of_card(const MadeStudio& studio);
 
 // What is seen of a still scene, by where its light came from: at any strength of the sun, the
-// picture is rest + strength * sun, since light adds.
+// picture is rest + strength * sun + lamps, since light adds.
 struct LightParts {
-  capture::Image sun;   // (height, width, 3)
-  capture::Image rest;  // (height, width, 3)
+  capture::Image sun;    // (height, width, 3)
+  capture::Image rest;   // (height, width, 3)
+  capture::Image lamps;  // (height, width, 3); empty = there are none
 };
 capture::Image add_light(const LightParts& parts, float sun_strength);
 
-// What a photograph shows: all there is, or what is behind virtual objects (photograph_behind.h).
-enum class Seen { everything, behind_virtual };
+struct PhotographSettings {
+  int samples = 16;  // paths a pixel for each part of the light, more where the sun itself is seen
+  std::uint32_t seed = 1;       // of the noise, which does not depend on the number of threads
+  bool behind_virtual = false;  // see PhotographView
+  std::span<const LocalLight> lamps = {};  // of the made lamps that are in the scene (made_lamp.h)
+};
 
-// A scene in the studio's light through `directions`, path-traced with `samples` paths a pixel for
-// each part of the light, and more where the sun itself is seen. Noise depends on `seed` alone, not
-// on the number of threads.
+// A scene in the studio's light through `directions`, path-traced.
 LightParts photograph_parts(const MadeStudio& studio,
                             const Scene& scene,
                             const calibrate::DirectionTable& directions,
                             const calibrate::Pose& cam_from_set,
-                            int samples,
-                            std::uint32_t seed = 1,
-                            Seen seen = Seen::everything);
+                            const PhotographSettings& settings);
 
 // Directions of a latitude-longitude map (height, 2 * height) as render::Environment has them, for
 // a camera that is not turned against the set.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "capture/exr.h"
 #include "render/join_scenes.h"
 #include "render/made_car.h"
+#include "render/made_lamp.h"
 #include "render/made_park.h"
 #include "studio/demo_files.h"
 
@@ -20,6 +22,11 @@ namespace studio {
 namespace {
 
 namespace fs = std::filesystem;
+
+render::Placement placement_of(const render::MadeStand& stand) {
+  constexpr double degree = std::numbers::pi / 180;
+  return render::placed(stand.foot, static_cast<float>(stand.yaw_deg * degree));
+}
 
 double mean_of(const capture::Image& image) {
   return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) /
@@ -37,7 +44,12 @@ std::uintmax_t bytes_in(const fs::path& dir) {
 }  // namespace
 
 render::MadeStudio make_demo_studio(const DemoSettings& settings) {
-  if (settings.world == DemoWorld::court) return render::make_studio(settings.studio);
+  if (settings.world == DemoWorld::court) {
+    render::MadeStudio studio = render::make_studio(settings.studio);
+    if (settings.lamp) studio.lamp = {render::court_lamp_foot, render::court_lamp_yaw_deg};
+    return studio;
+  }
+  if (settings.lamp) throw std::invalid_argument("only the court has a lamp");
   const std::string map = settings.map.string();
   const auto picture = capture::open_camera("file:" + map)->next();
   if (!picture || !picture->image) throw std::runtime_error(map + ": holds no picture");
@@ -48,15 +60,19 @@ render::MadeStudio make_demo_studio(const DemoSettings& settings) {
   }
 }
 
-render::SceneDescription place_with_car(const render::MadeStudio& studio,
-                                        std::vector<bool>& is_car) {
-  constexpr double degree = std::numbers::pi / 180;
+render::SceneDescription place_with_objects(const render::MadeStudio& studio,
+                                            std::vector<bool>& is_virtual) {
   render::SceneDescription scene = studio.place;
-  is_car.assign(scene.instances.size(), false);
-  render::join(scene, render::made_car(),
-               render::placed({}, static_cast<float>(studio.car_yaw_deg * degree)));
-  is_car.resize(scene.instances.size(), true);
+  is_virtual.assign(scene.instances.size(), false);
+  render::join(scene, render::made_car(), placement_of({{}, studio.car_yaw_deg}));
+  if (studio.lamp) render::join(scene, render::made_lamp(), placement_of(*studio.lamp));
+  is_virtual.resize(scene.instances.size(), true);
   return scene;
+}
+
+std::vector<render::LocalLight> lights_of_lamp(const render::MadeStudio& studio, int count) {
+  if (!studio.lamp) return {};
+  return render::lights_of_made_lamp(placement_of(*studio.lamp), count);
 }
 
 DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progress) {
@@ -69,12 +85,16 @@ DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progres
   const render::MadeStudio studio = make_demo_studio(settings);
   const render::Scene place(studio.place);
   const auto plate_directions = calibrate::make_direction_table(studio.plate.lens);
-  const auto photograph = [&](const render::Scene& scene, int n) {
+  const std::vector<render::LocalLight> lamp = lights_of_lamp(studio, lights_of_photographed_lamp);
+  const auto photograph = [&](const render::Scene& scene, int n,
+                              std::span<const render::LocalLight> lamps = {}) {
     // Frame 0 has a truth to be compared with; the others' noise need only stay below the sensor's.
     const int samples = n == 0 ? settings.samples : (settings.samples + 1) / 2;
     return render::photograph_parts(studio, scene, plate_directions,
-                                    render::pose_of_picture(studio.plate, n), samples,
-                                    studio.settings.seed + static_cast<std::uint32_t>(n));
+                                    render::pose_of_picture(studio.plate, n),
+                                    {.samples = samples,
+                                     .seed = studio.settings.seed + static_cast<std::uint32_t>(n),
+                                     .lamps = lamps});
   };
   const auto strength_at = [&](int n) {
     return render::sun_strength(studio, render::time_of_picture(studio.plate, n));
@@ -93,14 +113,14 @@ DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progres
 
   progress(0.5, "the probe");
   const calibrate::Pose& probe_pose = studio.probe.cam_from_set;
-  const render::LightParts probe =
-      render::photograph_parts(studio, place, calibrate::make_direction_table(studio.probe.lens),
-                               probe_pose, settings.samples, studio.settings.seed);
+  const render::LightParts probe = render::photograph_parts(
+      studio, place, calibrate::make_direction_table(studio.probe.lens), probe_pose,
+      {.samples = settings.samples, .seed = studio.settings.seed});
   figures.shots = write_demo_probe(settings.dir / "probe", studio, probe);
   const calibrate::Pose unturned{{}, -calibrate::position_of(probe_pose)};
   const render::LightParts around = render::photograph_parts(
       studio, place, render::latlong_directions(settings.studio.sky_height), unturned,
-      std::max(1, settings.samples / 4), studio.settings.seed);
+      {.samples = std::max(1, settings.samples / 4), .seed = studio.settings.seed});
   capture::write_exr((truth / "environment.exr").string(),
                      render::add_light(around, strength_at(0)));
   write_demo_cameras(settings.dir, studio);
@@ -109,22 +129,22 @@ DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progres
   write_demo_truth(truth / "truth.json", settings, studio);
 
   progress(0.6, "the photograph");
-  std::vector<bool> is_car;
-  const render::SceneDescription with_car = place_with_car(studio, is_car);
+  std::vector<bool> is_virtual;
+  const render::SceneDescription with_objects = place_with_objects(studio, is_virtual);
   {
-    const render::Scene scene(with_car);
-    const capture::Image radiance = render::add_light(photograph(scene, 0), strength_at(0));
+    const render::Scene scene(with_objects);
+    const capture::Image radiance = render::add_light(photograph(scene, 0, lamp), strength_at(0));
     capture::write_exr((truth / "photograph_0000.exr").string(), radiance);
     write_demo_picture(truth / "photograph_0000.png", studio, radiance, 0);
   }
   const auto coverage = [&](const std::vector<bool>& seen) {
-    return render::coverage_of(with_car, seen, plate_directions, studio.plate.cam_from_set,
+    return render::coverage_of(with_objects, seen, plate_directions, studio.plate.cam_from_set,
                                settings.samples);
   };
-  const capture::Image car = coverage(is_car);
-  capture::write_exr((truth / "coverage_0000.exr").string(), car);
-  figures.car_share = mean_of(car);
-  std::vector<bool> is_ground(is_car.size(), false);
+  const capture::Image covered = coverage(is_virtual);
+  capture::write_exr((truth / "coverage_0000.exr").string(), covered);
+  figures.car_share = mean_of(covered);
+  std::vector<bool> is_ground(is_virtual.size(), false);
   is_ground.front() = true;
   figures.ground_share = mean_of(coverage(is_ground));
   figures.bytes = bytes_in(settings.dir);

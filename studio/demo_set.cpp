@@ -24,6 +24,11 @@ std::string numbers(calibrate::Vec3 v) {
   return fmt::format("[{}, {}, {}]", number(v.x), number(v.y), number(v.z));
 }
 
+// As many digits as floats have.
+std::string numbers(render::Vec3f v) {
+  return fmt::format("[{:.6g}, {:.6g}, {:.6g}]", v.x, v.y, v.z);
+}
+
 // The nine numbers of a set file's rotation.
 std::string rotation(const calibrate::Pose& pose) {
   std::string list = "[";
@@ -73,6 +78,17 @@ std::string car_section(const render::MadeStudio& studio) {
       studio.car_yaw_deg);
 }
 
+// The lamp as an object, and what it shines as one point.
+std::string lamp_sections(const render::MadeStudio& studio) {
+  if (!studio.lamp) return "";
+  const render::LocalLight light = lights_of_lamp(studio, 1).front();
+  return fmt::format(
+      "[[object]]\nname = \"lamp\"\nmade = \"lamp\"\npose = {{ position = {}, yaw = {} }}\n\n"
+      "[[lamp]]\nposition = {}\nfacing = {}\nintensity = {}\n\n",
+      numbers(studio.lamp->foot), studio.lamp->yaw_deg, numbers(light.position),
+      numbers(light.normal), numbers(light.intensity));
+}
+
 }  // namespace
 
 void write_text(const fs::path& file, std::string_view text) {
@@ -91,16 +107,14 @@ std::string court_set(const render::MadeStudio& studio, const std::string& prefi
       studio, prefix,
       fmt::format("{{ patch = [{}, {}, {}, {}], albedo = {} }}  # a grey card on the ground",
                   patch[0], patch[1], patch[2], patch[3], number(card.albedo)));
-  text += car_section(studio);
+  text += car_section(studio) + lamp_sections(studio);
   text +=
       "[[stand_in]]\nname = \"court\"\nshape = \"plane\"\nsize = [16, 16]\n"
       "pose = { position = [0, 1.8, 0] }\ncatches = [\"shadow\", \"light\"]\nalbedo = 0.16\n\n";
   text += fmt::format(
       "[[stand_in]]\nname = \"crate\"\nshape = \"box\"\nsize = {}\n"
       "pose = {{ position = {}, yaw = {:.4f} }}\nblocks_light = true\n",
-      fmt::format("[{:.6g}, {:.6g}, {:.6g}]", crate.size.x, crate.size.y, crate.size.z),
-      fmt::format("[{:.6g}, {:.6g}, {:.6g}]", crate.middle.x, crate.middle.y, crate.middle.z),
-      crate.yaw_rad * degrees_per_rad);
+      numbers(crate.size), numbers(crate.middle), crate.yaw_rad * degrees_per_rad);
   text += "\n[record]\nfile = \"take.mkv\"\n";
   return text;
 }
@@ -149,6 +163,7 @@ void write_demo_truth(const fs::path& file,
   truth["sky_height"] = made.sky_height;
   truth["texture_size"] = made.texture_size;
   truth["frames"] = made.frames;
+  truth["lamp"] = settings.lamp;
   truth["samples"] = settings.samples;
   truth["seed"] = made.seed;
   truth["clap_s"] = demo_clap_s;
@@ -193,6 +208,7 @@ DemoSettings read_demo_truth(const fs::path& file) {
                        .texture_size = truth.at("texture_size"),
                        .frames = truth.at("frames"),
                        .seed = truth.at("seed")};
+    settings.lamp = truth.at("lamp");
     settings.samples = truth.at("samples");
     return settings;
   } catch (const std::exception& error) {

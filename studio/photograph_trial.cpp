@@ -85,47 +85,49 @@ PhotographTrial::PhotographTrial(const std::string& set_file,
 
   progress(0, "the place");
   const render::MadeStudio studio = make_demo_studio(demo);
-  std::vector<bool> is_car;
-  render::SceneDescription with_car = place_with_car(studio, is_car);
-  for (std::size_t i = 0; i < is_car.size(); ++i) {
-    if (!is_car[i]) with_car.instances[i].kind = render::ObjectKind::stand_in;
+  std::vector<bool> is_virtual;
+  render::SceneDescription with_objects = place_with_objects(studio, is_virtual);
+  for (std::size_t i = 0; i < is_virtual.size(); ++i) {
+    if (!is_virtual[i]) with_objects.instances[i].kind = render::ObjectKind::stand_in;
   }
   const render::Scene place(studio.place);
-  const render::Scene scene(with_car);
+  const render::Scene scene(with_objects);
   const calibrate::Pose& pose = studio.plate.cam_from_set;
   const float strength = render::sun_strength(studio, render::time_of_picture(studio.plate, 0));
   std::uint32_t seed = first_seed;
   double done = 0.05;
-  const auto take = [&](const render::Scene& seen, render::Seen what) {
+  const std::vector<render::LocalLight> lamp = lights_of_lamp(studio, lights_of_photographed_lamp);
+  const auto take = [&](const render::Scene& seen, bool with_lamp, bool behind_virtual) {
     progress(done += 0.13, "photographs");
-    return add_light(photograph_parts(studio, seen, *frame_.directions, pose,
-                                      settings.photograph_samples, seed++, what),
-                     strength);
+    render::PhotographSettings paths{
+        .samples = settings_.photograph_samples, .seed = seed++, .behind_virtual = behind_virtual};
+    if (with_lamp) paths.lamps = lamp;
+    return add_light(photograph_parts(studio, seen, *frame_.directions, pose, paths), strength);
   };
-  const auto take_twice = [&](const render::Scene& seen, render::Seen what) {
+  const auto take_twice = [&](const render::Scene& seen, bool with_lamp, bool behind_virtual) {
     Twice twice;
-    twice.first = take(seen, what);
-    twice.second = take(seen, what);
+    twice.first = take(seen, with_lamp, behind_virtual);
+    twice.second = take(seen, with_lamp, behind_virtual);
     return twice;
   };
-  photographs_ = take_twice(scene, render::Seen::everything);
-  plates_ = take_twice(place, render::Seen::everything);
-  behind_ = take_twice(scene, render::Seen::behind_virtual);
+  photographs_ = take_twice(scene, true, false);
+  plates_ = take_twice(place, false, false);
+  behind_ = take_twice(scene, true, true);
   photograph_ = mean_of(photographs_.first, photographs_.second);
 
   progress(0.9, "the light");
   const calibrate::Pose at_probe{{}, -calibrate::position_of(studio.probe.cam_from_set)};
-  true_light_.radiance =
-      add_light(photograph_parts(studio, place, render::latlong_directions(demo.studio.sky_height),
-                                 at_probe, settings.photograph_samples, seed++),
-                strength);
+  true_light_.radiance = add_light(
+      photograph_parts(studio, place, render::latlong_directions(demo.studio.sky_height), at_probe,
+                       {.samples = settings.photograph_samples, .seed = seed++}),
+      strength);
   true_light_.seen.assign(true_light_.radiance.pixels.size() / 3, 1);
   smooth_for_reflections(true_light_);
   true_table_ = make_light_table(true_light_, {frame_.job.effort.light_samples});
   true_table_.lamps = frame_.job.lights.lamps;
 
   progress(0.95, "the matte");
-  coverage_ = render::coverage_of(with_car, is_car, *frame_.directions, pose,
+  coverage_ = render::coverage_of(with_objects, is_virtual, *frame_.directions, pose,
                                   4 * settings.photograph_samples);
   find_mask();
 }

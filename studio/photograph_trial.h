@@ -20,7 +20,7 @@ struct Truths {
   bool plate = false;        // the plate before noise, clipping and coding
   bool light = false;        // the light around the probe, for what was measured of it
   bool calibration = false;  // the camera's pose, for one that is off by the trial's error
-  bool matte = false;        // the car's coverage, and the ground with its shadow behind the car
+  bool matte = false;        // the objects' coverage, and the ground in their shadow behind them
   bool sampling = false;     // endless lights, rays and edge samples, for the kernel's
   bool bounces = false;  // light between surfaces, which the kernel leaves out; needs `sampling`
 };
@@ -79,7 +79,7 @@ class PhotographTrial {
   render::Environment true_light_;  // at the probe
   render::LightTable true_table_;
   Twice photographs_, plates_, behind_;
-  capture::Image coverage_;  // of the car
+  capture::Image coverage_;  // of what is virtual
   capture::Image photograph_, mask_;
 };
 

@@ -99,7 +99,7 @@ struct PlacementSettings {
 struct ObjectSettings {
   std::string name;
   std::string mesh;  // file; "" = made
-  std::string made;  // "car"
+  std::string made;  // "car", "lamp"
   Place place;       // of `mesh` or `made`
   PlacementSettings pose;
   std::vector<std::string> hide;  // parts left out, by node name
@@ -126,10 +126,12 @@ struct StandInSettings {
   bool blocks_light = false;
 };
 
-// A virtual lamp: a point that shines to all sides.
+// A virtual lamp: a point that shines to all sides, or as a small disc that faces somewhere.
 struct LampSettings {
   calibrate::Vec3 position;
-  std::array<float, 3> intensity{};  // radiant intensity, in the plate's units
+  std::optional<calibrate::Vec3> facing;  // unit
+  std::array<float, 3>
+      intensity{};  // radiant intensity (of a disc: straight ahead), in the plate's units
 };
 
 struct DisplayChoice {

@@ -60,7 +60,7 @@ ObjectSettings read_object_section(Section section, const SetContext& context) {
   }
   object.place = section.place_of(section.has("mesh") ? "mesh" : "made");
   section.file("mesh", context.base, object.mesh);
-  section.word("made", object.made, {"car"});
+  section.word("made", object.made, {"car", "lamp"});
   if (auto table = section.table("pose")) object.pose = read_placement(*table);
   section.texts("hide", object.hide);
   section.number("emission_gain", object.emission_gain, {0, 1e9});
@@ -110,6 +110,13 @@ LampSettings read_lamp_section(Section section) {
   section.need("position", "where the lamp is, in metres");
   section.need("intensity", "what it shines: a number, or one for each colour");
   section.vector("position", lamp.position, metres);
+  calibrate::Vec3 facing;
+  if (section.vector("facing", facing, {-1, 1})) {
+    if (calibrate::length(facing) < 0.5)
+      section.fault("facing", "must be about of length 1");
+    else
+      lamp.facing = calibrate::normalize(facing);
+  }
   section.colour("intensity", lamp.intensity, {0, 1e9});
   section.finish();
   return lamp;

@@ -12,6 +12,7 @@
 #include "render/join_scenes.h"
 #include "render/load_mesh.h"
 #include "render/made_car.h"
+#include "render/made_lamp.h"
 
 namespace studio {
 namespace {
@@ -39,6 +40,7 @@ SceneDescription load_object(const ObjectSettings& object) {
     car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
     return render::made_car(car);
   }
+  if (object.made == "lamp") return render::made_lamp(static_cast<float>(object.emission_gain));
   render::LoadOptions options;
   options.hide = object.hide;
   options.emission_gain = static_cast<float>(object.emission_gain);
@@ -199,7 +201,9 @@ std::vector<render::LocalLight> describe_lamps(const Set& set) {
   std::vector<render::LocalLight> lamps;
   for (const LampSettings& lamp : set.lamps) {
     const auto& [red, green, blue] = lamp.intensity;
-    lamps.push_back({calibrate::to_float(lamp.position), {}, {red, green, blue}});
+    lamps.push_back({calibrate::to_float(lamp.position),
+                     calibrate::to_float(lamp.facing.value_or(calibrate::Vec3{})),
+                     {red, green, blue}});
   }
   return lamps;
 }

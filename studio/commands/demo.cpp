@@ -18,6 +18,7 @@ struct DemoOptions {
   std::string dir;
   std::string world = "court";
   std::string map;
+  bool lamp = false;
   std::optional<std::int64_t> width;
   std::optional<std::int64_t> samples;
   std::optional<std::int64_t> frames;
@@ -29,6 +30,7 @@ void demo(const DemoOptions& options, Console& console) {
   settings.dir = options.dir;
   if (options.world == "park") {
     if (options.map.empty()) throw UsageError("the park is lit by a map: --map FILE.hdr");
+    if (options.lamp) throw UsageError("the lamp stands on the court: --lamp is not for the park");
     settings.world = DemoWorld::park;
     settings.map = options.map;
     settings.studio = render::park_settings();
@@ -37,6 +39,7 @@ void demo(const DemoOptions& options, Console& console) {
   } else if (!options.map.empty()) {
     throw UsageError("the court has a sky of its own: --map is for the park");
   }
+  settings.lamp = options.lamp;
   if (options.width) {
     const int width = static_cast<int>(*options.width);
     settings.studio.height = width * settings.studio.height / settings.studio.width;
@@ -75,6 +78,7 @@ Command demo_command() {
         arguments.option("--world", options->world,
                          "court (a made sky) or park (a real map of light; the camera pans)");
         arguments.option("--map", options->map, "of the park: a latitude-longitude .hdr or .exr");
+        arguments.flag("--lamp", options->lamp, "of the court: a lamp beside the car, virtual too");
         arguments.option("--width", options->width, 32, 8192,
                          "of the plate (court 640, park 1280); its shape stays");
         arguments.option("--samples", options->samples, 1, 65536,

@@ -54,8 +54,9 @@ TEST(MakePark, LightsTheGroundWithTheMapThatTheProbeSees) {
   const MadeStudio& park = shared_park();
   const Scene place(park.place);
   const auto photograph = [&](const calibrate::Lens& lens, const calibrate::Pose& camera) {
-    return add_light(
-        photograph_parts(park, place, calibrate::make_direction_table(lens), camera, 64), 1);
+    return add_light(photograph_parts(park, place, calibrate::make_direction_table(lens), camera,
+                                      {.samples = 64}),
+                     1);
   };
   // Of the sky alone: the albedo of a spot of ground is its radiance over irradiance, in both
   // lights.

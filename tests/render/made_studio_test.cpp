@@ -33,7 +33,7 @@ const Scene& shared_court() {
 const LightParts& probe_parts() {
   static const LightParts parts = photograph_parts(
       shared_studio(), shared_court(), calibrate::make_direction_table(shared_studio().probe.lens),
-      shared_studio().probe.cam_from_set, 32);
+      shared_studio().probe.cam_from_set, {.samples = 32});
   return parts;
 }
 
@@ -42,7 +42,8 @@ Vec3f true_irradiance(float strength) {
   static const LightParts around = [] {
     const MadeStudio& studio = shared_studio();
     const calibrate::Pose unturned{{}, -calibrate::position_of(studio.probe.cam_from_set)};
-    return photograph_parts(studio, shared_court(), latlong_directions(64), unturned, 16);
+    return photograph_parts(studio, shared_court(), latlong_directions(64), unturned,
+                            {.samples = 16});
   }();
   Environment environment;
   environment.radiance = add_light(around, strength);
@@ -104,8 +105,8 @@ TEST(MadePlate, ShowsTheGreyCardAsBrightAsTheProbesLightMakesIt) {
   const calibrate::Lens lens{"pinhole", 8, 8, {400, 400, 3.5, 3.5}};
   const calibrate::Vec3 card = to_double(court_card.middle);
   const auto camera = calibrate::look_at(card + calibrate::Vec3{0, 0, 3}, card, 0);
-  const LightParts parts =
-      photograph_parts(studio, shared_court(), calibrate::make_direction_table(lens), camera, 256);
+  const LightParts parts = photograph_parts(
+      studio, shared_court(), calibrate::make_direction_table(lens), camera, {.samples = 256});
   for (const float strength : {1.0F, 0.65F}) {
     const capture::Image picture = add_light(parts, strength);
     double mean = 0;
@@ -118,13 +119,15 @@ TEST(MadePlate, ShowsTheGreyCardAsBrightAsTheProbesLightMakesIt) {
 TEST(PhotographParts, AddUpToThePictureUnderBothLights) {
   MadeStudio studio = shared_studio();
   const auto directions = calibrate::make_direction_table(studio.plate.lens);
-  const capture::Image sum = add_light(
-      photograph_parts(studio, shared_court(), directions, studio.plate.cam_from_set, 24), 1);
+  const capture::Image sum = add_light(photograph_parts(studio, shared_court(), directions,
+                                                        studio.plate.cam_from_set, {.samples = 24}),
+                                       1);
   for (std::size_t i = 0; i < studio.sky.sun.pixels.size(); ++i) {
     studio.sky.rest.pixels[i] += studio.sky.sun.pixels[i];
   }
-  const capture::Image whole =
-      photograph_parts(studio, shared_court(), directions, studio.plate.cam_from_set, 24).rest;
+  const capture::Image whole = photograph_parts(studio, shared_court(), directions,
+                                                studio.plate.cam_from_set, {.samples = 24})
+                                   .rest;
   double difference = 0;
   double total = 0;
   for (std::size_t i = 0; i < sum.pixels.size(); ++i) {
@@ -144,7 +147,8 @@ TEST(PhotographParts, HaveWhatGlowsOnceAndNotDimmedWithTheSun) {
   const Scene scene(std::move(description));
   const auto directions = calibrate::make_direction_table({"pinhole", 4, 4, {4, 4, 1.5, 1.5}});
   const auto camera = calibrate::look_at({0, 0, 2}, {0, 0, 0}, 0);
-  const LightParts parts = photograph_parts(shared_studio(), scene, directions, camera, 8);
+  const LightParts parts =
+      photograph_parts(shared_studio(), scene, directions, camera, {.samples = 8});
   for (const float strength : {0.0F, 1.0F}) {
     EXPECT_NEAR(add_light(parts, strength).at(2, 2, 1), 3, 1e-4) << strength;
   }
@@ -154,7 +158,8 @@ TEST(PhotographParts, RepeatThemselves) {
   const MadeStudio& studio = shared_studio();
   const auto directions = calibrate::make_direction_table(studio.plate.lens);
   const auto take = [&] {
-    return photograph_parts(studio, shared_court(), directions, studio.plate.cam_from_set, 2);
+    return photograph_parts(studio, shared_court(), directions, studio.plate.cam_from_set,
+                            {.samples = 2});
   };
   const LightParts once = take();
   const LightParts again = take();

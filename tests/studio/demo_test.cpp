@@ -179,6 +179,39 @@ TEST(WriteDemo, OfTheParkIsCompositedAsItsPhotographSays) {
   fs::remove_all(settings.dir);
 }
 
+// The lamp of the set is a point over the ground; the photograph's is a glowing disc under a shade.
+TEST(WriteDemo, WithALampIsLitByItAsItsPhotographSays) {
+  start();
+  DemoSettings settings = tiny("lamp");
+  settings.lamp = true;
+  settings.studio.width = 160;
+  settings.studio.height = 120;
+  settings.studio.frames = 1;
+  settings.samples = 16;
+  const DemoFigures figures = write_demo(settings, ignore);
+  const Set set = read_set(figures.set.string());
+  ASSERT_EQ(set.lamps.size(), 1U);
+  EXPECT_NEAR(set.lamps[0].facing.value().z, -1, 1e-6);
+  const PreparedFrame frame = FrameMaker(set).make(0).value();
+  render::FrameResult result;
+  render_frame(frame.inputs(), frame.job, *frame.plate, result);
+  const auto truth = [&](const char* name) {
+    return capture::read_exr((settings.dir / "truth" / name).string());
+  };
+  const capture::Image plate = truth("plate_linear_0000.exr");
+  const capture::Image photograph = truth("photograph_0000.exr");
+  capture::Image lit = truth("coverage_0000.exr");
+  int pixels = 0;
+  for (std::size_t i = 0; i < lit.pixels.size(); ++i) {
+    const bool brighter = photograph.pixels[3 * i] > 1.25F * plate.pixels[3 * i];
+    lit.pixels[i] = lit.pixels[i] == 0 && brighter ? 1.0F : 0.0F;
+    pixels += lit.pixels[i] > 0;
+  }
+  EXPECT_GT(pixels, 100);
+  EXPECT_NEAR(median_ratio(capture::to_float(result.rgba), photograph, lit), 1, 0.06);
+  fs::remove_all(settings.dir);
+}
+
 TEST(ParkSet, IsTheOneInTheProjectButForWhereItsFootageLies) {
   render::MadeStudioSettings settings = render::park_settings();
   settings.texture_size = 64;

@@ -97,6 +97,7 @@ roughness = 0.1
 blocks_light = true
 [[lamp]]
 position = [0, 0, 2]
+facing = [0, 0, -0.9]
 intensity = [1, 2, 3]
 [effort]
 aa_samples = 4
@@ -147,6 +148,7 @@ timecode = "10:00:00:00"
   EXPECT_TRUE(set.stand_ins[0].blocks_light);
   ASSERT_EQ(set.lamps.size(), 1U);
   EXPECT_FLOAT_EQ(set.lamps[0].intensity[2], 3);
+  EXPECT_EQ(set.lamps[0].facing, (calibrate::Vec3{0, 0, -1}));
   EXPECT_EQ(set.effort.light_samples, 16);
   EXPECT_FLOAT_EQ(set.effort.aa_tolerance, 0.02F);
   EXPECT_FLOAT_EQ(set.effort.glint_contrast, 0.3F);

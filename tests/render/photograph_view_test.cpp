@@ -1,5 +1,5 @@
 // What is photographed behind virtual objects: the ground in their shadow, and nothing of them.
-#include "render/photograph_behind.h"
+#include "render/photograph_view.h"
 
 #include <algorithm>
 
@@ -30,7 +30,7 @@ Environment even_light() {
   return light;
 }
 
-TEST(PhotographBehind, ShowsTheFloorInTheShadowOfWhatItLooksThrough) {
+TEST(PhotographView, ShowsTheFloorInTheShadowOfWhatItLooksThrough) {
   const Scene scene(floor_and_box());
   const Environment light = even_light();
   const auto directions =
@@ -39,7 +39,7 @@ TEST(PhotographBehind, ShowsTheFloorInTheShadowOfWhatItLooksThrough) {
   // So few that photograph() gives every pixel as many.
   const ReferenceSettings settings{.samples = 31, .bounces = true};
   const FrameInputs inputs{&scene, &directions, &light};
-  const capture::Image behind = photograph_behind(inputs, camera, settings);
+  const capture::Image behind = photograph(inputs, camera, settings, {.behind_virtual = true});
   const capture::Image before = photograph(inputs, camera, settings);
   // In the corner the box is not seen: the same paths.
   for (int c = 0; c < 3; ++c) EXPECT_EQ(behind.at(1, 1, c), before.at(1, 1, c));
@@ -51,10 +51,10 @@ TEST(PhotographBehind, ShowsTheFloorInTheShadowOfWhatItLooksThrough) {
   EXPECT_GT(before.at(16, 16, 1), 0.6);
 }
 
-TEST(PhotographBehind, RefusesNothingToLookAt) {
+TEST(PhotographView, RefusesNothingToLookAt) {
   const Scene scene(floor_and_box());
   const Environment light = even_light();
-  EXPECT_THROW(photograph_behind({&scene, nullptr, &light}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(photograph({&scene, nullptr, &light}, {}, {}, {}), std::invalid_argument);
 }
 
 }  // namespace

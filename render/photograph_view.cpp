@@ -1,5 +1,5 @@
-// Paths from the camera through what is virtual.
-#include "render/photograph_behind.h"
+// Paths of a photograph in a view of its own.
+#include "render/photograph_view.h"
 
 #include <array>
 #include <cstdint>
@@ -15,9 +15,10 @@
 
 namespace render {
 
-capture::Image photograph_behind(const FrameInputs& inputs,
-                                 const calibrate::Pose& cam_from_set,
-                                 const ReferenceSettings& settings) {
+capture::Image photograph(const FrameInputs& inputs,
+                          const calibrate::Pose& cam_from_set,
+                          const ReferenceSettings& settings,
+                          const PhotographView& view) {
   if (inputs.scene == nullptr || inputs.directions == nullptr || inputs.environment == nullptr) {
     throw std::invalid_argument("a photograph needs a scene, directions and an environment");
   }
@@ -27,11 +28,11 @@ capture::Image photograph_behind(const FrameInputs& inputs,
   PathRules rules;
   rules.max_depth = settings.max_depth;
   rules.diffuse_bounces = rules.sees_background = true;
-  rules.camera_mask = mask_stand_in;
+  if (view.behind_virtual) rules.camera_mask = mask_stand_in;
   rules.scattered_mask = rules.lobe_blockers = rules.diffuse_blockers =
       mask_virtual | mask_stand_in;
   const EnvironmentSampler environment(*inputs.environment);
-  const PathTracer tracer(*inputs.scene, environment, {}, rules);
+  const PathTracer tracer(*inputs.scene, environment, view.lamps, rules);
   const PixelRays rays(*inputs.directions, cam_from_set);
   const int width = inputs.directions->width;
   capture::Image picture = capture::make_image(inputs.directions->height, width, 3);
