@@ -119,7 +119,11 @@ Chart chart_set(const std::string& set_path, const SetChartSettings& settings, C
       console.progress(0, "reference");
       truth = truth_of(take.last, settings.samples);
     }
-    chart.points.push_back(point_of(all[i], take.frame_ms, error_against(truth, take.last)));
+    const render::PictureError error = error_against(truth, take.last);
+    if (error.pixels == 0) {
+      throw std::runtime_error(set_path + " shows nothing virtual: every effort costs the same");
+    }
+    chart.points.push_back(point_of(all[i], take.frame_ms, error));
     console.progress(static_cast<double>(i + 1) / static_cast<double>(all.size()), "efforts");
   }
   return chart;

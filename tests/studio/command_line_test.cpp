@@ -219,6 +219,18 @@ TEST_F(Runs, TakeTheEffortThatTheChartOfTheirSetFoundBest) {
   EXPECT_EQ(run("run " + set + " --fps 25 --error .01").status, 2);
 }
 
+TEST_F(Runs, AreNotChartedWithoutAnythingVirtual) {
+  write_set();  // its plate
+  const std::string set = write("bare.toml",
+                                "[show]\nwidth = 64\nheight = 48\n"
+                                "[camera]\nsource = \"file:plate_%d.png\"\n");
+  const Outcome outcome = run("chart set " + set + " --quick --samples 1");
+  EXPECT_EQ(outcome.status, 1);
+  expect_one_line(outcome.err);
+  EXPECT_THAT(outcome.err, HasSubstr("shows nothing virtual"));
+  EXPECT_FALSE(fs::exists(dir_ / "bare.chart.json"));
+}
+
 TEST_F(Runs, TellWhatTheirInputsCost) {
   const std::string json_path = (dir_ / "inputs.json").string();
   const Outcome outcome = run("bench inputs --set " + write_set() + " --json " + json_path);
