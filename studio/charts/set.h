@@ -9,7 +9,7 @@
 namespace studio {
 
 struct SetChartSettings {
-  int samples = 256;   // of the reference
+  int samples = 256;   // of the reference, at least 2
   bool quick = false;  // fewer points and frames: for tests
 };
 

@@ -87,7 +87,7 @@ Command chart_command() {
                 "--out", o->out,
                 "directory that the charts are written to (this one; of a set, its own)");
             arguments.option("--set", o->request.set, "measure with this set file's scene");
-            arguments.option("--samples", o->samples, 1, 1 << 20,
+            arguments.option("--samples", o->samples, 2, 1 << 20,
                              "of a set's reference, paths per pixel (256)");
             arguments.flag("--quick", o->request.quick, "fewer points, for a first look");
             return [o](Console& console) { chart(*o, console); };

@@ -224,7 +224,7 @@ TEST_F(Runs, AreNotChartedWithoutAnythingVirtual) {
   const std::string set = write("bare.toml",
                                 "[show]\nwidth = 64\nheight = 48\n"
                                 "[camera]\nsource = \"file:plate_%d.png\"\n");
-  const Outcome outcome = run("chart set " + set + " --quick --samples 1");
+  const Outcome outcome = run("chart set " + set + " --quick --samples 2");
   EXPECT_EQ(outcome.status, 1);
   expect_one_line(outcome.err);
   EXPECT_THAT(outcome.err, HasSubstr("shows nothing virtual"));
