@@ -16,8 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A thousandth of light lost is below what an eye or eight bits can tell.
-constexpr float changed = 1e-3F;
 constexpr std::uint32_t first_seed = 1001;  // none that footage is made with
 
 capture::Image mean_of(const capture::Image& a, const capture::Image& b) {
@@ -129,21 +127,8 @@ PhotographTrial::PhotographTrial(const std::string& set_file,
   progress(0.95, "the matte");
   coverage_ = render::coverage_of(with_objects, is_virtual, *frame_.directions, pose,
                                   4 * settings.photograph_samples);
-  find_mask();
-}
-
-void PhotographTrial::find_mask() {
-  const capture::Image reference =
-      render({.light = true, .sampling = true}, 0, plates_.first, first_seed);
-  mask_ = capture::make_image(reference.height, reference.width, 1);
-  for (std::size_t i = 0; i < mask_.pixels.size(); ++i) {
-    bool affected = coverage_.pixels[i] > 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float before = plates_.first.pixels[3 * i + c];
-      affected = affected || std::abs(reference.pixels[4 * i + c] - before) > changed * before;
-    }
-    mask_.pixels[i] = affected ? 1.0F : 0.0F;
-  }
+  mask_ = render::affected_mask(
+      render({.light = true, .sampling = true}, 0, plates_.first, first_seed), plates_.first);
 }
 
 double PhotographTrial::affected_share() const {

@@ -56,7 +56,7 @@ class PhotographTrial {
   capture::Image composite(const Truths& truths, double calibration_error_px = 0) const;
   // The mean of the two photographs.
   const capture::Image& photograph() const { return photograph_; }
-  // Where anything virtual changes the picture by more than a thousandth: (height, width, 1).
+  // Where anything virtual changes the picture (render::affected_mask).
   const capture::Image& mask() const { return mask_; }
   double affected_share() const;
   std::size_t triangles() const;
@@ -71,7 +71,6 @@ class PhotographTrial {
                         const capture::Image& plate,
                         std::uint32_t seed) const;
   capture::Image compose(const Truths& truths, double calibration_error_px, bool first) const;
-  void find_mask();
 
   TrialSettings settings_;
   PreparedFrame frame_;
