@@ -65,24 +65,6 @@ MapPoint map_point(Vec3f direction) {
           arc_tangent(across, direction.z) / pi};
 }
 
-Vec3f bilinear(const capture::Image& map, MapPoint at) {
-  const int w = map.width;
-  const int h = map.height;
-  const float x = at.u * static_cast<float>(w) - 0.5F;
-  const float y = at.v * static_cast<float>(h) - 0.5F;
-  const float x_floor = std::floor(x);
-  const float y_floor = std::floor(y);
-  const float fx = x - x_floor;
-  const float fy = y - y_floor;
-  const int x0 = static_cast<int>(x_floor);
-  const int y0 = static_cast<int>(y_floor);
-  const Vec3f top =
-      texel(map, wrapped(x0, y0, w, h)) * (1 - fx) + texel(map, wrapped(x0 + 1, y0, w, h)) * fx;
-  const Vec3f bottom = texel(map, wrapped(x0, y0 + 1, w, h)) * (1 - fx) +
-                       texel(map, wrapped(x0 + 1, y0 + 1, w, h)) * fx;
-  return top * (1 - fy) + bottom * fy;
-}
-
 constexpr float mirror_alpha = 4e-4F;  // of standard.h's mirror_roughness
 
 // Half of what a lobe mirrors head-on lies within 2 alpha of the mirrored direction, as half of a
@@ -91,42 +73,7 @@ constexpr float lobe_width = 5.6F;
 
 // Interpolation between texels blurs as a disc of so many texels does.
 constexpr float blur_texels = 1.7F;
-constexpr float most_steps = 8;  // along a cone that is longer than wide
-
-float alpha_of(float roughness) {
-  return roughness > 0 ? std::min(roughness * roughness, 1.0F) : 0.0F;
-}
-
-// A cone as discs of one width, side by side along its longer side.
-struct ConeSteps {
-  float count = 1;
-  float width_rad = 0;
-  Vec3f step;
-};
-
-// No finer than what the lobe or the map blurs.
-ConeSteps steps_of(const Environment& env, float alpha, const Spread& spread) {
-  const float aa = dot(spread.a, spread.a), bb = dot(spread.b, spread.b);
-  if (!(aa + bb > 0) || !std::isfinite(aa + bb)) return {};
-  const float longer = std::sqrt(std::max(aa, bb)), shorter = std::sqrt(std::min(aa, bb));
-  const float texel_rad = pi / static_cast<float>(env.smoothed[0].height);
-  const float narrow = std::max({shorter, lobe_width * alpha, blur_texels * texel_rad});
-  const float count = std::clamp(std::ceil(longer / narrow), 1.0F, most_steps);
-  return {count, std::sqrt(std::max(longer / count, shorter) * shorter),
-          (aa > bb ? spread.a : spread.b) * (1 / count)};
-}
-
-// Mean over a disc of directions.
-Vec3f in_cone(const Environment& env, MapPoint at, float width_rad) {
-  const float texel_rad = pi / static_cast<float>(env.smoothed[0].height);
-  const float texels = width_rad / (blur_texels * texel_rad);
-  if (!(texels > 1) || env.halved.empty()) return bilinear(env.smoothed[0], at);
-  const float level = std::min(std::log2(texels), static_cast<float>(env.halved.size()));
-  const auto below = std::min(static_cast<std::size_t>(level), env.halved.size() - 1);
-  const float f = level - static_cast<float>(below);
-  const capture::Image& sharp = below == 0 ? env.smoothed[0] : env.halved[below - 1];
-  return bilinear(sharp, at) * (1 - f) + bilinear(env.halved[below], at) * f;
-}
+constexpr float most_steps = 8;
 
 // GGX's lobe is a sum of discs: the share s^2 / (1 + s)^2 of its light is in those whose radius, as
 // seen by the mirrored direction, is at most 2 alpha sqrt(s). Here they stand for octaves of s:
@@ -144,31 +91,89 @@ float level_of(const Environment& env, float alpha, float spread_rad) {
   return std::min(std::sqrt(width_rad / lobe_width), 1.0F) *
          static_cast<float>(env.smoothed.size() - 1);
 }
-
-float share_of_levels(const Environment& env, float alpha, float spread_rad) {
+float share_of_smoothed(const Environment& env, float alpha, float spread_rad) {
   return std::clamp(2 * level_of(env, alpha, spread_rad) - 1, 0.0F, 1.0F);
 }
 
-// Mean over a lobe, seen by a sample whose cone is so wide.
-Vec3f in_lobe(const Environment& env, MapPoint at, float alpha, float spread_rad) {
-  const float level = level_of(env, alpha, spread_rad);
-  if (level >= 1) {
-    const auto below = std::min(static_cast<std::size_t>(level), env.smoothed.size() - 2);
-    const float f = level - static_cast<float>(below);
-    return bilinear(env.smoothed[below], at) * (1 - f) + bilinear(env.smoothed[below + 1], at) * f;
-  }
-  Vec3f narrow{};
-  if (alpha < mirror_alpha) {
-    narrow = in_cone(env, at, spread_rad);
-  } else {
-    for (const auto& [radius, share] : lobe_discs) {
-      narrow += in_cone(env, at, std::hypot(2 * radius * alpha, spread_rad)) * share;
-    }
-  }
-  if (level <= 0.5F) return narrow;
-  const float f = 2 * level - 1;
-  return narrow * (1 - f) + bilinear(env.smoothed[1], at) * f;
+float alpha_of(float roughness) {
+  return roughness > 0 ? std::min(roughness * roughness, 1.0F) : 0.0F;
 }
+
+// A cone that is longer than wide, taken in steps along its longer side.
+struct ConeSteps {
+  float count = 1;
+  float width_rad = 0;  // of each
+  Vec3f step{};
+};
+ConeSteps cone_steps(const Environment& env, float alpha, const Spread& spread) {
+  const float aa = dot(spread.a, spread.a), bb = dot(spread.b, spread.b);
+  if (!(aa + bb > 0) || !std::isfinite(aa + bb)) return {};
+  const float longer = std::sqrt(std::max(aa, bb)), shorter = std::sqrt(std::min(aa, bb));
+  const float texel_rad = pi / static_cast<float>(env.smoothed[0].height);
+  // No finer than what the lobe or the map blurs.
+  const float narrow = std::max({shorter, lobe_width * alpha, blur_texels * texel_rad});
+  const float count = std::clamp(std::ceil(longer / narrow), 1.0F, most_steps);
+  return {count, std::sqrt(std::max(longer / count, shorter) * shorter),
+          (aa > bb ? spread.a : spread.b) * (1 / count)};
+}
+
+// Gathers the samples of one direction.
+class MapSampler {
+ public:
+  MapSampler(const Environment& env, std::span<MapSample, most_map_samples> samples)
+      : env_(env), samples_(samples) {}
+
+  std::size_t count() const { return count_; }
+
+  // A lobe, seen by a sample whose cone is so wide.
+  void add_lobe(MapPoint at, float alpha, float spread_rad, float share) {
+    const float level = level_of(env_, alpha, spread_rad);
+    if (level >= 1) {
+      const auto below = std::min(static_cast<std::size_t>(level), env_.smoothed.size() - 2);
+      const float f = level - static_cast<float>(below);
+      add_smoothed(below, at, share * (1 - f));
+      add_smoothed(below + 1, at, share * f);
+      return;
+    }
+    const float f = share_of_smoothed(env_, alpha, spread_rad);
+    if (alpha < mirror_alpha) {
+      add_cone(at, spread_rad, share * (1 - f));
+    } else {
+      for (const auto& [radius, disc_share] : lobe_discs) {
+        add_cone(at, std::hypot(2 * radius * alpha, spread_rad), share * (1 - f) * disc_share);
+      }
+    }
+    if (f > 0) add_smoothed(1, at, share * f);
+  }
+
+  // A disc of directions.
+  void add_cone(MapPoint at, float width_rad, float share) {
+    const float texel_rad = pi / static_cast<float>(env_.smoothed[0].height);
+    const float texels = width_rad / (blur_texels * texel_rad);
+    if (!(texels > 1) || env_.halved.empty()) return add(0, env_.smoothed[0], at, share);
+    const float level = std::min(std::log2(texels), static_cast<float>(env_.halved.size()));
+    const auto below = std::min(static_cast<std::size_t>(level), env_.halved.size() - 1);
+    const float f = level - static_cast<float>(below);
+    add(below, below == 0 ? env_.smoothed[0] : env_.halved[below - 1], at, share * (1 - f));
+    add(below + 1, env_.halved[below], at, share * f);
+  }
+
+  void add(std::size_t level, const capture::Image& map, MapPoint at, float share) {
+    if (!(share > 0)) return;
+    samples_[count_++] = {at.u * static_cast<float>(map.width) - 0.5F,
+                          at.v * static_cast<float>(map.height) - 0.5F, share,
+                          static_cast<std::uint32_t>(level)};
+  }
+
+ private:
+  void add_smoothed(std::size_t level, MapPoint at, float share) {
+    add(level == 0 ? 0 : env_.halved.size() + level, env_.smoothed[level], at, share);
+  }
+
+  const Environment& env_;
+  std::span<MapSample, most_map_samples> samples_;
+  std::size_t count_ = 0;
+};
 
 // `level` = `map` with every value as it counts.
 void copy_counted(const capture::Image& map, capture::Image& level) {
@@ -213,18 +218,71 @@ double texel_solid_angle(int row, int width, int height) {
   return (std::cos(row * step_rad) - std::cos((row + 1) * step_rad)) * 2 * std::numbers::pi / width;
 }
 
-Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness, const Spread& spread) {
-  if (!std::isfinite(direction.x + direction.y + direction.z)) return {};
-  if (env.smoothed.empty())
-    return env.radiance.empty() ? Vec3f{} : bilinear(env.radiance, map_point(direction));
-  const float alpha = alpha_of(roughness);
-  const ConeSteps cone = steps_of(env, alpha, spread);
-  Vec3f at = direction - cone.step * (0.5F * (cone.count - 1));
-  Vec3f sum{};
-  for (float k = 0; k < cone.count; ++k, at += cone.step) {
-    sum += in_lobe(env, map_point(at), alpha, cone.width_rad);
+std::size_t find_map_samples(const Environment& env,
+                             Vec3f direction,
+                             float roughness,
+                             const Spread& spread,
+                             std::span<MapSample, most_map_samples> samples) {
+  if (!std::isfinite(direction.x + direction.y + direction.z)) return 0;
+  MapSampler sampler(env, samples);
+  if (env.smoothed.empty()) {
+    if (!env.radiance.empty()) sampler.add(0, env.radiance, map_point(direction), 1);
+    return sampler.count();
   }
-  return sum * (1 / cone.count);
+  const float alpha = alpha_of(roughness);
+  const ConeSteps steps = cone_steps(env, alpha, spread);
+  Vec3f at = direction - steps.step * (0.5F * (steps.count - 1));
+  for (float k = 0; k < steps.count; ++k, at += steps.step) {
+    sampler.add_lobe(map_point(at), alpha, steps.width_rad, 1 / steps.count);
+  }
+  return sampler.count();
+}
+
+std::vector<const capture::Image*> levels_of(const Environment& env) {
+  if (env.smoothed.empty()) return {&env.radiance};
+  std::vector<const capture::Image*> levels{&env.smoothed[0]};
+  for (const capture::Image& level : env.halved) levels.push_back(&level);
+  for (std::size_t k = 1; k < env.smoothed.size(); ++k) levels.push_back(&env.smoothed[k]);
+  return levels;
+}
+
+Vec3f radiance_at(const capture::Image& level, float x, float y) {
+  const int w = level.width;
+  const int h = level.height;
+  const float x_floor = std::floor(x);
+  const float y_floor = std::floor(y);
+  const float fx = x - x_floor;
+  const float fy = y - y_floor;
+  const int x0 = static_cast<int>(x_floor);
+  const int y0 = static_cast<int>(y_floor);
+  if (x0 >= 0 && y0 >= 0 && x0 + 1 < w && y0 + 1 < h) {
+    const float* p = &level.pixels[level.index(y0, x0)];
+    const float* q = p + static_cast<std::ptrdiff_t>(w) * 3;
+    const float a = (1 - fx) * (1 - fy), b = fx * (1 - fy), c = (1 - fx) * fy, d = fx * fy;
+    return {p[0] * a + p[3] * b + q[0] * c + q[3] * d, p[1] * a + p[4] * b + q[1] * c + q[4] * d,
+            p[2] * a + p[5] * b + q[2] * c + q[5] * d};
+  }
+  const Vec3f top =
+      texel(level, wrapped(x0, y0, w, h)) * (1 - fx) + texel(level, wrapped(x0 + 1, y0, w, h)) * fx;
+  const Vec3f bottom = texel(level, wrapped(x0, y0 + 1, w, h)) * (1 - fx) +
+                       texel(level, wrapped(x0 + 1, y0 + 1, w, h)) * fx;
+  return top * (1 - fy) + bottom * fy;
+}
+
+Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness, const Spread& spread) {
+  std::array<MapSample, most_map_samples> samples;
+  const std::size_t count = find_map_samples(env, direction, roughness, spread, samples);
+  const std::size_t halved = env.halved.size();
+  Vec3f sum{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [x, y, share, level] = samples[i];
+    const capture::Image& map = env.smoothed.empty() ? env.radiance
+                                : level == 0         ? env.smoothed[0]
+                                : level <= halved    ? env.halved[level - 1]
+                                                     : env.smoothed[level - halved];
+    sum += radiance_at(map, x, y) * share;
+  }
+  return sum;
 }
 
 Vec3f irradiance_of(const Environment& env, Vec3f normal) {
@@ -265,9 +323,8 @@ void smooth_for_reflections(Environment& env, const CompactTexels& compact, int 
   const int compact_height = compact.height;
   const auto side = static_cast<std::size_t>(compact_height);
   if (compact_height > 0 &&
-      (env.radiance.height % compact_height != 0 || compact.is_compact.size() != 2 * side * side)) {
+      (env.radiance.height % compact_height != 0 || compact.is_compact.size() != 2 * side * side))
     throw std::invalid_argument("the map of compact sources does not fit the environment");
-  }
   env.smoothed.resize(static_cast<std::size_t>(levels));
   copy_counted(env.radiance, env.smoothed[0]);
   env.halved.resize(halvings(env.radiance.height));
@@ -300,7 +357,7 @@ void smooth_for_reflections(Environment& env, const CompactTexels& compact, int 
 float share_without_compact(const Environment& env, float roughness, const Spread& spread) {
   if (!env.compact_apart) return 0;
   const float alpha = alpha_of(roughness);
-  return share_of_levels(env, alpha, steps_of(env, alpha, spread).width_rad);
+  return share_of_smoothed(env, alpha, cone_steps(env, alpha, spread).width_rad);
 }
 
 Environment environment_from_map(const capture::Image& map, double yaw_rad, int height) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,24 @@ Vec3f radiance_of(const Environment& env,
                   Vec3f direction,
                   float roughness,
                   const Spread& spread = {});
+
+// The same as places to look up: radiance_of() is the sum of their shares of what radiance_at()
+// finds there. They depend on the sizes of an environment's levels, not on its light.
+struct MapSample {
+  float x, y;  // in texels, (0, 0) the centre of the top-left one
+  float share;
+  std::uint32_t level;  // `smoothed` [0], then `halved`, then the rest of `smoothed`
+};
+inline constexpr std::size_t most_map_samples = 112;
+std::size_t find_map_samples(const Environment& env,
+                             Vec3f direction,
+                             float roughness,
+                             const Spread& spread,
+                             std::span<MapSample, most_map_samples> samples);
+// All levels in the order that MapSample counts them.
+std::vector<const capture::Image*> levels_of(const Environment& env);
+// A level's radiance at a place, bilinear. Poles and the seam are passed as on the sphere.
+Vec3f radiance_at(const capture::Image& level, float x, float y);
 
 // Irradiance on a surface that faces `normal` (unit), summed over all texels.
 Vec3f irradiance_of(const Environment& env, Vec3f normal);

@@ -121,6 +121,7 @@ RenderStatistics& RenderStatistics::operator+=(const RenderStatistics& o) {
   primary_rays += o.primary_rays;
   shadow_rays += o.shadow_rays;
   secondary_rays += o.secondary_rays;
+  kept_rays += o.kept_rays;
   depth_limit_hits += o.depth_limit_hits;
   clamped_values += o.clamped_values;
   clipped_plate += o.clipped_plate;

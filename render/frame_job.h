@@ -79,6 +79,7 @@ struct RenderStatistics {
   std::uint64_t primary_rays = 0;
   std::uint64_t shadow_rays = 0;
   std::uint64_t secondary_rays = 0;
+  std::uint64_t kept_rays = 0;         // that transport kept from earlier frames stands for
   std::uint64_t depth_limit_hits = 0;  // rays that max_depth ended
   std::uint64_t clamped_values = 0;    // outputs beyond half, or not finite, made finite
   std::uint64_t clipped_plate = 0;     // stand-in pixels whose plate is clipped

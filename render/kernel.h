@@ -16,7 +16,10 @@ inline constexpr int samples_max = 256;  // camera rays in one pixel
 struct FrameContext {
   FrameInputs inputs;
   const FrameJob* job = nullptr;
-  std::vector<DirectionalLight> compact;  // see ShadeContext
+  const Environment* planned = nullptr;  // its light decides
+  std::vector<const capture::Image*> levels, planned_levels;
+  std::shared_ptr<const LightTable> planned_table;  // the job's, with its planned irradiances
+  std::vector<std::uint32_t> compact;  // lights of the table that are compact and apart
   LightContext light;
   // Places of further camera rays in a pixel, -0.5 to 0.5.
   std::array<std::array<float, 2>, samples_max> pattern;

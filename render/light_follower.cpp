@@ -14,6 +14,13 @@ namespace {
 // Lights with less of the energy than this may jump without being called changed: they are noise.
 constexpr double least_share = 0.005;
 
+// Light that has grown or shrunk by more than this is planned for anew.
+constexpr double most_change = 1.5;
+
+Vec3f to_float(const std::array<double, 3>& v) {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+
 double luminance_of(const std::array<double, 3>& irradiance) {
   return .2126 * irradiance[0] + .7152 * irradiance[1] + .0722 * irradiance[2];
 }
@@ -40,14 +47,16 @@ LightTable LightFollower::follow(const Environment& env, const LightFollowerSett
   if (sums.empty() || (total_luminance(sums) > 0 && has_moved(sums, settings.tolerance_rad))) {
     sums = make_anew(env, settings.table);
   }
-  table.version = version_;
-  if (!(total_luminance(sums) > 0)) return table;
+  if (!(total_luminance(sums) > 0)) {
+    table.version = version_;
+    return table;
+  }
   take_energies(sums, settings);
+  plan();
+  table.version = version_;
   for (const Followed& followed : lights_) {
     DirectionalLight light = followed.light;
-    light.irradiance = {static_cast<float>(followed.irradiance[0]),
-                        static_cast<float>(followed.irradiance[1]),
-                        static_cast<float>(followed.irradiance[2])};
+    light.irradiance = to_float(followed.irradiance);
     table.lights.push_back(light);
   }
   table.error_estimate = estimate_light_error(table.lights, env.radiance.height);
@@ -66,6 +75,19 @@ std::vector<RegionLight> LightFollower::make_anew(const Environment& env,
   ++version_;
   mark_compact();
   return sums;
+}
+
+// Decisions were taken for another light than this: they are taken anew.
+void LightFollower::plan() {
+  double planned = 0, now = 0;
+  for (const Followed& followed : lights_) {
+    const Vec3f e = followed.light.planned;
+    planned += luminance_of({e.x, e.y, e.z});
+    now += luminance_of(followed.irradiance);
+  }
+  if (now < planned * most_change && planned < now * most_change) return;
+  for (Followed& followed : lights_) followed.light.planned = to_float(followed.irradiance);
+  ++version_;
 }
 
 void LightFollower::mark_compact() {

@@ -24,7 +24,8 @@ struct LightFollowerSettings {
 // memory that the table has: it lives with the show, not with a kernel.
 class LightFollower {
  public:
-  // The table of the next frame. Its version grows when directions change. A black frame gives an
+  // The table of the next frame. Its version grows when directions or planned
+  // irradiances change. A black frame gives an
   // empty table, and directions wait. Throws as make_light_table().
   LightTable follow(const Environment& env, const LightFollowerSettings& settings);
   // Where the lights that the last table marks as compact lie: the brightest of bright sources. To
@@ -44,6 +45,8 @@ class LightFollower {
   void take_energies(const std::vector<RegionLight>& sums, const LightFollowerSettings& settings);
 
   capture::Image map_;
+  void plan();
+
   LightRegions regions_;
   CompactTexels compact_;
   LightTableSettings made_with_;

@@ -5,11 +5,8 @@
 #include <bit>
 #include <cmath>
 
-#if defined(__AVX2__)
-#include <immintrin.h>
-#endif
-
 #include "render/embree_context.h"
+#include "render/lanes.h"
 #include "render/trace.h"
 
 namespace render {
@@ -20,46 +17,6 @@ constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 of its f
 
 int bit_of(int x, int y) { return (y & 3) * 16 + x; }
 int point_of(int word, int bit) { return word * 64 + bit; }
-
-#if defined(__AVX2__)
-using Lanes = __m256;
-constexpr std::size_t lanes = 8;
-Lanes load(const float* at) { return _mm256_load_ps(at); }
-void store(float* at, Lanes v) { _mm256_store_ps(at, v); }
-Lanes all(float v) { return _mm256_set1_ps(v); }
-Lanes add(Lanes a, Lanes b) { return _mm256_add_ps(a, b); }
-Lanes multiply(Lanes a, Lanes b) { return _mm256_mul_ps(a, b); }
-Lanes positive(Lanes v) { return _mm256_cmp_ps(v, _mm256_setzero_ps(), _CMP_GT_OQ); }
-Lanes both(Lanes a, Lanes b) { return _mm256_and_ps(a, b); }
-unsigned bits_of(Lanes mask) { return static_cast<unsigned>(_mm256_movemask_ps(mask)); }
-// Lanes whose bit is set, as a mask.
-Lanes mask_of(unsigned bits) {
-  const __m256i which = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-  const __m256i set = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(bits)), which);
-  return _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, which));
-}
-#else
-struct Lanes {
-  float v;
-};
-constexpr std::size_t lanes = 1;
-Lanes load(const float* at) { return {*at}; }
-void store(float* at, Lanes v) { *at = v.v; }
-Lanes all(float v) { return {v}; }
-Lanes add(Lanes a, Lanes b) { return {a.v + b.v}; }
-Lanes multiply(Lanes a, Lanes b) { return {a.v * b.v}; }
-// Masks are all ones or all zeros; as floats they are only ever combined by both() and bits_of().
-Lanes positive(Lanes v) { return {std::bit_cast<float>(v.v > 0 ? ~0U : 0U)}; }
-Lanes both(Lanes a, Lanes b) {
-  return {std::bit_cast<float>(std::bit_cast<unsigned>(a.v) & std::bit_cast<unsigned>(b.v))};
-}
-unsigned bits_of(Lanes mask) { return std::bit_cast<unsigned>(mask.v) >> 31; }
-Lanes mask_of(unsigned bits) { return {std::bit_cast<float>(bits & 1 ? ~0U : 0U)}; }
-#endif
-
-Lanes dot(Lanes ax, Lanes ay, Lanes az, Vec3f b) {
-  return add(add(multiply(ax, all(b.x)), multiply(ay, all(b.y))), multiply(az, all(b.z)));
-}
 
 // For each light: which pixels it shines on (in both their normals); and its irradiance there,
 // added to `open`.
@@ -257,13 +214,13 @@ bool can_be_blocked(const LightContext& context, const Box& box, Vec3f l) {
 }
 
 // Pixels of one light whose visibility must be tested: see gather_cell.
-class CellVisibility {
+class VisibilityFinder {
  public:
-  CellVisibility(const LightContext& context,
-                 const Receivers& r,
-                 GatherWorkspace& w,
-                 RenderStatistics& statistics,
-                 unsigned ray_mask)
+  VisibilityFinder(const LightContext& context,
+                   const Receivers& r,
+                   GatherWorkspace& w,
+                   RenderStatistics& statistics,
+                   unsigned ray_mask)
       : context_(context), r_(r), w_(w), statistics_(statistics), ray_mask_(ray_mask) {}
 
   // Fills w.seen for lights first .. first + count - 1 from w.lit; tints what glass weakens.
@@ -421,46 +378,32 @@ class CellVisibility {
   std::array<CellMask, GatherWorkspace::group> tinted_{};
 };
 
-// Notes which pixels a compact light shines on, and which see it.
-void set_compact(Receivers& r, const CellMask& lit, const CellMask& seen, std::uint32_t flag) {
-  for (std::size_t word = 0; word < 4; ++word) {
-    for (std::uint64_t bits = lit[word]; bits != 0; bits &= bits - 1) {
-      const int bit = std::countr_zero(bits);
-      const std::size_t k = word * 64 + static_cast<std::size_t>(bit);
-      r.compact_open[k] |= flag;
-      if (seen[word] >> bit & 1) r.compact_seen[k] |= flag;
-    }
-  }
-}
-
 void clear_sums(Receivers& r) {
   r.open_r.fill(0), r.open_g.fill(0), r.open_b.fill(0);
   r.lost_r.fill(0), r.lost_g.fill(0), r.lost_b.fill(0);
-  r.compact_open.fill(0), r.compact_seen.fill(0);
 }
 
 }  // namespace
 
-bool gather_cell(const LightContext& context,
+void gather_cell(const LightContext& context,
                  Receivers& r,
                  GatherWorkspace& w,
-                 const CellMemory& memory,
+                 CellVisibility& visibility,
                  RenderStatistics& statistics) {
   clear_sums(r);
-  if (!memory.kept) find_smooth_blocks(r, w);
+  find_smooth_blocks(r, w);
   const auto& lights = context.table->lights;
-  const Box box = memory.kept ? Box{} : box_of(r);
-  const bool real = context.scene->has_real_blockers();
+  visibility.lit.resize(lights.size());
+  visibility.seen.resize(lights.size());
+  visibility.tints.clear();
+  const Box box = box_of(r);
   CellMask real_first{};
-  if (real) {
+  if (context.scene->has_real_blockers()) {
     for (std::size_t k = 0; k < cell_pixels; ++k) {
       if (r.real_first[k]) real_first[k / 64] |= std::uint64_t{1} << (k % 64);
     }
     for (std::size_t word = 0; word < 4; ++word) real_first[word] &= r.active[word];
   }
-  const bool any_real_first = real_first != CellMask{};
-  bool complete = memory.room != nullptr;
-  unsigned compact = 0;  // lights so far
 
   for (std::size_t first = 0; first < lights.size(); first += GatherWorkspace::group) {
     const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lights.size() - first);
@@ -469,24 +412,15 @@ bool gather_cell(const LightContext& context,
     std::array<bool, GatherWorkspace::group> skip{};
     const std::span<const DirectionalLight> group(&lights[first], count);
     find_lit(r, group, std::span(w.lit).first(count));
-    if (!memory.kept) {
-      for (std::size_t i = 0; i < count; ++i) {
-        skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, group[i].direction);
-      }
+    for (std::size_t i = 0; i < count; ++i) {
+      skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, group[i].direction);
     }
-    if (any_real_first) {
+    if (real_first != CellMask{}) {
       // Light that real things block is not there to be lost.
-      if (memory.kept) {
-        std::copy_n(memory.kept + lights.size() + first, count, w.seen.begin());
-      } else {
-        CellVisibility behind(context, r, w, statistics, mask_real_blocker);
-        behind.skip_ = skip;
-        behind.find(first32, count);
-        w.tints.clear();
-        if (complete) {
-          std::copy_n(w.seen.begin(), count, memory.room + lights.size() + first);
-        }
-      }
+      VisibilityFinder behind(context, r, w, statistics, mask_real_blocker);
+      behind.skip_ = skip;
+      behind.find(first32, count);
+      w.tints.clear();
       for (std::size_t i = 0; i < count; ++i) {
         for (std::size_t word = 0; word < 4; ++word) {
           const std::uint64_t hidden = w.lit[i][word] & ~w.seen[i][word] & real_first[word];
@@ -498,56 +432,52 @@ bool gather_cell(const LightContext& context,
         }
       }
     }
-    if (memory.kept) {
-      std::copy_n(memory.kept + first, count, w.seen.begin());
-    } else {
-      CellVisibility visibility(context, r, w, statistics, 0);
-      visibility.skip_ = skip;
-      visibility.find(first32, count);
-      complete &= w.tints.empty();
-      if (complete) std::copy_n(w.seen.begin(), count, memory.room + first);
-    }
+    VisibilityFinder finder(context, r, w, statistics, 0);
+    finder.skip_ = skip;
+    finder.find(first32, count);
     add_hidden(r, group, std::span(w.lit).first(count), std::span(w.seen).first(count));
-    for (std::size_t i = 0; i < count; ++i) {
-      if (group[i].compact == 0) continue;
-      set_compact(r, w.lit[i], w.seen[i], std::uint32_t{1} << compact++);
+    for (const auto& tint : w.tints) {
+      add_lost(r, tint.point, lights[tint.light], tint.lost_share);
+      visibility.tints.push_back({static_cast<std::uint16_t>(tint.light),
+                                  static_cast<std::uint16_t>(tint.point), tint.lost_share});
     }
-    for (const auto& tint : w.tints) add_lost(r, tint.point, lights[tint.light], tint.lost_share);
+    std::copy_n(w.lit.begin(), count, visibility.lit.begin() + static_cast<std::ptrdiff_t>(first));
+    std::copy_n(w.seen.begin(), count,
+                visibility.seen.begin() + static_cast<std::ptrdiff_t>(first));
   }
-  return complete;
 }
 
 void gather_points(const LightContext& context,
                    Receivers& r,
                    GatherWorkspace& w,
+                   std::vector<PointLight>& tested,
                    RenderStatistics& statistics) {
   clear_sums(r);
   const auto& lights = context.table->lights;
   const bool real = context.scene->has_real_blockers();
   // Compact lights are few and strong: all points test all of them.
   const auto stride_of = [&](std::size_t k, const DirectionalLight& light) -> std::uint32_t {
-    if (light.compact != 0 || context.effort->interleave == 1 || r.share[k] >= 0.5F) return 1;
+    if (light.compact != 0 || context.effort->accuracy >= 1 || r.share[k] >= 0.5F) return 1;
     return r.share[k] >= 0.2F ? 2 : r.share[k] >= 0.05F ? 4 : 8;
   };
-  std::array<std::uint32_t, most_lights> flags;
-  std::uint32_t flag = 1;
-  for (std::size_t i = 0; i < lights.size(); ++i) {
-    flags[i] = lights[i].compact != 0 ? flag : 0;
-    if (lights[i].compact != 0) flag <<= 1;
-  }
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
-    if (blocked) r.compact_seen[k] &= ~flags[i];
-    if (!blocked && share == Vec3f{1, 1, 1}) return;
-    const Vec3f lost = blocked ? Vec3f{1, 1, 1} : Vec3f{1, 1, 1} - share;
-    add_lost(r, k, lights[i], lost * static_cast<float>(stride_of(k, lights[i])));
+    const Vec3f passed = blocked ? Vec3f{} : share;
+    const auto weight =
+        cosine_at(r, k, lights[i].direction) * static_cast<float>(stride_of(k, lights[i]));
+    const Vec3f open = lights[i].irradiance * weight;
+    const Vec3f lost = open * (Vec3f{1, 1, 1} - passed);
+    r.open_r[k] += open.x, r.open_g[k] += open.y, r.open_b[k] += open.z;
+    r.lost_r[k] += lost.x, r.lost_g[k] += lost.y, r.lost_b[k] += lost.z;
+    tested.push_back(
+        {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), weight, passed});
   };
   for (std::uint32_t i = 0; i < lights.size(); ++i) {
     const Vec3f l = lights[i].direction;
     for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-      const std::uint32_t stride = stride_of(k, lights[i]);
-      if ((i + k) % stride != 0) continue;
-      const float cosine = cosine_at(r, k, l);
-      if (!(cosine > 0) || !(r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0)) continue;
+      if ((i + k) % stride_of(k, lights[i]) != 0) continue;
+      if (!(cosine_at(r, k, l) > 0) || !(r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0)) {
+        continue;
+      }
       if (real && r.real_first[k]) {
         const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
         ++statistics.shadow_rays;
@@ -555,12 +485,6 @@ void gather_points(const LightContext& context,
           continue;
         }
       }
-      const float weight = cosine * static_cast<float>(stride);
-      r.open_r[k] += weight * lights[i].irradiance.x;
-      r.open_g[k] += weight * lights[i].irradiance.y;
-      r.open_b[k] += weight * lights[i].irradiance.z;
-      r.compact_open[k] |= flags[i];
-      r.compact_seen[k] |= flags[i];
       add_ray(w, r, k, i, l, r.mask[k]);
       if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }

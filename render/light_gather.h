@@ -28,8 +28,6 @@ struct Receivers {
       lost_b;                                      // out: what virtual objects block
   std::array<std::uint32_t, cell_pixels> surface;  // same number = same object and material
   std::array<std::uint32_t, cell_pixels> mask;     // what blocks: mask_virtual, mask_real_blocker
-  // out, bit i = the i-th compact light: shines on the point if nothing virtual hides it; is seen.
-  std::array<std::uint32_t, cell_pixels> compact_open, compact_seen;
   std::array<std::uint8_t, cell_pixels>
       real_first;                        // light that real things block does not count as open
   std::array<float, cell_pixels> share;  // of the pixel; weak points test fewer lights
@@ -66,29 +64,42 @@ struct LightContext {
   const Effort* effort = nullptr;
 };
 
-// Visibility of a cell from an earlier frame, and room for this one's. Either may be null. Two
-// masks a light: first of all lights the pixels that no virtual object hides from it, then those
-// that no real one does.
-struct CellMemory {
-  const CellMask* kept = nullptr;
-  CellMask* room = nullptr;
+// Light that glass weakens on its way to a pixel's centre.
+struct TintedLight {
+  std::uint16_t light, centre;
+  Vec3f lost_share;
 };
 
-// Adds up the light at the pixels of a cell: open and lost. Returns whether `memory.room` holds
-// this frame's visibility now (what glass weakens is not kept). Shadow rays go to one pixel
-// of every 4x4 block of a smooth surface first, another for each light; where neighbouring blocks
-// disagree, to its 2x2 blocks or pixels, as the effort's interleave asks.
-bool gather_cell(const LightContext& context,
+// What a cell's centres see of each light of the table: pixels that it shines on where no real
+// thing is in the way; of these, those that no virtual object hides from it.
+struct CellVisibility {
+  std::vector<CellMask> lit, seen;
+  std::vector<TintedLight> tints;
+};
+
+// Finds that for the pixels of a cell, and adds up their light: open and lost. Shadow rays go to
+// one pixel of every 4x4 block of a smooth surface first, another for each light; where
+// neighbouring blocks disagree, to its 2x2 blocks or pixels, as the effort's interleave asks.
+void gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,
-                 const CellMemory& memory,
+                 CellVisibility& visibility,
                  RenderStatistics& statistics);
 
-// The same for any points: every point tests every light, or, where its share of the picture is
-// small, every second, fourth ... of them, begun at another one from point to point.
+// A light that was tested at a point.
+struct PointLight {
+  std::uint16_t point, light;
+  float weight;  // the cosine, times the lights that this one stands for
+  Vec3f passed;  // share of its light that arrives
+};
+
+// The same for any points, tested lights appended to `tested`: every point tests every light, or,
+// where its share of the picture is small and the effort allows it, every second, fourth ... of
+// them, begun at another one from point to point.
 void gather_points(const LightContext& context,
                    Receivers& receivers,
                    GatherWorkspace& workspace,
+                   std::vector<PointLight>& tested,
                    RenderStatistics& statistics);
 
 // Irradiance of the table's lamps at one point, as it arrives.

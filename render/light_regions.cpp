@@ -360,6 +360,7 @@ DirectionalLight make_light(const RegionLight& region) {
   light.direction = l > 0 ? to_float(m / l) : Vec3f{0, 0, 1};
   light.irradiance = {static_cast<float>(irradiance[0]), static_cast<float>(irradiance[1]),
                       static_cast<float>(irradiance[2])};
+  light.planned = light.irradiance;
   // A disc of radius r spreads r / sqrt(2) about its middle.
   if (energy > 0) {
     light.spread = static_cast<float>(std::sqrt(2 * std::max(1 - l * l / (energy * energy), 0.0)));

@@ -15,6 +15,8 @@ struct DirectionalLight {
   float spread;               // angular radius of the region that it stands for, radians
   std::uint32_t compact = 0;  // 1 = part of a bright compact source, and its light is apart from
                               // the smoothed levels of the environment (Environment::compact_apart)
+  Vec3f planned{};  // the irradiance by which sampling is decided (FrameInputs::planned); zero = as
+                    // is
   friend bool operator==(const DirectionalLight&, const DirectionalLight&) = default;
 };
 

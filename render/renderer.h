@@ -9,15 +9,18 @@
 
 namespace render {
 
-class KeptVisibility;
+class KeptTransport;
 
 // What a FrameJob's numbers stand for on this machine. All of it must outlive the call.
 struct FrameInputs {
   const Scene* scene = nullptr;
   const calibrate::DirectionTable* directions =
-      nullptr;                                // of the job's lens; its size is the picture's
-  const Environment* environment = nullptr;   // of the job's time, match applied, smoothed
-  KeptVisibility* kept_visibility = nullptr;  // a cache, or null: the same bits, slower
+      nullptr;                               // of the job's lens; its size is the picture's
+  const Environment* environment = nullptr;  // of the job's time, match applied, smoothed
+  // An earlier one, of the same sizes, by whose light sampling is decided, so that the decisions
+  // stay while the light changes a little; null: `environment`.
+  const Environment* planned = nullptr;
+  KeptTransport* kept = nullptr;  // a cache, or null: the same bits, slower
 };
 
 struct FrameResult {

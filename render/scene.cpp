@@ -455,7 +455,7 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
       hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
                 RTCHitN_v(args->hit, n, lane), incoming);
-  const ShadeContext context{&description, nullptr, {}};
+  const ShadeContext context{&description};
   return shaders[hit.material]->transmittance(context, description.materials[hit.material], hit,
                                               incoming, kind);
 }

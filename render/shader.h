@@ -11,7 +11,6 @@
 #include <string_view>
 
 #include "render/environment.h"
-#include "render/light_table.h"
 #include "render/scene.h"
 
 namespace render {
@@ -23,10 +22,8 @@ enum class RayKind : std::uint8_t {
   shadow,
 };
 
-// Bytes that a shader keeps between surface() and shade().
-inline constexpr std::size_t shader_scratch_bytes = 96;
-
-// One point to shade. Filled by the kernel, by surface(), by the kernel again, by shade().
+// One point to shade. Filled by the kernel, then by shade(). A shader never sees the light: it says
+// how its surface answers to it, so that the answer can be kept while the light changes.
 struct ShadePoint {
   // From the kernel.
   HitPoint hit;             // unset for background()
@@ -34,33 +31,28 @@ struct ShadePoint {
   float footprint_m = 0;    // width of the sample's cone here
   float spread_rad = 0;     // by how much that cone widens a metre: its full angle
   Vec3f throughput;         // share of the pixel that this ray carries
-  Vec3f plate;              // the pixel's background, scene-linear
   std::uint32_t pixel = 0;  // index in the cell, for patterns
   std::uint32_t slot = 0;   // the sample that the result is added to
   RayKind kind = RayKind::camera;
   std::uint8_t depth = 0;
-  // From surface().
-  bool receives_light = false;
-  Vec3f light_normal;  // unit
-  alignas(8) std::array<std::byte, shader_scratch_bytes> scratch;
-  // From the kernel: irradiance on light_normal.
-  Vec3f irradiance;        // of the light table, as it arrives
-  Vec3f irradiance_open;   // the same if no virtual object blocked it
-  Vec3f irradiance_lamps;  // of the set's own lamps, as it arrives
-  // Bit i = ShadeContext::compact[i]: shines on light_normal if nothing virtual hides it; is seen.
-  std::uint32_t compact_open = 0, compact_seen = 0;
-  // From shade(): each is multiplied by throughput by the kernel.
-  Vec3f radiance;              // added to the pixel
-  Vec3f plate_share;           // share of the pixel's background that passes, lamps' light included
-  Vec3f plate_passed;          // the same without lamps: what the matte is made from
-  bool clipped_plate = false;  // the plate was too bright to tell the surface's albedo
+  // From shade(), cleared before: all that is sent back along `incoming`. Each is multiplied by
+  // throughput by the kernel.
+  Vec3f radiance;               // its own light
+  Vec3f diffuse;                // radiance per irradiance on light_normal
+  Vec3f light_normal;           // unit
+  Vec3f plate_share;            // share of the pixel's background that passes
+  Vec3f environment_share;      // of the environment's radiance straight on, where a ray leaves
+  bool catches_shadow = false;  // plate_share falls with the irradiance that virtual objects take
+  bool catches_lamps = false;   // shows the set's lamps on the plate, or where that tells nothing,
+  Vec3f albedo;                 // ... on a surface of this albedo
 };
 
-// A ray that a shader asks for.
+// A ray that a shader asks for, in the middle of a lobe.
 struct NewRay {
   Vec3f origin;
   Vec3f direction;   // unit
   Vec3f throughput;  // the point's own, times the surface's share
+  Vec3f normal;      // that the lobe lies about; zero = straight through
   float roughness;   // of the lobe, 0 = mirror: picks the environment's smoothing
   Spread spread;     // of the sample's cone from here on
   RayKind kind;
@@ -76,27 +68,15 @@ class RaySink {
 
 struct ShadeContext {
   const SceneDescription* scene = nullptr;
-  const Environment* environment = nullptr;
-  // Lights that the environment's smoothed levels lack: rough lobes add those that a point sees.
-  std::span<const DirectionalLight> compact;
 };
-
-// What a lobe of `roughness` mirrors of those compact lights whose bits are set.
-Vec3f compact_light(const ShadeContext& context,
-                    std::uint32_t lights,
-                    Vec3f normal,
-                    Vec3f view,
-                    float roughness,
-                    const Spread& spread);
 
 class Shader {
  public:
   virtual ~Shader() = default;
   // Throws std::invalid_argument if the parameter block is not one of this shader's.
   virtual void check(const SceneDescription& scene, const Material& material) const = 0;
-  // Decides light_normal and receives_light, and keeps in scratch what shade() needs.
-  virtual void surface(const ShadeContext& context, std::span<ShadePoint* const> points) const = 0;
-  // Radiance, the plate's share, and further rays.
+  // How the surface answers to light, and further rays. Where a ray is pushed, the kernel also adds
+  // what its lobe mirrors of compact lights.
   virtual void shade(const ShadeContext& context,
                      std::span<ShadePoint* const> points,
                      RaySink& rays) const = 0;

@@ -1,7 +1,6 @@
 // The standard surface: glTF 2.0 metallic-roughness with clear coat, thin transmission, emission.
 #include "render/standard.h"
 
-#include <bit>
 #include <cstddef>
 #include <cstring>
 #include <numbers>
@@ -10,7 +9,6 @@
 #include <utility>
 
 #include "render/scene.h"
-#include "render/shader.h"
 #include "render/texture.h"
 
 namespace render {
@@ -191,29 +189,18 @@ float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction) {
   return unfolded_density(v, l, alpha) + unfolded_density(v, {l.x, l.y, -l.z}, alpha);
 }
 
-Vec3f compact_light(const ShadeContext& context,
-                    std::uint32_t lights,
-                    Vec3f normal,
-                    Vec3f view,
-                    float roughness,
-                    const Spread& spread) {
+float compact_lobe(Vec3f normal,
+                   Vec3f view,
+                   float roughness,
+                   const Spread& spread,
+                   const DirectionalLight& light) {
   // Half of a lobe lies within 2 alpha of the mirrored direction, as half of a disc of radius r
   // does within .7 r: so wide is the light itself, and the cone of the sample.
   constexpr float alpha_of_radius = 0.35F;
-  const float share = share_without_compact(*context.environment, roughness, spread);
-  if (!(share > 0)) return {};
   const float cone_radius_rad = 0.5F * std::sqrt(length(spread.a) * length(spread.b));
-  Vec3f sum;
-  for (; lights != 0; lights &= lights - 1) {
-    const auto i = static_cast<std::size_t>(std::countr_zero(lights));
-    if (i >= context.compact.size()) break;
-    const DirectionalLight& light = context.compact[i];
-    const float alpha = std::hypot(roughness * roughness,
-                                   alpha_of_radius * std::hypot(light.spread, cone_radius_rad));
-    const float widened = std::min(std::sqrt(alpha), 1.0F);
-    sum += light.irradiance * lobe_density(normal, view, widened, light.direction);
-  }
-  return sum * share;
+  const float alpha = std::hypot(roughness * roughness,
+                                 alpha_of_radius * std::hypot(light.spread, cone_radius_rad));
+  return lobe_density(normal, view, std::min(std::sqrt(alpha), 1.0F), light.direction);
 }
 
 }  // namespace render

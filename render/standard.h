@@ -18,6 +18,8 @@
 #include <cstdint>
 #include <string>
 
+#include "render/environment.h"
+#include "render/light_table.h"
 #include "render/mesh.h"
 
 namespace render {
@@ -126,5 +128,10 @@ inline Vec3f mirrored(Vec3f view, Vec3f normal) { return normal * (2 * dot(norma
 // view from below the shading normal counts as grazing.
 Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random);
 float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction);
+
+// What a lobe mirrors to `view` of a compact light, per irradiance of it: the lobe's density,
+// blurred by the light's own size and by the cone of the sample.
+float compact_lobe(
+    Vec3f normal, Vec3f view, float roughness, const Spread& spread, const DirectionalLight& light);
 
 }  // namespace render

@@ -9,8 +9,6 @@
 namespace render {
 namespace {
 
-static_assert(sizeof(StandardSurface) <= shader_scratch_bytes);
-
 // The block of a material that check() has passed.
 StandardParameters block_of(const Material& material) {
   StandardParameters parameters;
@@ -24,42 +22,29 @@ class StandardShader final : public Shader {
     standard_parameters(material, scene.textures.size());
   }
 
-  void surface(const ShadeContext& context, std::span<ShadePoint* const> points) const override {
-    for (ShadePoint* p : points) {
-      const StandardSurface surface =
-          standard_surface(block_of(context.scene->materials[p->hit.material]), *context.scene,
-                           p->hit, p->footprint_m);
-      p->light_normal = surface.normal;
-      const bool diffuse =
-          surface.metallic < 1 && surface.transmission < 1 && surface.base != Vec3f{};
-      const bool glossy =
-          surface.roughness >= mirror_roughness ||
-          (surface.clearcoat > 0 && surface.clearcoat_roughness >= mirror_roughness);
-      p->receives_light = diffuse || (glossy && !context.compact.empty());
-      std::memcpy(p->scratch.data(), &surface, sizeof surface);
-    }
-  }
-
   void shade(const ShadeContext& context,
              std::span<ShadePoint* const> points,
              RaySink& rays) const override {
     for (ShadePoint* p : points) {
-      StandardSurface surface;
-      std::memcpy(&surface, p->scratch.data(), sizeof surface);
+      const StandardSurface surface =
+          standard_surface(block_of(context.scene->materials[p->hit.material]), *context.scene,
+                           p->hit, p->footprint_m);
       const Vec3f view = -p->incoming;
       const StandardWeights weights = standard_weights(surface, view);
       constexpr float per_pi = 0.318309886F;
-      p->radiance =
-          surface.emission + weights.diffuse * (p->irradiance + p->irradiance_lamps) * per_pi;
+      p->radiance = surface.emission;
+      p->diffuse = weights.diffuse * per_pi;
+      p->light_normal = surface.normal;
       if (weights.coat > 0) {
-        mirror(context, *p, surface.coat_normal, view, surface.clearcoat_roughness,
+        mirror(*p, surface.coat_normal, view, surface.clearcoat_roughness,
                {weights.coat, weights.coat, weights.coat}, rays);
       }
-      mirror(context, *p, surface.normal, view, surface.roughness, weights.specular, rays);
+      mirror(*p, surface.normal, view, surface.roughness, weights.specular, rays);
       if (weights.transmission != Vec3f{}) {
         rays.push(*p, {offset_origin(p->hit, p->incoming),
                        p->incoming,
                        p->throughput * weights.transmission,
+                       {},
                        0,
                        {},
                        p->kind});
@@ -105,32 +90,22 @@ class StandardShader final : public Shader {
     return spread;
   }
 
-  static void mirror(const ShadeContext& context,
-                     ShadePoint& p,
-                     Vec3f normal,
-                     Vec3f view,
-                     float roughness,
-                     Vec3f weight,
-                     RaySink& rays) {
+  static void mirror(
+      const ShadePoint& p, Vec3f normal, Vec3f view, float roughness, Vec3f weight, RaySink& rays) {
     Vec3f direction = normalize(mirrored(view, normal));
     // A mapped or interpolated normal may send the ray into the surface: mirror it out again.
     const float into = dot(direction, p.hit.geometric_normal);
     if (into < 0) direction -= p.hit.geometric_normal * (2 * into);
-    const Spread spread = mirrored_spread(p, normal, view);
-    if (p.compact_seen != 0) {
-      p.radiance +=
-          weight * compact_light(context, p.compact_seen, normal, view, roughness, spread);
-    }
-    rays.push(p,
-              {offset_origin(p.hit, direction), direction, p.throughput * weight, roughness, spread,
-               p.kind == RayKind::difference ? RayKind::difference : RayKind::reflection});
+    rays.push(p, {offset_origin(p.hit, direction), direction, p.throughput * weight, normal,
+                  roughness, mirrored_spread(p, normal, view),
+                  p.kind == RayKind::difference ? RayKind::difference : RayKind::reflection});
   }
 };
 
 class EnvironmentBackground final : public BackgroundShader {
  public:
-  void shade(const ShadeContext& context, std::span<ShadePoint* const> points) const override {
-    for (ShadePoint* p : points) p->radiance = radiance_of(*context.environment, p->incoming, 0);
+  void shade(const ShadeContext&, std::span<ShadePoint* const> points) const override {
+    for (ShadePoint* p : points) p->environment_share = {1, 1, 1};
   }
 };
 

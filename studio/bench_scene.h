@@ -5,7 +5,7 @@
 
 #include "calibrate/lens.h"
 #include "capture/image.h"
-#include "render/kept_visibility.h"
+#include "render/kept_transport.h"
 #include "render/made_sky.h"
 #include "render/reference.h"
 #include "render/renderer.h"

@@ -193,6 +193,7 @@ std::optional<PreparedFrame> FrameMaker::make(std::int64_t number) {
     job.match = light.match.gain;
     prepared.match = std::move(light.match);
     prepared.environment = std::move(light.environment);
+    prepared.planned = std::move(light.planned);
     prepared.scene = scene_;
     prepared.directions = directions_;
   }

@@ -29,6 +29,7 @@ struct PreparedFrame {
   render::FrameJob job;
   std::shared_ptr<const capture::HalfImage> plate;
   std::shared_ptr<const render::Environment> environment;
+  std::shared_ptr<const render::Environment> planned;  // see render::FrameInputs
   std::shared_ptr<const render::Scene> scene;
   std::shared_ptr<const calibrate::DirectionTable> directions;
   std::vector<capture::Sound> sound;
@@ -37,7 +38,9 @@ struct PreparedFrame {
   capture::FrameStatus plate_status = capture::FrameStatus::good;
   std::array<double, stages> stage_ms{};  // capture, probe and job are set
 
-  render::FrameInputs inputs() const { return {scene.get(), directions.get(), environment.get()}; }
+  render::FrameInputs inputs() const {
+    return {scene.get(), directions.get(), environment.get(), planned.get()};
+  }
 };
 
 // One thread uses it. All memory across frames (sources, followed light, match) lives here, so the

@@ -194,13 +194,16 @@ Light LightFeed::at(const LightRequest& request) {
   if (table_count_ != request.light_samples) {
     render::LightFollowerSettings following;
     following.table.count = request.light_samples;
+    const std::uint64_t version_before = table_.version;
     table_ = follower_.follow(*environment_, following);
     render::smooth_for_reflections(*environment_, follower_.compact_texels());
+    if (!planned_ || table_.version != version_before) planned_ = environment_;
     table_.unseen_share = environment_->unseen_share;
     table_count_ = request.light_samples;
   }
   light.table = table_;
   light.environment = environment_;
+  light.planned = planned_ ? planned_ : light.environment;
   light.match = match_;
   return light;
 }

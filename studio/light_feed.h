@@ -23,6 +23,7 @@ namespace studio {
 // The light of one frame, in the plate's units.
 struct Light {
   std::shared_ptr<const render::Environment> environment;  // never null
+  std::shared_ptr<const render::Environment> planned;      // see render::FrameInputs
   render::LightTable table;                                // without the set's own lamps
   render::MatchResult match;
   capture::Time time{};  // of the probe's newest shot
@@ -68,6 +69,7 @@ class LightFeed {
   // Another one for every change, never touched once it was handed out.
   std::shared_ptr<render::Environment> environment_;
   capture::Pool<render::Environment> environments_;
+  std::shared_ptr<const render::Environment> planned_;  // of the table's version
   render::LightTable table_;  // of environment_, if it is not stale
   int table_count_ = 0;       // that it was made for; 0 = stale
 };

@@ -12,7 +12,7 @@
 
 #include "capture/pool.h"
 #include "compositing/display.h"
-#include "render/kept_visibility.h"
+#include "render/kept_transport.h"
 #include "studio/handover.h"
 #include "studio/recording.h"
 #include "studio/tally.h"
@@ -201,7 +201,7 @@ class Show::Stages {
     const std::shared_ptr<render::FrameResult> result = results_.lend();
     timed(shown, Stage::render, [&] {
       render::FrameInputs inputs = shown.prepared.inputs();
-      inputs.kept_visibility = &kept_visibility_;
+      inputs.kept = &kept_;
       render::render_frame(inputs, shown.prepared.job, *shown.prepared.plate, *result);
     });
     shown.result = result;
@@ -282,7 +282,7 @@ class Show::Stages {
   // Of the caller's thread.
   Tally tally_;
   std::unique_ptr<compositing::Display> display_;
-  render::KeptVisibility kept_visibility_;
+  render::KeptTransport kept_;
   capture::Pool<render::FrameResult> results_;
   capture::Pool<std::vector<std::uint8_t>> pictures_;
 

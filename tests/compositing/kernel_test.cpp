@@ -8,7 +8,7 @@
 #include <new>
 
 #include "made_shot.h"
-#include "render/kept_visibility.h"
+#include "render/kept_transport.h"
 #include "render/light_follower.h"
 
 namespace {
@@ -93,7 +93,7 @@ TEST(RenderFrame, IsTheSameColdAndWarm) {
   real.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
   scene.instances.push_back(real);
   MadeShot shot = made_shot(96, 64, scene, 70);
-  render::KeptVisibility kept;
+  render::KeptTransport kept;
   for (int frame = 0; frame < 6; ++frame) {
     if (frame == 2) shot.job.lights.lights[3].irradiance *= 0.5F;
     if (frame == 3) shot.job.cam_from_set = calibrate::look_at({3, -3, 1.6}, {0.3, 0, 0.3}, 0);
@@ -102,7 +102,7 @@ TEST(RenderFrame, IsTheSameColdAndWarm) {
     const FrameResult cold = render(shot);
     FrameResult warm;
     render::FrameInputs inputs = shot.inputs();
-    inputs.kept_visibility = &kept;
+    inputs.kept = &kept;
     render_frame(inputs, shot.job, shot.plate, warm);
     EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
     EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;

@@ -1,0 +1,578 @@
+// A cell's rays, from the camera to the light.
+#include "render/cell_baker.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "render/embree_context.h"
+#include "render/standard.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+void clear_answer(ShadePoint& p) {
+  p.radiance = p.diffuse = p.light_normal = p.plate_share = p.environment_share = {};
+  p.catches_shadow = p.catches_lamps = false;
+}
+
+// Whether the table's light matters to a point.
+bool receives_light(const ShadePoint& p) {
+  return p.diffuse != Vec3f{} || p.catches_shadow || p.catches_lamps;
+}
+
+// The mean width of a cone. What goes straight on keeps it.
+float spread_of(const Spread& spread, const ShadePoint& from) {
+  const float area = length(spread.a) * length(spread.b);
+  return area > 0 ? std::min(std::sqrt(area), 1.0F) : from.spread_rad;
+}
+
+float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
+float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+
+// 1 - lost/open, exactly 1 where nothing is lost.
+float passing(float open, float arriving) {
+  const float lost = open - arriving;
+  return lost > 0 && open > 0 ? std::max(0.0F, 1 - lost / open) : 1.0F;
+}
+
+constexpr std::uint16_t nowhere = 0xFFFF;
+
+}  // namespace
+
+CellBaker::CellBaker() {
+  queue_.reserve(16384);
+  gather_.tints.reserve(static_cast<std::size_t>(GatherWorkspace::group) * cell_pixels);
+}
+
+void CellBaker::bake(const FrameContext& frame,
+                     int x0,
+                     int y0,
+                     CellTransport& transport,
+                     RenderStatistics& statistics) {
+  frame_ = &frame;
+  x0_ = x0;
+  y0_ = y0;
+  transport_ = &transport;
+  statistics_ = &statistics;
+  const std::uint64_t rays_before =
+      statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays;
+  transport.clear();
+  samples_.fill({});
+  base_.fill({});
+  light_.fill({});
+  edge_.fill(Edge::none);
+  counts_.fill(0);
+  lender_.fill(-1);
+  queue_.clear();
+  trace_centres();
+  const bool smooth_edges = frame.job->effort.aa_samples > 1;
+  if (smooth_edges) keep_centres();
+  shade_centres();
+  if (smooth_edges) {
+    trace_ring();
+    find_edges();
+    find_glints();
+    sample_edges();
+  }
+  pack();
+  transport.rays =
+      statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays - rays_before;
+}
+
+// Tells what came of the cell's slots, and joins what is many times the same.
+void CellBaker::pack() {
+  CellTransport& t = *transport_;
+  std::copy_n(base_.begin(), cell_pixels, t.base.begin());
+  const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
+  t.empty = t.receiving == CellMask{} && t.environment.empty() && t.lights.empty();
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
+    if (edge_[k] == Edge::none) continue;
+    t.further.push_back({static_cast<std::uint16_t>(k), counts_[k], base_[cell_pixels + k]});
+    for (std::size_t i = 0; i < borrowed_[k].size(); ++i) {
+      if (borrowed_[k][i] == 0) continue;
+      const int centre = static_cast<int>(k) + (static_cast<int>(i) / 3 - 1) * cell_size +
+                         static_cast<int>(i) % 3 - 1;
+      t.borrowed.push_back(
+          {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(centre), borrowed_[k][i]});
+    }
+  }
+  const auto join = [](auto& terms, const auto& key) {
+    std::ranges::stable_sort(terms, {}, key);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      if (kept > 0 && key(terms[kept - 1]) == key(terms[i])) {
+        terms[kept - 1].weight += terms[i].weight;
+      } else {
+        terms[kept++] = terms[i];
+      }
+    }
+    terms.resize(kept);
+  };
+  join(t.lights, [](const CellTransport::LightTerm& l) { return l.slot * 65536U + l.light; });
+  join(t.shared, [](const CellTransport::SharedTerm& s) {
+    return (s.slot * 65536U + s.centre) * 2U + s.shadow;
+  });
+}
+
+void CellBaker::add_environment(std::size_t slot,
+                                std::size_t target,
+                                Vec3f direction,
+                                float roughness,
+                                const Spread& spread,
+                                Vec3f weight) {
+  std::array<MapSample, most_map_samples> places;
+  const std::size_t count =
+      find_map_samples(*frame_->planned, direction, roughness, spread, places);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [x, y, share, level] = places[i];
+    transport_->environment.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
+                                       static_cast<std::uint16_t>(level)});
+    samples_[slot].added += weight * radiance_at(*frame_->planned_levels[level], x, y) * share;
+  }
+}
+
+void CellBaker::push(const ShadePoint& from, const NewRay& ray) {
+  const float weight = largest(ray.throughput);
+  if (!(weight > 0)) return;
+  const bool straight = ray.kind == RayKind::camera;
+  if (!straight && ray.normal != Vec3f{}) {
+    const float share = share_without_compact(*frame_->planned, ray.roughness, ray.spread);
+    if (share > 0) {
+      lobes_.push_back({&from, ray.throughput, ray.normal, ray.spread, ray.roughness, share,
+                        ray.kind == RayKind::difference});
+    }
+  }
+  const Vec3f light =
+      straight ? Vec3f{} : radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread);
+  const Effort& effort = frame_->job->effort;
+  // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
+  const bool deep = from.depth >= effort.max_depth || queue_.size() == queue_.capacity();
+  if (deep) ++statistics_->depth_limit_hits;
+  if (deep || weight * std::max(1.0F, largest(light)) < 1 - effort.accuracy) {
+    if (straight) {
+      CellTransport::Base& base = base_[target_of(from)];
+      samples_[from.slot].plate += ray.throughput;
+      base.plate += ray.throughput;
+      base.passed += mean(ray.throughput);
+      base.seen += mean(ray.throughput);
+    } else if (ray.kind == RayKind::reflection) {
+      add_environment(from.slot, target_of(from), ray.direction, ray.roughness, ray.spread,
+                      ray.throughput);
+    }
+    return;
+  }
+  queue_.push_back({ray.origin, ray.direction, ray.throughput, light, ray.spread, from.footprint_m,
+                    spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
+                    static_cast<std::uint8_t>(from.depth + 1)});
+}
+
+void CellBaker::trace(int count, bool coherent, RayKind kind) {
+  RayStream& s = stream_;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    s.far_m[i] = s.mask[i] ? ray_far : -1.0F;
+    s.time[i] = 0;
+    s.id[i] = static_cast<unsigned>(i);
+    s.flags[i] = 0;
+    s.geom[i] = s.inst[i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  if (gather_.log) {
+    gather_.log->add(false, coherent,
+                     {s.ox.data(), s.oy.data(), s.oz.data(), s.dx.data(), s.dy.data(), s.dz.data(),
+                      s.near_m.data(), s.far_m.data()},
+                     s.mask.data(), static_cast<std::size_t>(count));
+  }
+  TraceContext context(kind, coherent);
+  RTCRayHitNp rays;
+  rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
+              s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
+              s.far_m.data(), s.mask.data(), s.id.data(), s.flags.data()};
+  rays.hit.Ng_x = s.ngx.data(), rays.hit.Ng_y = s.ngy.data(), rays.hit.Ng_z = s.ngz.data();
+  rays.hit.u = s.u.data(), rays.hit.v = s.v.data();
+  rays.hit.primID = s.prim.data(), rays.hit.geomID = s.geom.data();
+  rays.hit.instID[0] = s.inst.data();
+  rtcIntersectNp(frame_->inputs.scene->embree(), &context.context, &rays,
+                 static_cast<unsigned>(count));
+}
+
+void CellBaker::set_camera_ray(int index, Vec3f v) {
+  const auto i = static_cast<std::size_t>(index);
+  const auto& m = frame_->set_from_cam;
+  const Vec3f d{m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
+                m[6] * v.x + m[7] * v.y + m[8] * v.z};
+  const float l = dot(d, d);
+  const bool seen = l > 0.25F;  // zero where the lens sees nothing
+  const Vec3f unit = seen ? d * (1 / std::sqrt(l)) : Vec3f{0, 0, 1};
+  stream_.ox[i] = frame_->camera.x, stream_.oy[i] = frame_->camera.y,
+  stream_.oz[i] = frame_->camera.z;
+  stream_.dx[i] = unit.x, stream_.dy[i] = unit.y, stream_.dz[i] = unit.z;
+  stream_.near_m[i] = 0;
+  stream_.mask[i] = seen ? mask_virtual | mask_stand_in : 0U;
+}
+
+void CellBaker::trace_centres() {
+  const auto& table = *frame_->inputs.directions;
+  inside_ = {};
+  // 4x4 blocks one after the other: coherent for Embree, and each stream is exactly one cell.
+  for (int i = 0; i < cell_pixels; ++i) {
+    const auto [x, y] = pixel_of_ray(i);
+    const bool in = x0_ + x < table.width && y0_ + y < table.height;
+    if (in) {
+      const std::size_t t = table.index(y0_ + y, x0_ + x);
+      set_camera_ray(i, {table.x[t], table.y[t], table.z[t]});
+      inside_[static_cast<std::size_t>(y / 4)] |= std::uint64_t{1} << ((y & 3) * 16 + x);
+    } else {
+      set_camera_ray(i, {});
+    }
+    statistics_->primary_rays += in;
+  }
+  trace(cell_pixels, true, RayKind::camera);
+}
+
+void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::uint32_t slot) {
+  const auto i = static_cast<std::size_t>(index);
+  const RayStream& s = stream_;
+  p.incoming = {s.dx[i], s.dy[i], s.dz[i]};
+  if (s.geom[i] != RTC_INVALID_GEOMETRY_ID) {
+    p.hit = frame_->inputs.scene->hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i],
+                                            p.incoming);
+  }
+  p.spread_rad = frame_->pixel_angle;
+  p.footprint_m = s.far_m[i] < ray_far ? s.far_m[i] * p.spread_rad : 0;
+  p.throughput = {1, 1, 1};
+  p.pixel = pixel;
+  p.slot = slot;
+  p.kind = RayKind::camera;
+  p.depth = 0;
+}
+
+// Calls `call` with each shader and its points, in the order in which shaders first appear.
+template <class F>
+void CellBaker::for_each_shader(int count, F&& call) {
+  const Scene& scene = *frame_->inputs.scene;
+  std::fill_n(done_.begin(), count, std::uint8_t{0});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    if (done_[i]) continue;
+    const Shader& shader = scene.shader_of(points_[i].hit.material);
+    std::size_t n = 0;
+    for (std::size_t j = i; j < static_cast<std::size_t>(count); ++j) {
+      if (done_[j] || &scene.shader_of(points_[j].hit.material) != &shader) continue;
+      done_[j] = 1;
+      group_[n++] = &points_[j];
+    }
+    call(shader, std::span<ShadePoint* const>(group_.data(), n));
+  }
+}
+
+// Answers, then light, at the first `count` points; in a grid each is its pixel's centre.
+void CellBaker::shade_points(int count, bool grid) {
+  if (count == 0) return;
+  const ShadeContext context{&frame_->inputs.scene->description()};
+  lobes_.clear();
+  for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
+    for (ShadePoint* p : group_points) clear_answer(*p);
+    shader.shade(context, group_points, *this);
+  });
+  receive(count, grid);
+  const auto& instances = frame_->inputs.scene->description().instances;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const ShadePoint& p = points_[i];
+    collect(p);
+    if (p.kind == RayKind::camera && instances[p.hit.instance].kind == ObjectKind::stand_in) {
+      base_[target_of(p)].seen += mean(p.throughput);
+    }
+  }
+}
+
+void CellBaker::run_background(std::span<ShadePoint* const> leaving) {
+  if (leaving.empty()) return;
+  const ShadeContext context{&frame_->inputs.scene->description()};
+  for (ShadePoint* p : leaving) {
+    clear_answer(*p);
+    p->hit = {};
+  }
+  frame_->inputs.scene->background().shade(context, leaving);
+  for (ShadePoint* p : leaving) {
+    light_of_point_[static_cast<std::size_t>(p - points_.data())] = {};
+    collect(*p);
+    base_[target_of(*p)].seen += mean(p->throughput);
+  }
+}
+
+// What a point sends back whatever the light, and all of it under the planned light.
+void CellBaker::collect(const ShadePoint& p) {
+  CellTransport::Base& base = base_[target_of(p)];
+  Sample& sample = samples_[p.slot];
+  const Light& light = light_of_point_[static_cast<std::size_t>(&p - points_.data())];
+  const Vec3f own = p.throughput * p.radiance;
+  base.radiance += own;
+  sample.added += own + p.throughput * p.diffuse * light.arriving;
+  if (p.environment_share != Vec3f{}) {
+    add_environment(p.slot, target_of(p), p.incoming, 0, {}, p.throughput * p.environment_share);
+  }
+  if (p.kind != RayKind::camera) return;
+  const Vec3f share = p.throughput * p.plate_share;
+  if (!p.catches_shadow) {
+    base.plate += share;
+    base.passed += mean(share);
+    sample.plate += share;
+    return;
+  }
+  sample.plate += share * Vec3f{passing(light.open.x, light.arriving.x),
+                                passing(light.open.y, light.arriving.y),
+                                passing(light.open.z, light.arriving.z)};
+}
+
+void CellBaker::shade_centres() {
+  int count = 0;
+  std::size_t leaving = 0;
+  // Points in front, those that leave at the back: a cell has no more than 256 of both.
+  for (int i = 0; i < cell_pixels; ++i) {
+    const auto [x, y] = pixel_of_ray(i);
+    const auto pixel = static_cast<std::uint32_t>(y * cell_size + x);
+    if (!is_inside(pixel)) continue;
+    if (stream_.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID) {
+      set_point(points_[static_cast<std::size_t>(count++)], i, pixel, pixel);
+    } else {
+      ShadePoint& p = points_[stream_rays - ++leaving];
+      set_point(p, i, pixel, pixel);
+      group_[leaving - 1] = &p;
+    }
+  }
+  run_background({group_.data(), leaving});
+  shade_points(count, true);
+  bounce();
+}
+
+void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
+  Receivers& r = receivers_;
+  const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
+  r.px[k] = origin.x, r.py[k] = origin.y, r.pz[k] = origin.z;
+  r.nx[k] = p.light_normal.x, r.ny[k] = p.light_normal.y, r.nz[k] = p.light_normal.z;
+  const Vec3f g = p.hit.geometric_normal;
+  r.gx[k] = g.x, r.gy[k] = g.y, r.gz[k] = g.z;
+  const auto& instance = frame_->inputs.scene->description().instances[p.hit.instance];
+  const bool real = instance.kind == ObjectKind::stand_in;
+  r.mask[k] = real ? mask_virtual : mask_virtual | mask_real_blocker;
+  r.real_first[k] = real;
+  r.surface[k] = p.hit.instance * 4096 + p.hit.material;
+  // Further samples of an edge pixel share its weight.
+  const float further_share = 1 / static_cast<float>(frame_->job->effort.aa_samples);
+  r.share[k] = largest(p.throughput) * (p.slot < cell_pixels ? 1.0F : further_share);
+}
+
+// Finds who sees which light, and notes it.
+void CellBaker::receive(int count, bool grid) {
+  Receivers& r = receivers_;
+  r.active = {};
+  r.count = 0;
+  r.real_first.fill(0);
+  std::array<std::uint16_t, stream_rays> place;     // of points among receivers
+  std::array<std::uint16_t, stream_rays> point_at;  // and back
+  std::fill_n(place.begin(), count, nowhere);
+  std::fill_n(light_of_point_.begin(), count, Light{});
+  std::array<std::uint8_t, stream_rays> glossy{};
+  for (const Lobe& lobe : lobes_) glossy[static_cast<std::size_t>(lobe.point - points_.data())] = 1;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const ShadePoint& p = points_[i];
+    if (!glossy[i] && !receives_light(p)) continue;
+    if (lender_[i] >= 0) {
+      const auto centre = static_cast<std::size_t>(lender_[i]);
+      if (transport_->receiving[centre / 64] >> (centre % 64) & 1) {
+        light_of_point_[i] = light_[centre];
+        add_shared(p, centre);
+        continue;
+      }
+    }
+    const std::size_t k = grid ? p.pixel : static_cast<std::size_t>(r.count);
+    place[i] = static_cast<std::uint16_t>(k);
+    point_at[k] = static_cast<std::uint16_t>(i);
+    set_receiver(k, p);
+    if (p.light_normal == Vec3f{}) {
+      r.nx[k] = p.hit.normal.x, r.ny[k] = p.hit.normal.y, r.nz[k] = p.hit.normal.z;
+    }
+    ++r.count;
+    r.active[k / 64] |= std::uint64_t{1} << (k % 64);
+  }
+  if (r.count > 0) {
+    if (grid) {
+      for (std::size_t k = 0; k < cell_pixels; ++k) {
+        if (!(r.active[k / 64] >> (k % 64) & 1)) r.nx[k] = r.ny[k] = r.nz[k] = 0;
+      }
+      gather_cell(frame_->light, r, gather_, transport_->visibility, *statistics_);
+      transport_->receiving = r.active;
+    } else {
+      tested_.clear();
+      gather_points(frame_->light, r, gather_, tested_, *statistics_);
+    }
+  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const std::size_t k = place[i];
+    if (k == nowhere) continue;
+    const Vec3f open{r.open_r[k], r.open_g[k], r.open_b[k]};
+    light_of_point_[i] = {open, open - Vec3f{r.lost_r[k], r.lost_g[k], r.lost_b[k]}};
+    if (!grid) continue;
+    light_[k] = light_of_point_[i];
+    add_centre(points_[i]);
+  }
+  if (!grid && r.count > 0)
+    add_tested(std::span(point_at).first(static_cast<std::size_t>(r.count)));
+  add_lobes(place, grid);
+}
+
+void CellBaker::add_centre(const ShadePoint& p) {
+  CellTransport& t = *transport_;
+  const std::size_t k = p.pixel;
+  t.nx[k] = receivers_.nx[k], t.ny[k] = receivers_.ny[k], t.nz[k] = receivers_.nz[k];
+  t.diffuse[k] = p.throughput * p.diffuse;
+  if (p.catches_shadow) t.shadow[k] = p.throughput * p.plate_share;
+  add_lamps(p, k);
+}
+
+// Lights of points that are no centres, in the order of `tested_`.
+void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
+  CellTransport& t = *transport_;
+  for (const PointLight& l : tested_) {
+    const ShadePoint& p = points_[point_at[l.point]];
+    const Vec3f weight = p.throughput * p.diffuse * l.passed * l.weight;
+    if (weight != Vec3f{}) {
+      t.lights.push_back({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
+    }
+  }
+  for (std::size_t k = 0; k < point_at.size(); ++k) {
+    const ShadePoint& p = points_[point_at[k]];
+    if (!p.catches_shadow && !p.catches_lamps) {
+      add_lamps(p, 0);
+      continue;
+    }
+    const auto first = static_cast<std::uint32_t>(t.shadow_lights.size());
+    for (const PointLight& l : tested_) {
+      if (l.point != k) continue;
+      t.shadow_lights.push_back({l.light, l.weight, (Vec3f{1, 1, 1} - l.passed) * l.weight});
+    }
+    t.shadow_points.push_back({static_cast<std::uint16_t>(target_of(p)), first,
+                               static_cast<std::uint32_t>(t.shadow_lights.size()) - first,
+                               p.catches_shadow ? p.throughput * p.plate_share : Vec3f{}});
+    add_lamps(p, cell_pixels + t.shadow_points.size() - 1);
+  }
+}
+
+// A further sample that shares the light of a centre on the same surface.
+void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
+  const auto slot = static_cast<std::uint16_t>(target_of(p));
+  const auto c = static_cast<std::uint16_t>(centre);
+  if (p.diffuse != Vec3f{}) {
+    transport_->shared.push_back({slot, c, false, p.throughput * p.diffuse});
+  }
+  if (p.catches_shadow) {
+    transport_->shared.push_back({slot, c, true, p.throughput * p.plate_share});
+  }
+  add_lamps(p, centre);
+}
+
+// Light of the set's lamps, which stays as it is. `light_point` tells a stand-in's irradiance.
+void CellBaker::add_lamps(const ShadePoint& p, std::size_t light_point) {
+  if (frame_->job->lights.lamps.empty()) return;
+  const Vec3f normal = p.light_normal == Vec3f{} ? p.hit.normal : p.light_normal;
+  const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
+  const Vec3f irradiance = gather_lamps(frame_->light, origin, normal, p.hit.geometric_normal,
+                                        mask_virtual | mask_real_blocker, *statistics_);
+  if (irradiance == Vec3f{}) return;
+  const Vec3f added = p.throughput * p.diffuse * irradiance;
+  base_[target_of(p)].radiance += added;
+  samples_[p.slot].added += added;
+  if (p.catches_lamps) {
+    transport_->lamps.push_back({static_cast<std::uint16_t>(target_of(p)),
+                                 static_cast<std::uint32_t>(light_point), p.throughput, irradiance,
+                                 p.albedo});
+    samples_[p.slot].added += p.throughput * p.albedo * irradiance * 0.318309886F;
+  }
+}
+
+// What lobes mirror of compact lights that their points see; of a real surface's, less those that
+// virtual objects hide, for the plate shows them.
+void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid) {
+  if (lobes_.empty()) return;
+  const CellVisibility& cell = transport_->visibility;
+  for (const Lobe& lobe : lobes_) {
+    const auto i = static_cast<std::size_t>(lobe.point - points_.data());
+    const bool shared = receiver_of_point[i] == nowhere;
+    if (!grid && !shared) continue;
+    const std::size_t k = shared ? static_cast<std::size_t>(lender_[i]) : receiver_of_point[i];
+    for (const std::uint32_t light : frame_->compact) {
+      const auto in = [&](const CellMask& mask) { return (mask[k / 64] >> (k % 64) & 1) != 0; };
+      if (!in(cell.lit[light])) continue;
+      add_compact(lobe, light, in(cell.seen[light]) ? Vec3f{1, 1, 1} : Vec3f{});
+    }
+  }
+  if (grid) return;
+  for (const PointLight& l : tested_) {
+    if (frame_->job->lights.lights[l.light].compact == 0) continue;
+    for (const Lobe& lobe : lobes_) {
+      const auto i = static_cast<std::size_t>(lobe.point - points_.data());
+      if (receiver_of_point[i] == l.point) add_compact(lobe, l.light, l.passed);
+    }
+  }
+}
+
+void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
+  const Vec3f share = lobe.difference ? passed - Vec3f{1, 1, 1} : passed;
+  if (share == Vec3f{}) return;
+  const DirectionalLight& l = frame_->job->lights.lights[light];
+  const ShadePoint& p = *lobe.point;
+  const float density =
+      compact_lobe(lobe.normal, -p.incoming, lobe.roughness, lobe.spread, l) * lobe.share;
+  if (!(density > 0)) return;
+  const Vec3f weight = lobe.throughput * share * density;
+  transport_->lights.push_back(
+      {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
+  samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;
+}
+
+void CellBaker::bounce() {
+  while (!queue_.empty()) {
+    const std::size_t n = std::min<std::size_t>(queue_.size(), stream_rays);
+    const std::size_t from = queue_.size() - n;
+    for (std::size_t i = 0; i < n; ++i) {
+      const QueuedRay& q = queue_[from + i];
+      stream_.ox[i] = q.origin.x, stream_.oy[i] = q.origin.y, stream_.oz[i] = q.origin.z;
+      stream_.dx[i] = q.direction.x, stream_.dy[i] = q.direction.y, stream_.dz[i] = q.direction.z;
+      stream_.near_m[i] = 0;
+      stream_.mask[i] = q.kind == RayKind::camera ? mask_virtual | mask_stand_in : mask_virtual;
+    }
+    trace(static_cast<int>(n), false, RayKind::reflection);
+    statistics_->secondary_rays += n;
+    int count = 0;
+    std::size_t leaving = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const QueuedRay& q = queue_[from + i];
+      const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
+      const std::size_t target = q.slot < cell_pixels ? q.pixel : cell_pixels + q.pixel;
+      if (!hit && q.kind != RayKind::camera) {
+        if (q.kind == RayKind::reflection) {
+          add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.throughput);
+        }
+        continue;
+      }
+      if (hit && q.kind == RayKind::difference) {
+        add_environment(q.slot, target, q.direction, q.roughness, q.spread, -q.throughput);
+      }
+      ShadePoint& p =
+          hit ? points_[static_cast<std::size_t>(count++)] : points_[stream_rays - ++leaving];
+      set_point(p, static_cast<int>(i), q.pixel, q.slot);
+      if (!hit) group_[leaving - 1] = &p;
+      p.spread_rad = q.spread_rad;
+      p.footprint_m = q.footprint_m + (hit ? stream_.far_m[i] * q.spread_rad : 0);
+      p.throughput = q.throughput;
+      p.kind = q.kind == RayKind::camera ? RayKind::camera : RayKind::reflection;
+      p.depth = q.depth;
+    }
+    queue_.resize(from);
+    run_background({group_.data(), leaving});
+    shade_points(count, false);
+  }
+}
+
+}  // namespace render

@@ -1,0 +1,184 @@
+// Finds a cell's transport: camera rays, what they meet, who sees which light, bounces, edges.
+// Private to the kernel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/cell_transport.h"
+#include "render/kernel.h"
+
+namespace render {
+
+// A stream of rays with their hits.
+struct RayStream {
+  alignas(64) std::array<float, stream_rays> ox, oy, oz, dx, dy, dz, near_m, far_m, time;
+  alignas(64) std::array<unsigned, stream_rays> mask, id, flags, geom, prim, inst;
+  alignas(64) std::array<float, stream_rays> u, v, ngx, ngy, ngz;
+};
+
+// A cell under the planned light while its transport is found: one sample after the other is both
+// added up (to decide what is worth more rays) and noted in the transport.
+//
+// All memory that this takes on one thread; once it has grown, nothing is allocated.
+class CellBaker final : public RaySink {
+ public:
+  CellBaker();
+  // The cell whose top-left pixel is (x0, y0), into `transport`.
+  void bake(const FrameContext& frame,
+            int x0,
+            int y0,
+            CellTransport& transport,
+            RenderStatistics& statistics);
+  void log_rays(RayLog* log) { gather_.log = log; }
+
+  void push(const ShadePoint& from, const NewRay& ray) override;
+
+ private:
+  static constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
+  static constexpr int ring_pixels = ring_size * ring_size;
+
+  struct QueuedRay {
+    Vec3f origin, direction, throughput;
+    Vec3f planned;  // light of the environment in that direction, as planned
+    Spread spread;
+    float footprint_m, spread_rad;
+    float roughness;
+    std::uint32_t pixel, slot;
+    RayKind kind;
+    std::uint8_t depth;
+  };
+
+  // A lobe, whose compact light waits until it is known who sees which.
+  struct Lobe {
+    const ShadePoint* point;
+    Vec3f throughput, normal;
+    Spread spread;
+    float roughness, share;
+    bool difference;
+  };
+
+  // What the rays of one sample add up to under the planned light.
+  struct Sample {
+    Vec3f added;  // radiance
+    Vec3f plate;  // share of the plate
+
+    Sample& operator+=(const Sample& o) {
+      added += o.added;
+      plate += o.plate;
+      return *this;
+    }
+  };
+
+  // What the camera ray through a pixel's centre met: enough to find edges and to share shading.
+  struct Met {
+    Scene::Surface surface;  // or no_hit
+    Vec3f normal;            // of the triangle, unit, towards the camera
+    Vec3f position;
+  };
+
+  // Why a pixel takes further camera rays.
+  enum class Edge : std::uint8_t {
+    none,
+    surface,  // another surface begins: those that meet what a neighbour met share its radiance
+    glint,    // mirrored light changes quickly: they share only the light that arrives
+  };
+
+  struct Further {
+    std::uint16_t pixel;
+    std::uint16_t index;  // in the frame's pattern
+  };
+
+  // Of points: the irradiance that is planned.
+  struct Light {
+    Vec3f open, arriving;
+    friend bool operator==(const Light&, const Light&) = default;
+  };
+
+  // The order of camera rays in a cell's stream: 4x4 blocks one after the other.
+  static std::array<int, 2> pixel_of_ray(int i) {
+    return {((i >> 4) & 3) * 4 + (i & 3), (i >> 6) * 4 + ((i >> 2) & 3)};
+  }
+  static bool continuous(const Met& a, const Met& b, float pixel_angle, Vec3f camera);
+  static std::size_t target_of(const ShadePoint& p) {
+    return p.slot < cell_pixels ? p.pixel : cell_pixels + p.pixel;
+  }
+  bool is_inside(std::size_t k) const { return (inside_[k / 64] >> (k % 64) & 1) != 0; }
+
+  // cell_baker.cpp
+  void trace(int count, bool coherent, RayKind kind);
+  void set_camera_ray(int i, Vec3f v_cam);
+  void set_point(ShadePoint& p, int i, std::uint32_t pixel, std::uint32_t slot);
+  void trace_centres();
+  void shade_centres();
+  template <class F>
+  void for_each_shader(int count, F&& call);
+  void shade_points(int count, bool grid);
+  void run_background(std::span<ShadePoint* const> leaving);
+  void receive(int count, bool grid);
+  void set_receiver(std::size_t k, const ShadePoint& p);
+  void add_centre(const ShadePoint& p);
+  void add_tested(std::span<const std::uint16_t> point_of_receiver);
+  void add_shared(const ShadePoint& p, std::size_t centre);
+  void add_lamps(const ShadePoint& p, std::size_t light_point);
+  void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
+  void add_compact(const Lobe& lobe, std::size_t light, Vec3f passed);
+  void add_environment(std::size_t slot,
+                       std::size_t target,
+                       Vec3f direction,
+                       float roughness,
+                       const Spread& spread,
+                       Vec3f weight);
+  void collect(const ShadePoint& p);
+  void bounce();
+  void pack();
+
+  // cell_edges.cpp
+  Met met_at(int i) const;
+  void keep_centres();
+  void trace_ring();
+  void find_edges();
+  void find_glints();
+  void sample_edges();
+  void finish_further(int count);
+  int neighbour_of(int i, const Further& f) const;
+  CellMask edges() const;
+  CellMask uncertain(int n) const;
+  bool is_uncertain(std::size_t k, int n) const;
+  Vec3f direction_in(int x, int y, const std::array<float, 2>& offset) const;
+  void add_further(std::size_t k, const Sample& sample);
+
+  RayStream stream_;
+  GatherWorkspace gather_;
+  Receivers receivers_;
+  std::array<ShadePoint, stream_rays> points_;
+  std::array<Light, stream_rays> light_of_point_;
+  std::array<ShadePoint*, stream_rays> group_;
+  std::array<std::uint8_t, stream_rays> done_;
+  std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
+  std::vector<PointLight> tested_;
+  std::vector<Lobe> lobes_;
+  std::vector<QueuedRay> queue_;  // capacity reserved
+
+  std::array<Sample, slots> samples_;  // centres, then further ones shaded on their own
+  std::array<CellTransport::Base, slots> base_;
+  std::array<Light, cell_pixels> light_;  // at what the centres met
+  std::array<Met, ring_pixels> met_;
+  std::array<Edge, cell_pixels> edge_;
+  std::array<Vec3f, cell_pixels> shown_sum_, squares_;  // of what further samples show
+  std::array<std::uint16_t, cell_pixels> counts_;
+  int samples_each_ = 1;  // of the pixels that take further ones now
+  std::array<std::array<std::uint16_t, 9>, cell_pixels> borrowed_;  // by neighbour, row by row
+  std::array<Further, stream_rays> further_;
+
+  // Of the cell at work.
+  const FrameContext* frame_ = nullptr;
+  RenderStatistics* statistics_ = nullptr;
+  CellTransport* transport_ = nullptr;
+  int x0_ = 0, y0_ = 0;
+  CellMask inside_{};
+};
+
+}  // namespace render

@@ -1,0 +1,279 @@
+// Edges and glints of a cell: where pixels take further camera rays.
+#include "render/cell_baker.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "render/embree_context.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+constexpr float display_limit = 4;   // brighter light than this, in display white, looks alike
+constexpr float grey_plate = 0.18F;  // for whatever plate: decisions hold from frame to frame
+constexpr Scene::Surface no_hit{~0U, ~0U};
+
+Vec3f clipped(Vec3f v) {
+  return {std::min(v.x, display_limit), std::min(v.y, display_limit), std::min(v.z, display_limit)};
+}
+
+}  // namespace
+
+CellBaker::Met CellBaker::met_at(int index) const {
+  const auto i = static_cast<std::size_t>(index);
+  const RayStream& s = stream_;
+  if (s.geom[i] == RTC_INVALID_GEOMETRY_ID) return {no_hit, {}, {}};
+  const Vec3f d{s.dx[i], s.dy[i], s.dz[i]};
+  Vec3f n = normalize(Vec3f{s.ngx[i], s.ngy[i], s.ngz[i]});
+  if (dot(n, d) > 0) n = -n;
+  const Scene::Surface surface = frame_->inputs.scene->surface_of(s.geom[i], s.prim[i], s.inst[i]);
+  return {surface, n, frame_->camera + d * s.far_m[i]};
+}
+
+void CellBaker::keep_centres() {
+  for (int i = 0; i < cell_pixels; ++i) {
+    const auto [x, y] = pixel_of_ray(i);
+    met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)] = met_at(i);
+  }
+}
+
+void CellBaker::trace_ring() {
+  const auto& table = *frame_->inputs.directions;
+  std::array<std::uint16_t, 4 * (ring_size - 1)> place;
+  int count = 0;
+  const auto add = [&](int x, int y) {
+    place[static_cast<std::size_t>(count)] =
+        static_cast<std::uint16_t>((y + 1) * ring_size + x + 1);
+    const bool in = x0_ + x >= 0 && y0_ + y >= 0 && x0_ + x < table.width && y0_ + y < table.height;
+    const std::size_t t = in ? table.index(y0_ + y, x0_ + x) : 0;
+    set_camera_ray(count, in ? Vec3f{table.x[t], table.y[t], table.z[t]} : Vec3f{});
+    ++count;
+  };
+  for (int x = -1; x <= cell_size; ++x) add(x, -1);
+  for (int x = -1; x <= cell_size; ++x) add(x, cell_size);
+  for (int y = 0; y < cell_size; ++y) add(-1, y);
+  for (int y = 0; y < cell_size; ++y) add(cell_size, y);
+  trace(count, true, RayKind::camera);
+  for (int i = 0; i < count; ++i) met_[place[static_cast<std::size_t>(i)]] = met_at(i);
+}
+
+// Whether two neighbouring pixels show one surface: same thing, no crease, no step in depth.
+bool CellBaker::continuous(const Met& a, const Met& b, float pixel_angle, Vec3f camera) {
+  if (a.surface != b.surface) return false;
+  if (a.surface == no_hit) return true;
+  if (dot(a.normal, b.normal) < 0.9F) return false;
+  const Vec3f between = b.position - a.position;
+  const float step = std::min(std::abs(dot(a.normal, between)), std::abs(dot(b.normal, between)));
+  return step < 3 * pixel_angle * length(a.position - camera);
+}
+
+void CellBaker::find_edges() {
+  edge_.fill(Edge::none);
+  const auto& table = *frame_->inputs.directions;
+  const auto mark = [&](int x, int y) {
+    if (x >= 0 && y >= 0 && x < cell_size && y < cell_size) {
+      edge_[static_cast<std::size_t>(y * cell_size + x)] = Edge::surface;
+    }
+  };
+  const auto compare = [&](int x, int y, int dx, int dy) {
+    const auto in = [&](int px, int py) {
+      return px >= 0 && py >= 0 && px < table.width && py < table.height;
+    };
+    if (!in(x0_ + x, y0_ + y) || !in(x0_ + x + dx, y0_ + y + dy)) return;
+    const Met& a = met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)];
+    const Met& b = met_[static_cast<std::size_t>((y + 1 + dy) * ring_size + x + 1 + dx)];
+    if (continuous(a, b, frame_->pixel_angle, frame_->camera)) return;
+    mark(x, y);
+    mark(x + dx, y + dy);
+  };
+  for (int y = -1; y <= cell_size; ++y) {
+    for (int x = -1; x <= cell_size; ++x) {
+      if (x < cell_size) compare(x, y, 1, 0);
+      if (y < cell_size) compare(x, y, 0, 1);
+    }
+  }
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (!is_inside(k)) edge_[k] = Edge::none;
+  }
+}
+
+// Marks pixels whose own light differs from a neighbour's by more than the effort allows.
+void CellBaker::find_glints() {
+  const float least = frame_->job->effort.glint_contrast;
+  if (!(least > 0)) return;
+  const auto shown = [&](std::size_t k) { return clipped(samples_[k].added); };
+  const auto compare = [&](std::size_t a, std::size_t b) {
+    if (!is_inside(a) || !is_inside(b)) return;
+    const Vec3f d = shown(a) - shown(b);
+    if (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) > least)
+      edge_[a] = edge_[b] = Edge::glint;
+  };
+  for (std::size_t y = 0; y < cell_size; ++y) {
+    for (std::size_t x = 0; x < cell_size; ++x) {
+      const std::size_t k = y * cell_size + x;
+      if (x + 1 < cell_size) compare(k, k + 1);
+      if (y + 1 < cell_size) compare(k, k + cell_size);
+    }
+  }
+}
+
+// The nearest pixel whose centre shows the same surface as a further_ ray met_, or -1.
+int CellBaker::neighbour_of(int index, const Further& f) const {
+  const Met here = met_at(index);
+  const int px = f.pixel % cell_size, py = f.pixel / cell_size;
+  const auto& offset = frame_->pattern[f.index];
+  float best = 1e9F;
+  int found = -1;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const int x = px + dx, y = py + dy;
+      if (x < 0 || y < 0 || x >= cell_size || y >= cell_size) continue;
+      const int k = y * cell_size + x;
+      if (!is_inside(static_cast<std::size_t>(k))) continue;
+      const float ox = static_cast<float>(dx) - offset[0], oy = static_cast<float>(dy) - offset[1];
+      const float distance = ox * ox + oy * oy;
+      if (distance >= best) continue;
+      const Met& there = met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)];
+      if (!continuous(here, there, frame_->pixel_angle, frame_->camera)) continue;
+      best = distance;
+      found = k;
+    }
+  }
+  return found;
+}
+
+void CellBaker::finish_further(int count) {
+  trace(count, true, RayKind::camera);
+  statistics_->primary_rays += static_cast<std::uint64_t>(count);
+  int shaded = 0;
+  std::size_t leaving = 0;
+  std::array<std::uint16_t, stream_rays> pixel_of;
+  std::size_t used = 0;
+  const float finer = 1 / std::sqrt(static_cast<float>(samples_each_));
+  for (int i = 0; i < count; ++i) {
+    const Further& f = further_[static_cast<std::size_t>(i)];
+    const int neighbour = neighbour_of(i, f);
+    if (neighbour >= 0 && edge_[f.pixel] == Edge::surface) {
+      add_further(f.pixel, samples_[static_cast<std::size_t>(neighbour)]);
+      const int dx = neighbour % cell_size - f.pixel % cell_size;
+      const int dy = neighbour / cell_size - f.pixel / cell_size;
+      ++borrowed_[f.pixel][static_cast<std::size_t>((dy + 1) * 3 + dx + 1)];
+      continue;
+    }
+    const std::size_t slot = cell_pixels + used;
+    samples_[slot] = {};
+    pixel_of[used++] = f.pixel;
+    const bool hit = stream_.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID;
+    ShadePoint& p =
+        hit ? points_[static_cast<std::size_t>(shaded++)] : points_[stream_rays - ++leaving];
+    set_point(p, i, f.pixel, static_cast<std::uint32_t>(slot));
+    p.spread_rad *= finer;
+    p.footprint_m *= finer;
+    if (hit && neighbour >= 0)
+      lender_[static_cast<std::size_t>(shaded - 1)] = static_cast<std::int16_t>(neighbour);
+    if (!hit) group_[leaving - 1] = &p;
+  }
+  run_background({group_.data(), leaving});
+  shade_points(shaded, false);
+  lender_.fill(-1);
+  bounce();
+  for (std::size_t i = 0; i < used; ++i) {
+    add_further(pixel_of[i], samples_[cell_pixels + i]);
+  }
+}
+
+// More camera rays in pixels that an edge crosses. The centre's own sample makes room for them.
+// Pixels that are still uncertain take more, three times as many as they have, and again.
+void CellBaker::sample_edges() {
+  const Effort& effort = frame_->job->effort;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (edge_[k] == Edge::none) continue;
+    squares_[k] = shown_sum_[k] = {};
+    borrowed_[k] = {};
+  }
+  int first = 0;
+  for (int end = effort.aa_samples; end <= samples_max; first = end, end *= 4) {
+    samples_each_ = end;
+    const CellMask chosen = first == 0 ? edges() : uncertain(first);
+    int count = 0;
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      if (!(chosen[k / 64] >> (k % 64) & 1)) continue;
+      const int x = static_cast<int>(k % cell_size), y = static_cast<int>(k / cell_size);
+      for (int i = first; i < end; ++i) {
+        further_[static_cast<std::size_t>(count)] = {static_cast<std::uint16_t>(k),
+                                                     static_cast<std::uint16_t>(i)};
+        set_camera_ray(
+            count, direction_in(x0_ + x, y0_ + y, frame_->pattern[static_cast<std::size_t>(i)]));
+        if (++count == stream_rays) {
+          finish_further(count);
+          count = 0;
+        }
+      }
+    }
+    if (count > 0) finish_further(count);
+    if (!(effort.aa_tolerance > 0)) break;
+  }
+}
+
+CellMask CellBaker::edges() const {
+  CellMask mask{};
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (edge_[k] != Edge::none) mask[k / 64] |= std::uint64_t{1} << (k % 64);
+  }
+  return mask;
+}
+
+// Pixels whose mean of `n` further samples is uncertain, and those beside them: what one pixel saw
+// of a small bright thing the next one may have missed.
+CellMask CellBaker::uncertain(int n) const {
+  CellMask mask{};
+  for (int k = 0; k < cell_pixels; ++k) {
+    if (!is_uncertain(static_cast<std::size_t>(k), n)) continue;
+    for (int y = std::max(0, k / cell_size - 1); y <= std::min(cell_size - 1, k / cell_size + 1);
+         ++y) {
+      for (int x = std::max(0, k % cell_size - 1); x <= std::min(cell_size - 1, k % cell_size + 1);
+           ++x) {
+        const auto i = static_cast<std::size_t>(y * cell_size + x);
+        if (edge_[i] != Edge::none && counts_[i] == n) mask[i / 64] |= std::uint64_t{1} << (i % 64);
+      }
+    }
+  }
+  return mask;
+}
+
+// Whether the mean of a pixel's first `n` further samples may be off by more than is allowed. A
+// pixel that took no more than before stays as it is.
+bool CellBaker::is_uncertain(std::size_t k, int n) const {
+  if (counts_[k] != n) return false;
+  const auto samples_n = static_cast<float>(n);
+  const Vec3f shown = shown_sum_[k];
+  const Vec3f spread = squares_[k] - shown * shown * (1 / samples_n);
+  const float tolerance = frame_->job->effort.aa_tolerance;
+  return std::max({spread.x, spread.y, spread.z}) >
+         tolerance * tolerance * samples_n * std::max(samples_n - 1, 1.0F);
+}
+
+// Through a pixel off its centre: linear between the centre and the next one on that side.
+Vec3f CellBaker::direction_in(int x, int y, const std::array<float, 2>& offset) const {
+  const auto& table = *frame_->inputs.directions;
+  const int sx = offset[0] < 0 ? -1 : 1, sy = offset[1] < 0 ? -1 : 1;
+  const float fx = std::abs(offset[0]), fy = std::abs(offset[1]);
+  const auto at = [&](int column, int row) {
+    const std::size_t t = table.index(row, column);
+    return Vec3f{table.x[t], table.y[t], table.z[t]};
+  };
+  const Vec3f a = at(x, y), b = at(x + sx, y), c = at(x, y + sy);
+  if (dot(a, a) < 0.5F || dot(b, b) < 0.5F || dot(c, c) < 0.5F) return a;
+  return a + (b - a) * fx + (c - a) * fy;
+}
+
+void CellBaker::add_further(std::size_t k, const Sample& sample) {
+  ++counts_[k];
+  const Vec3f shown = clipped(sample.added + sample.plate * grey_plate);
+  shown_sum_[k] += shown;
+  squares_[k] += shown * shown;
+}
+
+}  // namespace render

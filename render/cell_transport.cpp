@@ -1,0 +1,211 @@
+// Cells under new light.
+#include "render/cell_transport.h"
+
+#include <algorithm>
+#include <bit>
+#include <numbers>
+
+#include "render/lanes.h"
+#include "render/stand_in_parameters.h"
+
+namespace render {
+namespace {
+
+float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
+
+// 1 - lost/open, exactly 1 where nothing is lost.
+float passing(float open, float lost) {
+  return lost > 0 && open > 0 ? std::max(0.0F, 1 - lost / open) : 1.0F;
+}
+Vec3f passing(Vec3f open, Vec3f lost) {
+  return {passing(open.x, lost.x), passing(open.y, lost.y), passing(open.z, lost.z)};
+}
+
+// Irradiance at the centres: of all light that is not behind real things, and what of it virtual
+// objects take.
+void add_irradiance(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
+  const std::size_t count = std::min(light.lights.size(), cell.visibility.lit.size());
+  for (std::size_t k = 0; k < cell_pixels; k += lanes) {
+    const auto bits_at = [k](const CellMask& mask) {
+      return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
+    };
+    Lanes open_r = all(0), open_g = all(0), open_b = all(0);
+    Lanes lost_r = all(0), lost_g = all(0), lost_b = all(0);
+    if (bits_at(cell.receiving)) {
+      const Lanes nx = load(&cell.nx[k]), ny = load(&cell.ny[k]), nz = load(&cell.nz[k]);
+      for (std::size_t i = 0; i < count; ++i) {
+        const unsigned lit = bits_at(cell.visibility.lit[i]);
+        if (!lit) continue;
+        const DirectionalLight& l = light.lights[i];
+        const Lanes cosine = both(dot(nx, ny, nz, l.direction), mask_of(lit));
+        const Lanes r = multiply(cosine, all(l.irradiance.x));
+        const Lanes g = multiply(cosine, all(l.irradiance.y));
+        const Lanes b = multiply(cosine, all(l.irradiance.z));
+        open_r = add(open_r, r), open_g = add(open_g, g), open_b = add(open_b, b);
+        const unsigned hidden = lit & ~bits_at(cell.visibility.seen[i]);
+        if (!hidden) continue;
+        const Lanes mask = mask_of(hidden);
+        lost_r = add(lost_r, both(r, mask));
+        lost_g = add(lost_g, both(g, mask));
+        lost_b = add(lost_b, both(b, mask));
+      }
+    }
+    store(&w.open_r[k], open_r), store(&w.open_g[k], open_g), store(&w.open_b[k], open_b);
+    store(&w.lost_r[k], lost_r), store(&w.lost_g[k], lost_g), store(&w.lost_b[k], lost_b);
+  }
+  for (const TintedLight& tint : cell.visibility.tints) {
+    const std::size_t k = tint.centre;
+    const DirectionalLight& l = light.lights[tint.light];
+    const float cosine =
+        cell.nx[k] * l.direction.x + cell.ny[k] * l.direction.y + cell.nz[k] * l.direction.z;
+    w.lost_r[k] += cosine * l.irradiance.x * tint.lost_share.x;
+    w.lost_g[k] += cosine * l.irradiance.y * tint.lost_share.y;
+    w.lost_b[k] += cosine * l.irradiance.z * tint.lost_share.z;
+  }
+}
+
+void light_centres(const CellTransport& cell, RelightWorkspace& w) {
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const CellTransport::Base& base = cell.base[k];
+    w.added[k] = base.radiance;
+    w.share[k] = base.plate;
+    w.passed[k] = base.passed;
+    if (!(cell.receiving[k / 64] >> (k % 64) & 1)) continue;
+    const Vec3f open{w.open_r[k], w.open_g[k], w.open_b[k]};
+    const Vec3f lost{w.lost_r[k], w.lost_g[k], w.lost_b[k]};
+    w.arriving[k] = open - lost;
+    w.passing[k] = passing(open, lost);
+    w.added[k] += cell.diffuse[k] * w.arriving[k];
+    const Vec3f share = cell.shadow[k] * w.passing[k];
+    w.share[k] += share;
+    w.passed[k] += mean(share);
+  }
+}
+
+// What lamps add on a stand-in. Where the plate tells its albedo, they brighten the plate.
+void light_lamps(const CellTransport& cell,
+                 std::span<const Vec3f, cell_pixels> plate,
+                 RelightWorkspace& w,
+                 RenderStatistics& statistics) {
+  for (const CellTransport::LampCatcher& lamp : cell.lamps) {
+    const std::size_t k = lamp.point;
+    const Vec3f open = k < cell_pixels ? Vec3f{w.open_r[k], w.open_g[k], w.open_b[k]}
+                                       : w.open_at_points[k - cell_pixels];
+    const Vec3f behind = plate[lamp.slot % cell_pixels];
+    if (std::max({behind.x, behind.y, behind.z}) >= clipped_plate) ++statistics.clipped_plate;
+    if (plate_tells_albedo(behind, open) && open.x > 0 && open.y > 0 && open.z > 0) {
+      w.share[lamp.slot] +=
+          lamp.share *
+          Vec3f{lamp.irradiance.x / open.x, lamp.irradiance.y / open.y, lamp.irradiance.z / open.z};
+    } else {
+      w.added[lamp.slot] +=
+          lamp.share * lamp.albedo * lamp.irradiance * (1 / std::numbers::pi_v<float>);
+    }
+  }
+}
+
+// Shadows on points that are no centres.
+void light_shadow_points(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
+  w.open_at_points.clear();
+  for (const CellTransport::ShadowPoint& point : cell.shadow_points) {
+    Vec3f open{}, lost{};
+    for (std::uint32_t i = point.first; i < point.first + point.count; ++i) {
+      const CellTransport::ShadowLight& s = cell.shadow_lights[i];
+      const Vec3f e = light.lights[s.light].irradiance;
+      open += e * s.open;
+      lost += e * s.lost;
+    }
+    const Vec3f share = point.share * passing(open, lost);
+    w.share[point.slot] += share;
+    w.passed[point.slot] += mean(share);
+    w.open_at_points.push_back(open);
+  }
+}
+
+}  // namespace
+
+void CellTransport::clear() {
+  empty = true;
+  base.fill({});
+  nx.fill(0), ny.fill(0), nz.fill(0);
+  diffuse.fill({});
+  shadow.fill({});
+  receiving = {};
+  visibility.lit.clear(), visibility.seen.clear(), visibility.tints.clear();
+  shared.clear(), lights.clear();
+  environment.clear(), shadow_points.clear(), shadow_lights.clear(), lamps.clear();
+  borrowed.clear(), further.clear();
+  rays = 0;
+}
+
+std::size_t CellTransport::bytes() const {
+  const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
+  return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
+         of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
+         of(lamps) + of(borrowed) + of(further);
+}
+
+void relight(const CellTransport& cell,
+             const FrameLight& light,
+             std::span<const Vec3f, cell_pixels> plate,
+             RelightWorkspace& w,
+             CellPicture& picture,
+             RenderStatistics& statistics) {
+  if (cell.receiving != CellMask{}) add_irradiance(cell, light, w);
+  light_centres(cell, w);
+  for (const CellTransport::Further& f : cell.further) {
+    const std::size_t slot = cell_pixels + f.pixel;
+    w.added[slot] = f.base.radiance;
+    w.share[slot] = f.base.plate;
+    w.passed[slot] = f.base.passed;
+  }
+  light_shadow_points(cell, light, w);
+  light_lamps(cell, plate, w, statistics);
+  for (const CellTransport::SharedTerm& s : cell.shared) {
+    if (s.shadow) {
+      const Vec3f share = s.weight * w.passing[s.centre];
+      w.share[s.slot] += share;
+      w.passed[s.slot] += mean(share);
+    } else {
+      w.added[s.slot] += s.weight * w.arriving[s.centre];
+    }
+  }
+  for (const CellTransport::LightTerm& l : cell.lights) {
+    w.added[l.slot] += l.weight * light.lights[l.light].irradiance;
+  }
+  for (const CellTransport::EnvironmentTerm& e : cell.environment) {
+    w.added[e.slot] += e.weight * radiance_at(*light.levels[e.level], e.x, e.y);
+  }
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    picture.added[k] = w.added[k];
+    picture.share[k] = w.share[k];
+    picture.passed[k] = w.passed[k];
+    picture.seen[k] = cell.base[k].seen;
+  }
+  // Pixels of further samples: their own sums, and what they share of centres.
+  for (const CellTransport::Further& f : cell.further) {
+    const std::size_t k = f.pixel;
+    picture.added[k] = w.added[cell_pixels + k];
+    picture.share[k] = w.share[cell_pixels + k];
+    picture.passed[k] = w.passed[cell_pixels + k];
+    picture.seen[k] = f.base.seen;
+  }
+  for (const CellTransport::Borrowed& b : cell.borrowed) {
+    const auto n = static_cast<float>(b.count);
+    picture.added[b.pixel] += w.added[b.centre] * n;
+    picture.share[b.pixel] += w.share[b.centre] * n;
+    picture.passed[b.pixel] += w.passed[b.centre] * n;
+    picture.seen[b.pixel] += cell.base[b.centre].seen * n;
+  }
+  for (const CellTransport::Further& f : cell.further) {
+    const auto n = static_cast<float>(f.count);
+    const std::size_t k = f.pixel;
+    // Divided, not multiplied by 1 / n: n equal shares of the plate give it back exactly.
+    picture.added[k] = picture.added[k] / n;
+    picture.share[k] = picture.share[k] / n;
+    picture.passed[k] /= n;
+    picture.seen[k] /= n;
+  }
+}
+
+}  // namespace render

@@ -1,0 +1,131 @@
+// How light gets from its sources to the pixels of a cell: all of a cell's picture but the light.
+// Private to the kernel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/environment.h"
+#include "render/frame_job.h"
+#include "render/light_gather.h"
+
+namespace render {
+
+// Where a sample's light is added up: 0..255 the centre of a pixel, 256..511 all further samples of
+// a pixel together.
+inline constexpr std::size_t slots = 2 * cell_pixels;
+
+// What rays found out about a cell, as sums over the light: pixel = plate * share + light from the
+// environment, from the table's lights, and of the surfaces themselves. It holds while scene,
+// camera, lens, directions of lights and effort stay; lighting it anew takes no ray.
+//
+// After Sloan, Kautz and Snyder, "Precomputed Radiance Transfer for Real-Time Rendering in Dynamic,
+// Low-Frequency Lighting Environments", SIGGRAPH 2002, but with the table's own lights as the
+// basis, and with mirrored light as places in the environment.
+struct CellTransport {
+  struct Base {
+    Vec3f radiance;    // whatever the light
+    Vec3f plate;       // share of the plate
+    float passed = 0;  // the same in the mean
+    float seen = 0;    // 1 - coverage by virtual objects
+    friend bool operator==(const Base&, const Base&) = default;
+  };
+  // Slot += weight * light of the table.
+  struct LightTerm {
+    std::uint16_t slot, light;
+    Vec3f weight;
+  };
+  // Slot += weight * a level of the environment at a place.
+  struct EnvironmentTerm {
+    Vec3f weight;
+    float x, y;
+    std::uint16_t slot, level;
+  };
+  // Slot += weight * irradiance of a centre; or the plate's share, as far as the centre sees light.
+  struct SharedTerm {
+    std::uint16_t slot, centre;
+    bool shadow;
+    Vec3f weight;
+  };
+  // A point of a stand-in that is no centre: the plate passes as far as it sees light.
+  struct ShadowPoint {
+    std::uint16_t slot;
+    std::uint32_t first, count;  // of shadow_lights
+    Vec3f share;
+  };
+  struct ShadowLight {
+    std::uint16_t light;
+    float open;
+    Vec3f lost;
+  };
+  // A stand-in's point that lamps shine on.
+  struct LampCatcher {
+    std::uint16_t slot;
+    std::uint32_t point;  // a centre, or cell_pixels + a shadow point
+    Vec3f share, irradiance, albedo;
+  };
+  // A pixel of further samples: those that share the whole radiance of a centre, and how many all
+  // are.
+  struct Borrowed {
+    std::uint16_t pixel, centre, count;
+  };
+  struct Further {
+    std::uint16_t pixel, count;
+    Base base;
+  };
+
+  bool empty = true;  // nothing but plate
+  std::array<Base, cell_pixels> base;
+  // Centres that receive light: normals and answers; masks say which.
+  alignas(64) std::array<float, cell_pixels> nx, ny, nz;
+  std::array<Vec3f, cell_pixels> diffuse;  // radiance per irradiance
+  std::array<Vec3f, cell_pixels> shadow;   // plate's share, as far as light is seen
+  CellMask receiving{};
+  CellVisibility visibility;
+  std::vector<SharedTerm> shared;
+  std::vector<LightTerm> lights;
+  std::vector<EnvironmentTerm> environment;
+  std::vector<ShadowPoint> shadow_points;
+  std::vector<ShadowLight> shadow_lights;
+  std::vector<LampCatcher> lamps;
+  std::vector<Borrowed> borrowed;
+  std::vector<Further> further;
+  std::uint64_t rays = 0;  // that it took
+
+  void clear();
+  std::size_t bytes() const;
+};
+
+// The light of one frame, as relight() wants it.
+struct FrameLight {
+  std::span<const DirectionalLight> lights;
+  std::span<const capture::Image* const> levels;  // of the environment: levels_of()
+};
+
+// What relight() works in.
+struct RelightWorkspace {
+  alignas(64) std::array<float, cell_pixels> open_r, open_g, open_b, lost_r, lost_g, lost_b;
+  std::array<Vec3f, slots> added, share;
+  std::array<float, slots> passed;
+  std::array<Vec3f, cell_pixels> arriving, passing;  // irradiance; share of it that is seen
+  std::vector<Vec3f> open_at_points;  // irradiance, where nothing virtual is in the way
+};
+
+// What a pixel shows: plate * share + added.
+struct CellPicture {
+  std::array<Vec3f, cell_pixels> added, share;
+  std::array<float, cell_pixels> passed, seen;
+};
+
+// A cell under the light of a frame. `plate` in scene-linear light decides where lamps on stand-ins
+// find their albedo.
+void relight(const CellTransport& cell,
+             const FrameLight& light,
+             std::span<const Vec3f, cell_pixels> plate,
+             RelightWorkspace& workspace,
+             CellPicture& picture,
+             RenderStatistics& statistics);
+
+}  // namespace render

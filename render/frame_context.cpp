@@ -1,0 +1,193 @@
+// What all tiles of a frame share.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "render/kept_transport.h"
+#include "render/kernel.h"
+
+namespace render {
+namespace {
+
+// A hash of many numbers.
+class Key {
+ public:
+  void mix(std::uint64_t value) {
+    value_ = (value_ ^ value) * 0xFF51AFD7ED558CCDULL;
+    value_ ^= value_ >> 32;
+  }
+  void mix(double value) { mix(std::bit_cast<std::uint64_t>(value)); }
+  void mix(float value) { mix(std::uint64_t{std::bit_cast<std::uint32_t>(value)}); }
+  void mix(int value) { mix(static_cast<std::uint64_t>(value)); }
+  void mix(Vec3f v) { mix(v.x), mix(v.y), mix(v.z); }
+  void mix(const std::vector<float>& values) {
+    std::size_t i = 0;
+    for (; i + 1 < values.size(); i += 2) {
+      mix(std::uint64_t{std::bit_cast<std::uint32_t>(values[i])} << 32 |
+          std::bit_cast<std::uint32_t>(values[i + 1]));
+    }
+    if (i < values.size()) mix(values[i]);
+  }
+  std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0x9E3779B97F4A7C15ULL;
+};
+
+// Changes whenever the cells' transport may.
+std::uint64_t transport_key(const FrameContext& context) {
+  Key key;
+  const FrameJob& job = *context.job;
+  key.mix(context.inputs.scene->id());
+  for (const double value : job.cam_from_set.R.m) key.mix(value);
+  const calibrate::Vec3& t = job.cam_from_set.t;
+  key.mix(t.x), key.mix(t.y), key.mix(t.z);
+  key.mix(context.inputs.directions->x);
+  key.mix(context.inputs.directions->y);
+  for (const DirectionalLight& light : context.planned_table->lights) {
+    key.mix(light.direction), key.mix(light.irradiance);
+    key.mix(light.spread), key.mix(std::uint64_t{light.compact});
+  }
+  for (const LocalLight& lamp : job.lights.lamps) {
+    key.mix(lamp.position), key.mix(lamp.normal), key.mix(lamp.intensity);
+  }
+  for (const capture::Image* level : context.planned_levels) key.mix(level->height);
+  key.mix(context.planned->radiance.pixels);
+  key.mix(std::uint64_t{context.planned->compact_apart});
+  const Effort& e = job.effort;
+  key.mix(e.aa_samples), key.mix(e.aa_tolerance), key.mix(e.glint_contrast);
+  key.mix(e.interleave), key.mix(std::uint64_t{e.adaptive_visibility});
+  key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
+  return key.value();
+}
+
+// Whether places in one are places in the other.
+bool alike(const Environment& a, const Environment& b) {
+  const auto same_sizes = [](const auto& x, const auto& y) {
+    return std::ranges::equal(x, y, {}, &capture::Image::height, &capture::Image::height);
+  };
+  return a.radiance.height == b.radiance.height && same_sizes(a.smoothed, b.smoothed) &&
+         same_sizes(a.halved, b.halved) && a.compact_apart == b.compact_apart;
+}
+
+// Places in a pixel, -.5..+.5: every first 4^n of them are spread well (Sobol's sequence).
+std::array<std::array<float, 2>, samples_max> sample_pattern() {
+  std::array<std::array<float, 2>, samples_max> pattern;
+  for (std::uint32_t i = 0; i < samples_max; ++i) {
+    std::uint32_t x = 0, y = 0;
+    std::uint32_t column = 1U << 31;
+    for (std::uint32_t bits = i, place = 1U << 31; bits != 0; bits >>= 1, place >>= 1) {
+      if (bits & 1) x |= place, y ^= column;
+      column ^= column >> 1;
+    }
+    const auto middle = [](std::uint32_t v) {
+      return (static_cast<float>(v >> 24) + 0.5F) / samples_max - 0.5F;
+    };
+    pattern[i] = {middle(x), middle(y)};
+  }
+  return pattern;
+}
+
+}  // namespace
+
+FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) {
+  if (!inputs.scene || !inputs.directions || !inputs.environment) {
+    throw std::invalid_argument("a frame needs a scene, a lens and an environment");
+  }
+  const Effort& e = job.effort;
+  if (e.aa_samples < 1 || e.aa_samples > samples_max) {
+    throw std::invalid_argument("aa_samples must be 1 to " + std::to_string(samples_max));
+  }
+  if (e.interleave != 1 && e.interleave != 2 && e.interleave != 4) {
+    throw std::invalid_argument("interleave must be 1, 2 or 4");
+  }
+  const auto is_radiance = [](float v) { return std::isfinite(v) && v >= 0; };
+  if (!is_radiance(e.aa_tolerance) || !is_radiance(e.glint_contrast)) {
+    throw std::invalid_argument("aa_tolerance and glint_contrast must be finite, and 0 or more");
+  }
+  if (job.lights.lights.size() > most_lights) {
+    throw std::invalid_argument("a table holds at most " + std::to_string(most_lights) + " lights");
+  }
+  if (!(e.accuracy >= 0 && e.accuracy <= 1)) throw std::invalid_argument("accuracy must be 0 to 1");
+  if (e.max_depth < 0 || e.max_depth > 64) throw std::invalid_argument("max_depth must be 0 to 64");
+  if (e.tile_size < cell_size || e.tile_size % cell_size != 0) {
+    throw std::invalid_argument("tile_size must be a multiple of 16");
+  }
+  const auto finite = [](Vec3f v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+  };
+  for (const DirectionalLight& light : job.lights.lights) {
+    if (!finite(light.direction) || !finite(light.irradiance) || !finite(light.planned)) {
+      throw std::invalid_argument("a light of the table is not finite");
+    }
+  }
+  FrameContext context;
+  context.planned = inputs.planned && alike(*inputs.planned, *inputs.environment)
+                        ? inputs.planned
+                        : inputs.environment;
+  context.planned_levels = levels_of(*context.planned);
+  context.levels = levels_of(*inputs.environment);
+  auto planned_table = std::make_shared<LightTable>(job.lights);
+  for (std::size_t i = 0; i < planned_table->lights.size(); ++i) {
+    DirectionalLight& light = planned_table->lights[i];
+    if (light.planned != Vec3f{}) light.irradiance = light.planned;
+    if (light.compact != 0 && context.planned->compact_apart) {
+      context.compact.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  context.planned_table = std::move(planned_table);
+  if (context.compact.size() > most_compact_lights) {
+    throw std::invalid_argument("a table marks at most " + std::to_string(most_compact_lights) +
+                                " lights as compact");
+  }
+  context.pattern = sample_pattern();
+  context.inputs = inputs;
+  context.job = &job;
+  context.light = {inputs.scene, context.planned_table.get(), &job.effort};
+  const auto& R = job.cam_from_set.R.m;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j)
+      context.set_from_cam[i * 3 + j] = static_cast<float>(R[j * 3 + i]);
+  }
+  context.camera = calibrate::to_float(calibrate::position_of(job.cam_from_set));
+  if (!finite(context.camera)) throw std::invalid_argument("the camera's pose is not finite");
+  const auto& d = *inputs.directions;
+  const std::size_t a = d.index(d.height / 2, d.width / 2),
+                    b = d.index(d.height / 2, d.width / 2 + 1);
+  context.pixel_angle =
+      std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
+  if (inputs.kept) {
+    inputs.kept->begin_frame(transport_key(context), (d.width + cell_size - 1) / cell_size,
+                             (d.height + cell_size - 1) / cell_size);
+  }
+  return context;
+}
+
+void cut_tile(const capture::HalfImage& plate, Rect rect, int margin, TileJob& job) {
+  job.rect = rect;
+  job.margin = margin;
+  Rect& b = job.background_rect;
+  b.x = std::max(0, rect.x - margin);
+  b.y = std::max(0, rect.y - margin);
+  b.width = std::min(plate.width, rect.x + rect.width + margin) - b.x;
+  b.height = std::min(plate.height, rect.y + rect.height + margin) - b.y;
+  const auto row = static_cast<std::size_t>(b.width) * 3;
+  job.background.resize(static_cast<std::size_t>(b.height) * row);
+  for (int y = 0; y < b.height; ++y) {
+    const auto from = plate.pixels.begin() + static_cast<std::ptrdiff_t>(plate.index(b.y + y, b.x));
+    std::copy(from, from + static_cast<std::ptrdiff_t>(row),
+              job.background.begin() + static_cast<std::ptrdiff_t>(row) * y);
+  }
+}
+
+void size_result(const Rect& rect, TileResult& result) {
+  const auto pixels = static_cast<std::size_t>(rect.width) * static_cast<std::size_t>(rect.height);
+  result.rect = rect;
+  result.rgba.resize(pixels * 4);
+  result.matte.resize(pixels);
+  result.statistics = {};
+}
+
+}  // namespace render

@@ -1,0 +1,55 @@
+// Eight floats at a time, or one where there is no AVX2.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
+
+#include "calibrate/vec.h"
+
+namespace render {
+
+#if defined(__AVX2__)
+using Lanes = __m256;
+inline constexpr std::size_t lanes = 8;
+inline Lanes load(const float* at) { return _mm256_load_ps(at); }
+inline void store(float* at, Lanes v) { _mm256_store_ps(at, v); }
+inline Lanes all(float v) { return _mm256_set1_ps(v); }
+inline Lanes add(Lanes a, Lanes b) { return _mm256_add_ps(a, b); }
+inline Lanes multiply(Lanes a, Lanes b) { return _mm256_mul_ps(a, b); }
+inline Lanes positive(Lanes v) { return _mm256_cmp_ps(v, _mm256_setzero_ps(), _CMP_GT_OQ); }
+inline Lanes both(Lanes a, Lanes b) { return _mm256_and_ps(a, b); }
+inline unsigned bits_of(Lanes mask) { return static_cast<unsigned>(_mm256_movemask_ps(mask)); }
+// Lanes whose bit is set, as a mask.
+inline Lanes mask_of(unsigned bits) {
+  const __m256i which = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+  const __m256i set = _mm256_and_si256(_mm256_set1_epi32(static_cast<int>(bits)), which);
+  return _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, which));
+}
+#else
+struct Lanes {
+  float v;
+};
+inline constexpr std::size_t lanes = 1;
+inline Lanes load(const float* at) { return {*at}; }
+inline void store(float* at, Lanes v) { *at = v.v; }
+inline Lanes all(float v) { return {v}; }
+inline Lanes add(Lanes a, Lanes b) { return {a.v + b.v}; }
+inline Lanes multiply(Lanes a, Lanes b) { return {a.v * b.v}; }
+// Masks are all ones or all zeros; as floats they are only ever combined by both() and bits_of().
+inline Lanes positive(Lanes v) { return {std::bit_cast<float>(v.v > 0 ? ~0U : 0U)}; }
+inline Lanes both(Lanes a, Lanes b) {
+  return {std::bit_cast<float>(std::bit_cast<unsigned>(a.v) & std::bit_cast<unsigned>(b.v))};
+}
+inline unsigned bits_of(Lanes mask) { return std::bit_cast<unsigned>(mask.v) >> 31; }
+inline Lanes mask_of(unsigned bits) { return {std::bit_cast<float>(bits & 1 ? ~0U : 0U)}; }
+#endif
+
+inline Lanes dot(Lanes ax, Lanes ay, Lanes az, calibrate::Vec3f b) {
+  return add(add(multiply(ax, all(b.x)), multiply(ay, all(b.y))), multiply(az, all(b.z)));
+}
+
+}  // namespace render
