@@ -100,7 +100,7 @@ void CellBaker::pack() {
     }
   }
   const auto join = [](auto& terms, const auto& key) {
-    std::ranges::stable_sort(terms, {}, key);
+    std::ranges::sort(terms, {}, key);  // in place: nothing is allocated
     std::size_t kept = 0;
     for (std::size_t i = 0; i < terms.size(); ++i) {
       if (kept > 0 && key(terms[kept - 1]) == key(terms[i])) {
