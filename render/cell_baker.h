@@ -167,7 +167,7 @@ class CellBaker final : public RaySink {
   std::array<Light, cell_pixels> light_;  // at what the centres met
   std::array<Met, ring_pixels> met_;
   std::array<Edge, cell_pixels> edge_;
-  std::array<Vec3f, cell_pixels> shown_sum_, squares_;  // of what further samples show
+  std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_;  // of further samples
   std::array<std::uint16_t, cell_pixels> counts_;
   int samples_each_ = 1;  // of the pixels that take further ones now
   std::array<std::array<std::uint16_t, 9>, cell_pixels> borrowed_;  // by neighbour, row by row

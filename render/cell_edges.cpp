@@ -11,8 +11,9 @@
 namespace render {
 namespace {
 
-constexpr float display_limit = 4;   // brighter light than this, in display white, looks alike
-constexpr float grey_plate = 0.18F;  // for whatever plate: decisions hold from frame to frame
+constexpr float display_limit = 4;  // brighter light than this, in display white, looks alike
+constexpr float plate_contrast =
+    0.4F;  // by which virtual things are taken to differ from the plate
 constexpr Scene::Surface no_hit{~0U, ~0U};
 
 Vec3f clipped(Vec3f v) {
@@ -190,7 +191,7 @@ void CellBaker::sample_edges() {
   const Effort& effort = frame_->job->effort;
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (edge_[k] == Edge::none) continue;
-    squares_[k] = shown_sum_[k] = {};
+    squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
     borrowed_[k] = {};
   }
   int first = 0;
@@ -248,8 +249,8 @@ CellMask CellBaker::uncertain(int n) const {
 bool CellBaker::is_uncertain(std::size_t k, int n) const {
   if (counts_[k] != n) return false;
   const auto samples_n = static_cast<float>(n);
-  const Vec3f shown = shown_sum_[k];
-  const Vec3f spread = squares_[k] - shown * shown * (1 / samples_n);
+  const Vec3f shown = shown_sum_[k], behind = behind_sum_[k];
+  const Vec3f spread = squares_[k] - (shown * shown + behind * behind) * (1 / samples_n);
   const float tolerance = frame_->job->effort.aa_tolerance;
   return std::max({spread.x, spread.y, spread.z}) >
          tolerance * tolerance * samples_n * std::max(samples_n - 1, 1.0F);
@@ -271,9 +272,12 @@ Vec3f CellBaker::direction_in(int x, int y, const std::array<float, 2>& offset) 
 
 void CellBaker::add_further(std::size_t k, const Sample& sample) {
   ++counts_[k];
-  const Vec3f shown = clipped(sample.added + sample.plate * grey_plate);
+  const Vec3f shown = clipped(sample.added);
+  // Whatever the plate shows: decisions hold from frame to frame.
+  const Vec3f behind = sample.plate * plate_contrast;
   shown_sum_[k] += shown;
-  squares_[k] += shown * shown;
+  behind_sum_[k] += behind;
+  squares_[k] += shown * shown + behind * behind;
 }
 
 }  // namespace render

@@ -133,15 +133,14 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   for (std::size_t i = 0; i < planned_table->lights.size(); ++i) {
     DirectionalLight& light = planned_table->lights[i];
     if (light.planned != Vec3f{}) light.irradiance = light.planned;
-    if (light.compact != 0 && context.planned->compact_apart) {
-      context.compact.push_back(static_cast<std::uint32_t>(i));
-    }
+    if (light.compact != 0) context.compact.push_back(static_cast<std::uint32_t>(i));
   }
   context.planned_table = std::move(planned_table);
   if (context.compact.size() > most_compact_lights) {
     throw std::invalid_argument("a table marks at most " + std::to_string(most_compact_lights) +
                                 " lights as compact");
   }
+  if (!context.planned->compact_apart) context.compact.clear();
   context.pattern = sample_pattern();
   context.inputs = inputs;
   context.job = &job;

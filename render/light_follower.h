@@ -24,9 +24,8 @@ struct LightFollowerSettings {
 // memory that the table has: it lives with the show, not with a kernel.
 class LightFollower {
  public:
-  // The table of the next frame. Its version grows when directions or planned
-  // irradiances change. A black frame gives an
-  // empty table, and directions wait. Throws as make_light_table().
+  // The table of the next frame. Its version grows when directions or planned irradiances change. A
+  // black frame gives an empty table, and directions wait. Throws as make_light_table().
   LightTable follow(const Environment& env, const LightFollowerSettings& settings);
   // Where the lights that the last table marks as compact lie: the brightest of bright sources. To
   // be left out of the environment's smoothed levels, else their light counts twice.
@@ -43,10 +42,9 @@ class LightFollower {
   void mark_compact();
   bool has_moved(const std::vector<RegionLight>& sums, float tolerance_rad) const;
   void take_energies(const std::vector<RegionLight>& sums, const LightFollowerSettings& settings);
-
-  capture::Image map_;
   void plan();
 
+  capture::Image map_;
   LightRegions regions_;
   CompactTexels compact_;
   LightTableSettings made_with_;
