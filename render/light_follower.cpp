@@ -70,7 +70,9 @@ std::vector<RegionLight> LightFollower::make_anew(const Environment& env,
   made_height_ = env.radiance.height;
   lights_.clear();
   std::vector<RegionLight> sums = sum_regions(regions_, map_, env.radiance);
-  for (const RegionLight& sum : sums) lights_.push_back({make_light(sum), sum.irradiance});
+  for (const RegionLight& sum : sums)
+    lights_.push_back(
+        {.light = make_light(sum), .irradiance = sum.irradiance, .newest = sum.luminance});
   averaged_frames_ = 0;
   ++version_;
   mark_compact();
@@ -120,6 +122,21 @@ bool LightFollower::has_moved(const std::vector<RegionLight>& sums, float tolera
   return moved > tolerance_rad * total_luminance(sums);
 }
 
+// An average lags behind light that drifts. Noise misses it to both sides, and makes neighbouring
+// frames differ; a drift misses it to one side. Near 1 where all of a miss is drift, 0 or less
+// where it may be noise.
+double LightFollower::gain_of_drift(Followed& followed, double now) {
+  constexpr double memory = 0.25;  // of misses
+  constexpr double doubt = 1.5;    // of chance: noise alone rarely passes it
+  const double step = now - followed.newest;
+  followed.newest = now;
+  followed.miss += memory * (now - luminance_of(followed.irradiance) - followed.miss);
+  followed.variance += memory / 4 * (step * step / 2 - followed.variance);
+  const double drift = followed.miss * followed.miss;
+  const double noise = followed.variance;
+  return drift > 0 ? (drift - doubt * noise) / (drift + noise) : 0;
+}
+
 void LightFollower::take_energies(const std::vector<RegionLight>& sums,
                                   const LightFollowerSettings& settings) {
   const double least_gain = 1 / std::max(settings.smoothing_frames, 1.0F);
@@ -137,8 +154,12 @@ void LightFollower::take_energies(const std::vector<RegionLight>& sums,
   // A plain mean at first, then an exponential one.
   const double gain = std::max(1.0 / (averaged_frames_ + 1), least_gain);
   for (std::size_t i = 0; i < sums.size(); ++i) {
-    std::array<double, 3>& averaged = lights_[i].irradiance;
-    for (std::size_t c = 0; c < 3; ++c) averaged[c] += gain * (sums[i].irradiance[c] - averaged[c]);
+    Followed& followed = lights_[i];
+    if (changed) followed.miss = followed.variance = 0, followed.newest = sums[i].luminance;
+    const double own_gain = std::max(gain, gain_of_drift(followed, sums[i].luminance));
+    for (std::size_t c = 0; c < 3; ++c) {
+      followed.irradiance[c] += own_gain * (sums[i].irradiance[c] - followed.irradiance[c]);
+    }
   }
   ++averaged_frames_;
 }

@@ -9,7 +9,8 @@ namespace render {
 
 struct LightFollowerSettings {
   LightTableSettings table;
-  // Energies are averaged over about this many frames; 1 = every frame for itself.
+  // Energies are averaged over about this many frames, or over fewer where they drift by more than
+  // their noise; 1 = every frame for itself.
   float smoothing_frames = 12;
   // Directions are made anew when the light has moved this far from them, in the energy-weighted
   // mean.
@@ -32,10 +33,14 @@ class LightFollower {
   const CompactTexels& compact_texels() const { return compact_; }
 
  private:
-  // A light with its averaged energy.
+  // A light with its averaged energy, and what tells a drift of it from noise: the newest energy,
+  // by how much the average has missed of late, and the noise's variance; of its luminance.
   struct Followed {
     DirectionalLight light;
-    std::array<double, 3> irradiance;
+    std::array<double, 3> irradiance{};
+    double newest = 0;
+    double miss = 0;
+    double variance = 0;
   };
 
   std::vector<RegionLight> make_anew(const Environment& env, const LightTableSettings& settings);
@@ -43,6 +48,7 @@ class LightFollower {
   bool has_moved(const std::vector<RegionLight>& sums, float tolerance_rad) const;
   void take_energies(const std::vector<RegionLight>& sums, const LightFollowerSettings& settings);
   void plan();
+  static double gain_of_drift(Followed& followed, double now);
 
   capture::Image map_;
   LightRegions regions_;
