@@ -16,10 +16,10 @@ namespace render {
 
 // All settings of speed against accuracy.
 struct Effort {
-  int aa_samples = 8;  // camera rays in pixels where an edge passes; 1 = no anti-aliasing
+  int aa_samples = 16;  // camera rays in pixels where an edge passes; 1 = no anti-aliasing
   // Standard error, in radiance, that a pixel of further camera rays may have before it takes more
   // of them, up to 256; 0 = aa_samples must do.
-  float aa_tolerance = 0.1F;
+  float aa_tolerance = 0.05F;
   // Radiance by which the virtual light of neighbouring pixels may differ before they are sampled
   // like edges; 0 = it never matters.
   float glint_contrast = 0.1F;

@@ -70,8 +70,8 @@ class LightFeed {
   std::shared_ptr<render::Environment> environment_;
   capture::Pool<render::Environment> environments_;
   std::shared_ptr<const render::Environment> planned_;  // of the table's version
-  render::LightTable table_;  // of environment_, if it is not stale
-  int table_count_ = 0;       // that it was made for; 0 = stale
+  render::LightTable table_;                            // of environment_, if it is not stale
+  int table_count_ = 0;                                 // that it was made for; 0 = stale
 };
 
 }  // namespace studio
