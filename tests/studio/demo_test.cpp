@@ -10,6 +10,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "capture/camera.h"
 #include "capture/exr.h"
@@ -27,7 +28,8 @@ namespace fs = std::filesystem;
 
 DemoSettings tiny(const std::string& name) {
   DemoSettings settings;
-  settings.dir = fs::path(testing::TempDir()) / ("platelight_demo_" + name);
+  settings.dir =
+      fs::path(testing::TempDir()) / ("platelight_demo_" + name + std::to_string(getpid()));
   fs::remove_all(settings.dir);
   settings.studio = {.width = 64,
                      .height = 48,

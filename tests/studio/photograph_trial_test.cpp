@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include "studio/start.h"
 
@@ -70,7 +71,10 @@ class PhotographTrialTest : public testing::Test {
     delete trial_;
     fs::remove_all(dir());
   }
-  static fs::path dir() { return fs::path(testing::TempDir()) / "platelight_photograph_trial"; }
+  static fs::path dir() {
+    return fs::path(testing::TempDir()) /
+           ("platelight_photograph_trial" + std::to_string(getpid()));
+  }
 
   static std::string set_;
   static PhotographTrial* trial_;
@@ -105,14 +109,15 @@ TEST_F(PhotographTrialTest, HasTheRealShadowWhereItsMatteIsTrue) {
 }
 
 TEST(ReadDemoTruth, RefusesWhatNoDemoWrote) {
-  const fs::path file = fs::path(testing::TempDir()) / "platelight_no_truth.json";
+  const fs::path file =
+      fs::path(testing::TempDir()) / ("platelight_no_truth" + std::to_string(getpid()) + ".json");
   for (const char* text : {"", "{}", "[1", R"({"world": "moon"})"}) {
     std::ofstream(file) << text;
     try {
       read_demo_truth(file);
       ADD_FAILURE() << "took " << text;
     } catch (const std::runtime_error& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr("platelight_no_truth.json"));
+      EXPECT_THAT(error.what(), testing::HasSubstr(file.filename().string()));
     }
   }
   fs::remove(file);
