@@ -145,13 +145,18 @@ void CellBaker::push(const ShadePoint& from, const NewRay& ray) {
                         ray.kind == RayKind::difference});
     }
   }
-  const Vec3f light =
-      straight ? Vec3f{} : radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread);
   const Effort& effort = frame_->job->effort;
   // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
   const bool deep = from.depth >= effort.max_depth || queue_.size() == queue_.capacity();
   if (deep) ++statistics_->depth_limit_hits;
-  if (deep || weight * std::max(1.0F, largest(light)) < 1 - effort.accuracy) {
+  const auto too_dim = [&] {
+    const float least = 1 - effort.accuracy;
+    if (straight || weight >= least) return weight < least;
+    return weight *
+               largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread)) <
+           least;
+  };
+  if (deep || too_dim()) {
     if (straight) {
       CellTransport::Base& base = base_[target_of(from)];
       samples_[from.slot].plate += ray.throughput;
@@ -164,7 +169,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& ray) {
     }
     return;
   }
-  queue_.push_back({ray.origin, ray.direction, ray.throughput, light, ray.spread, from.footprint_m,
+  queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.footprint_m,
                     spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
                     static_cast<std::uint8_t>(from.depth + 1)});
 }

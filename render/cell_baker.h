@@ -42,7 +42,6 @@ class CellBaker final : public RaySink {
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;
-    Vec3f planned;  // light of the environment in that direction, as planned
     Spread spread;
     float footprint_m, spread_rad;
     float roughness;

@@ -75,6 +75,16 @@ Measured measure(const BenchScene& shot, const render::FrameJob& job, int runs) 
   return m;
 }
 
+// A frame of a still shot, all of whose transport is kept.
+double measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs) {
+  render::KeptTransport kept;
+  render::FrameInputs inputs = shot.inputs();
+  inputs.kept = &kept;
+  render::FrameResult result;
+  render_frame(inputs, job, shot.half_plate, result);
+  return best_ms(runs, [&] { render_frame(inputs, job, shot.half_plate, result); });
+}
+
 }  // namespace
 
 void bench_kernel(int runs, Console& console) {
@@ -82,11 +92,15 @@ void bench_kernel(int runs, Console& console) {
   render::FrameJob job = shot.job;
   job.lights = make_light_table(shot.environment, {64, render::LightMethod::split});
   const render::FrameJob by_default = job;
-  // The plain ray set: every pixel tests every light that it faces.
+  // The plain ray set: every pixel tests every light that it faces, and nothing adapts.
   job.effort.adaptive_visibility = false;
   job.effort.interleave = 1;
+  job.effort.aa_tolerance = 0;
+  job.effort.glint_contrast = 0;
   const Measured plain = measure(shot, job, runs);
   const Measured adaptive = measure(shot, by_default, runs);
+
+  const double kept_ms = measure_kept(shot, by_default, runs);
 
   const double share = plain.bare_ms / plain.kernel_ms;
   const double frame_share = adaptive.kernel_ms / plain.bare_ms;
@@ -105,8 +119,12 @@ void bench_kernel(int runs, Console& console) {
       fmt::format("default effort {:8} rays  kernel {:7.1f} ms = {:.2f} of bare Embree's time for "
                   "the plain rays",
                   adaptive.rays, adaptive.kernel_ms, frame_share));
+  console.say(fmt::format("the same, kept  no rays        kernel {:7.1f} ms = {:.2f} of it",
+                          kept_ms, kept_ms / plain.bare_ms));
   const Machine machine = this_machine();
   console.figures(nlohmann::ordered_json{
+      {"kept_frame_ms", kept_ms},
+      {"kept_frame_over_bare", kept_ms / plain.bare_ms},
       {"rays_plain", plain.rays},
       {"bare_ms", plain.bare_ms},
       {"kernel_ms", plain.kernel_ms},
