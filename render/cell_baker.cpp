@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numbers>
 
 #include "render/embree_context.h"
 #include "render/standard.h"
@@ -30,12 +31,6 @@ float spread_of(const Spread& spread, const ShadePoint& from) {
 
 float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
 float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
-
-// 1 - lost/open, exactly 1 where nothing is lost.
-float passing(float open, float arriving) {
-  const float lost = open - arriving;
-  return lost > 0 && open > 0 ? std::max(0.0F, 1 - lost / open) : 1.0F;
-}
 
 constexpr std::uint16_t nowhere = 0xFFFF;
 
@@ -325,9 +320,7 @@ void CellBaker::collect(const ShadePoint& p) {
     sample.plate += share;
     return;
   }
-  sample.plate += share * Vec3f{passing(light.open.x, light.arriving.x),
-                                passing(light.open.y, light.arriving.y),
-                                passing(light.open.z, light.arriving.z)};
+  sample.plate += share * passing(light.open, light.open - light.arriving);
 }
 
 void CellBaker::shade_centres() {
@@ -395,9 +388,6 @@ void CellBaker::receive(int count, bool grid) {
     place[i] = static_cast<std::uint16_t>(k);
     point_at[k] = static_cast<std::uint16_t>(i);
     set_receiver(k, p);
-    if (p.light_normal == Vec3f{}) {
-      r.nx[k] = p.hit.normal.x, r.ny[k] = p.hit.normal.y, r.nz[k] = p.hit.normal.z;
-    }
     ++r.count;
     r.active[k / 64] |= std::uint64_t{1} << (k % 64);
   }
@@ -479,11 +469,11 @@ void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
 
 // Light of the set's lamps, which stays as it is. `light_point` tells a stand-in's irradiance.
 void CellBaker::add_lamps(const ShadePoint& p, std::size_t light_point) {
-  if (frame_->job->lights.lamps.empty()) return;
-  const Vec3f normal = p.light_normal == Vec3f{} ? p.hit.normal : p.light_normal;
+  if (frame_->job->lights.lamps.empty() || !receives_light(p)) return;
   const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
-  const Vec3f irradiance = gather_lamps(frame_->light, origin, normal, p.hit.geometric_normal,
-                                        mask_virtual | mask_real_blocker, *statistics_);
+  const Vec3f irradiance =
+      gather_lamps(frame_->light, origin, p.light_normal, p.hit.geometric_normal,
+                   mask_virtual | mask_real_blocker, *statistics_);
   if (irradiance == Vec3f{}) return;
   const Vec3f added = p.throughput * p.diffuse * irradiance;
   base_[target_of(p)].radiance += added;
@@ -492,7 +482,8 @@ void CellBaker::add_lamps(const ShadePoint& p, std::size_t light_point) {
     transport_->lamps.push_back({static_cast<std::uint16_t>(target_of(p)),
                                  static_cast<std::uint32_t>(light_point), p.throughput, irradiance,
                                  p.albedo});
-    samples_[p.slot].added += p.throughput * p.albedo * irradiance * 0.318309886F;
+    samples_[p.slot].added +=
+        p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);
   }
 }
 

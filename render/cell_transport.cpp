@@ -13,14 +13,6 @@ namespace {
 
 float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
 
-// 1 - lost/open, exactly 1 where nothing is lost.
-float passing(float open, float lost) {
-  return lost > 0 && open > 0 ? std::max(0.0F, 1 - lost / open) : 1.0F;
-}
-Vec3f passing(Vec3f open, Vec3f lost) {
-  return {passing(open.x, lost.x), passing(open.y, lost.y), passing(open.z, lost.z)};
-}
-
 // Irradiance at the centres: of all light that is not behind real things, and what of it virtual
 // objects take.
 void add_irradiance(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {

@@ -2,6 +2,7 @@
 // Private to the kernel.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -103,6 +104,14 @@ struct FrameLight {
   std::span<const DirectionalLight> lights;
   std::span<const capture::Image* const> levels;  // of the environment: levels_of()
 };
+
+// The share of light that is not lost: 1 - lost/open, exactly 1 where nothing is.
+inline Vec3f passing(Vec3f open, Vec3f lost) {
+  const auto share = [](float all, float gone) {
+    return gone > 0 && all > 0 ? std::max(0.0F, 1 - gone / all) : 1.0F;
+  };
+  return {share(open.x, lost.x), share(open.y, lost.y), share(open.z, lost.z)};
+}
 
 // What relight() works in.
 struct RelightWorkspace {

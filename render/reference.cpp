@@ -12,6 +12,7 @@
 
 #include "render/environment_sampler.h"
 #include "render/path_tracer.h"
+#include "render/pixel_rays.h"
 #include "render/sample_budget.h"
 #include "render/sample_sequence.h"
 #include "render/stand_in_parameters.h"
@@ -43,42 +44,6 @@ class Sum {
 
  private:
   double x_ = 0, y_ = 0, z_ = 0;
-};
-
-class PixelRays {
- public:
-  PixelRays(const DirectionTable& directions, const Pose& cam_from_set)
-      : directions_(directions),
-        set_from_cam_(cam_from_set.R.transposed()),
-        origin_(to_float(calibrate::position_of(cam_from_set))) {}
-
-  Vec3f origin() const { return origin_; }
-
-  // Direction in the set through (x + dx, y + dy), -.5 <= dx, dy <= .5; nothing where the lens does
-  // not see.
-  std::optional<Vec3f> direction(int x, int y, float dx, float dy) const {
-    const int x0 = dx < 0 ? x - 1 : x;
-    const int y0 = dy < 0 ? y - 1 : y;
-    const float fx = dx < 0 ? dx + 1 : dx;
-    const float fy = dy < 0 ? dy + 1 : dy;
-    const Vec3f here = at(x, y);
-    if (here == Vec3f{}) return std::nullopt;
-    const Vec3f a = at(x0, y0), b = at(x0 + 1, y0), c = at(x0, y0 + 1), d = at(x0 + 1, y0 + 1);
-    const bool whole = a != Vec3f{} && b != Vec3f{} && c != Vec3f{} && d != Vec3f{};
-    const Vec3f v_cam =
-        whole ? (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy : here;
-    return normalize(to_float(set_from_cam_ * to_double(v_cam)));
-  }
-
- private:
-  Vec3f at(int x, int y) const {
-    const std::size_t i = directions_.index(y, x);
-    return {directions_.x[i], directions_.y[i], directions_.z[i]};
-  }
-
-  const DirectionTable& directions_;
-  Mat3 set_from_cam_;
-  Vec3f origin_;
 };
 
 // What the samples of a pixel say about one stand-in.
