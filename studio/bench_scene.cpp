@@ -1,6 +1,7 @@
 // The scene of charts and benchmarks.
 #include "studio/bench_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -8,14 +9,26 @@
 
 #include "compositing/stand_in.h"
 #include "render/made_car.h"
+#include "render/standard.h"
 
 namespace studio {
 namespace {
 
 using render::Vec3f;
 
-render::SceneDescription describe() {
+constexpr float matte_albedo = 0.5F;
+
+render::Material make_matte() {
+  render::StandardParameters parameters;
+  std::fill_n(parameters.base_color, 3, matte_albedo);
+  parameters.roughness = 1;
+  parameters.specular = 0;
+  return render::make_standard_material("matte", parameters);
+}
+
+render::SceneDescription describe(BenchFinish finish) {
   render::SceneDescription scene = render::made_car();
+  if (finish == BenchFinish::matte) std::ranges::fill(scene.materials, make_matte());
   scene.background = "plate";
   const auto floor_material = static_cast<std::uint32_t>(scene.materials.size());
   scene.materials.push_back(compositing::make_stand_in_material("floor", {}));
@@ -84,33 +97,52 @@ void replace_sun(capture::Image& sun, Vec3f direction, float radius_rad) {
   }
 }
 
+float upward_luminance(const render::Environment& environment) {
+  const Vec3f e = render::irradiance_of(environment, {0, 0, 1});
+  return render::luminance(e.x, e.y, e.z);
+}
+
 }  // namespace
 
 render::Environment make_bench_sky(const BenchSky& wanted) {
-  render::MadeSkySettings settings;
-  settings.height = 256;
-  settings.sun_azimuth_rad = -0.9F;
-  settings.sun_elevation_rad = 0.75F;
-  render::MadeSky sky = render::make_sky(settings);
+  static const render::MadeSky made =
+      render::make_sky({.height = 256, .sun_azimuth_rad = -0.9F, .sun_elevation_rad = 0.75F});
+  render::MadeSky sky = made;
   if (wanted.sun_radius_rad > 0) replace_sun(sky.sun, sky.sun_direction, wanted.sun_radius_rad);
   render::Environment environment;
   environment.radiance = sky.rest;
+  std::vector<float>& pixels = environment.radiance.pixels;
+  const auto add_sun = [&](float strength) {
+    for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] += strength * sky.sun.pixels[i];
+  };
+  add_sun(1);
+  const float clear_day = upward_luminance(environment);
+  add_sun(wanted.sun_to_sky - 1);
+  const float exposure = clear_day / upward_luminance(environment);
   std::mt19937 random(wanted.noise_seed);
   std::normal_distribution<float> normal(1, wanted.noise);
-  for (std::size_t i = 0; i < environment.radiance.pixels.size(); ++i) {
-    float& value = environment.radiance.pixels[i];
-    value += wanted.sun_to_sky * sky.sun.pixels[i];
+  for (float& value : pixels) {
+    value *= exposure;
     if (wanted.noise > 0) value *= std::max(0.0F, normal(random));
   }
   render::smooth_for_reflections(environment);
   return environment;
 }
 
-BenchScene make_bench_scene(int width, int height) {
+BenchLight follow_bench_sky(render::LightFollower& follower,
+                            const render::Environment& sky,
+                            const render::LightTableSettings& settings) {
+  BenchLight light{follower.follow(sky, {.table = settings}), {}};
+  light.environment.radiance = sky.radiance;
+  render::smooth_for_reflections(light.environment, follower.compact_texels());
+  return light;
+}
+
+BenchScene make_bench_scene(int width, int height, BenchFinish finish) {
   if (width < 16 || height < 16) throw std::invalid_argument("a bench picture needs 16x16 pixels");
   compositing::register_shaders();
   BenchScene shot;
-  shot.scene = std::make_unique<render::Scene>(describe());
+  shot.scene = std::make_unique<render::Scene>(describe(finish));
   const double focal_px = width * 1.32;
   shot.directions = calibrate::make_direction_table(
       {"pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}});

@@ -6,6 +6,7 @@
 #include "calibrate/lens.h"
 #include "capture/image.h"
 #include "render/kept_transport.h"
+#include "render/light_follower.h"
 #include "render/made_sky.h"
 #include "render/reference.h"
 #include "render/renderer.h"
@@ -25,7 +26,17 @@ struct BenchScene {
   render::FrameInputs inputs() const { return {scene.get(), &directions, &environment}; }
 };
 
-// The sun's share and size may be changed, to see where methods fail.
+// Surfaces of the car.
+enum class BenchFinish {
+  real,   // paint, glass, rubber, chrome
+  matte,  // all of it one dull grey: shows nothing but how the light table lights it
+};
+
+// Throws std::invalid_argument if a side is below 16.
+BenchScene make_bench_scene(int width, int height, BenchFinish finish = BenchFinish::real);
+
+// The sun's share and size may be changed, to see where methods fail. Radiance is then scaled to
+// what it was on a surface that faces up, as a camera's exposure would.
 struct BenchSky {
   float sun_radius_rad = 0;  // 0 = the made sky's own sun, about half a degree
   float sun_to_sky = 1;      // times the sun of a clear day
@@ -35,7 +46,14 @@ struct BenchSky {
 
 render::Environment make_bench_sky(const BenchSky& sky);
 
-// Throws std::invalid_argument if a side is below 16.
-BenchScene make_bench_scene(int width, int height);
+// Light as a show has it (LightFeed): followed, and compact sources apart from what is smoothed.
+struct BenchLight {
+  render::LightTable table;
+  render::Environment environment;
+};
+
+BenchLight follow_bench_sky(render::LightFollower& follower,
+                            const render::Environment& sky,
+                            const render::LightTableSettings& settings);
 
 }  // namespace studio

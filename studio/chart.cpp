@@ -118,7 +118,9 @@ std::string chart_json(const Chart& chart) {
            {"reported_error", sample.reported_error ? Json(*sample.reported_error) : Json(nullptr)},
            {"status", sample.status}});
     }
-    stressors.push_back({{"stressor", s.stressor}, {"unit", s.unit}, {"samples", samples}});
+    Json stressor{{"stressor", s.stressor}, {"unit", s.unit}, {"samples", samples}};
+    if (s.floor > 0) stressor["floor"] = s.floor;
+    stressors.push_back(std::move(stressor));
   }
   const Machine machine = this_machine();
   Json json{{"stage", chart.stage},

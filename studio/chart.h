@@ -13,15 +13,17 @@ using ChartValue = std::variant<bool, double, std::string>;
 
 // One measured setting of one method.
 struct ChartPoint {
-  std::string method;  // "split", "median cut": one colour and one legend line each
-  bool peer = false;   // another tool's
+  std::string method;   // "split", "median cut": one colour and one legend line each
+  std::string variant;  // of the method: "adaptive grid": one mark each; "" = there are none
+  bool peer = false;    // another tool's
   std::vector<std::pair<std::string, ChartValue>> settings;  // in the order to show
   double time_ms = 0;                                        // > 0
   double error = 0;  // as the chart's `error_name` says; >= 0
   double error_p99 = 0;
   std::vector<std::pair<std::string, double>> figures;  // what else was measured: flicker, memory
-  std::string label;      // a few characters beside the mark: "N 64"; "" = none
-  bool on_front = false;  // mark_front() sets it
+  std::string label;        // a few characters beside the mark: "N 64"; "" = none
+  bool by_default = false;  // what the program does if it is told nothing else
+  bool on_front = false;    // mark_front() sets it
 };
 
 struct StressorSample {
@@ -37,6 +39,16 @@ struct Stressor {
   std::string unit;      // "degrees"; "" = none
   bool logarithmic = true;
   std::vector<StressorSample> samples;  // by rising value
+  // Error that is left whatever the samples do, with its name; 0 = none is known.
+  double floor = 0;
+  std::string floor_name{};
+};
+
+// Other figures of the points against their time, each with a word on it. "error_p99", or a name
+// among ChartPoint::figures; points without it are left out.
+struct FigurePanel {
+  std::string name;  // of the axis
+  std::vector<std::pair<std::string, std::string>> figures;
 };
 
 // What an error is made of: it falls from step to step as one thing after the other is made true.
@@ -56,7 +68,9 @@ struct Chart {
   std::string subtitle;                          // scene, size, threads
   std::string time_name = "time per frame, ms";  // of the axes
   std::string error_name = "relative RMS error";
+  std::string variant_name;  // what variants differ in
   std::vector<ChartPoint> points;
+  std::vector<FigurePanel> panels;
   std::vector<Stressor> stressors;
   std::vector<ErrorSteps> steps;
 };
@@ -68,8 +82,8 @@ void mark_front(Chart& chart);
 std::string chart_json(const Chart& chart);
 // One row a point: method, peer, every setting and figure that any point has, time, errors, front.
 std::string chart_csv(const Chart& chart);
-// The picture: error against time on logarithmic axes, then one panel for each split into steps and
-// each stressor. The same chart always gives the same text.
+// The picture: error against time on logarithmic axes, then a smaller one for each figure, split
+// into steps and stressor. The same chart always gives the same text.
 std::string chart_svg(const Chart& chart);
 
 // Writes STAGE.json, .csv, .svg and .png into a directory, which is made if need be. Throws

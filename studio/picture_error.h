@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <functional>
 
 #include "render/reference.h"
 #include "studio/show.h"
@@ -13,6 +15,10 @@ struct Truth {
   std::array<capture::Image, 2> references;  // (height, width, 4)
   capture::Image mask;                       // (height, width, 1)
 };
+
+// Two references, rendered with the seeds 1 and 2, of a picture over `plate` (height, width, 3).
+Truth truth_of(const capture::Image& plate,
+               const std::function<capture::Image(std::uint32_t seed)>& reference);
 
 // Renders the reference of a frame twice, with half of `samples` (at least 2) paths per pixel each.
 // Takes minutes at high samples.

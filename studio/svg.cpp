@@ -100,41 +100,33 @@ void Svg::text(double x, double y, std::string_view text, const TextStyle& style
       style.bold ? " font-weight=\"bold\"" : "", turned, escaped(text));
 }
 
-void Svg::mark(double x, double y, Mark mark, double r, std::string_view colour) {
-  const auto shape = [&](std::string_view path, bool filled) {
-    body_ += fmt::format("<path d=\"{}\" fill=\"{}\" stroke=\"{}\" stroke-width=\"{}\"/>\n", path,
-                         filled ? colour : "none", filled ? "#ffffff" : colour, filled ? 0.8 : 2.0);
+void Svg::mark(double x, double y, Mark mark, double r, std::string_view colour, bool filled) {
+  const bool solid = filled && mark != Mark::cross;
+  const std::string paint =
+      fmt::format("fill=\"{}\" stroke=\"{}\" stroke-width=\"{}\"", solid ? colour : "none",
+                  solid ? "#ffffff" : colour, solid ? 0.8 : 1.8);
+  const auto shape = [&](std::string_view path) {
+    body_ += fmt::format("<path d=\"{}\" {}/>\n", path, paint);
   };
   switch (mark) {
     case Mark::disc:
-      body_ += fmt::format(
-          "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" fill=\"{}\" stroke=\"#ffffff\" "
-          "stroke-width=\"0.8\"/>\n",
-          x, y, r, colour);
-      break;
-    case Mark::ring:
-      body_ += fmt::format(
-          "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" fill=\"none\" stroke=\"{}\" "
-          "stroke-width=\"1.6\"/>\n",
-          x, y, r, colour);
+      body_ +=
+          fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"{:.2f}\" {}/>\n", x, y, r, paint);
       break;
     case Mark::square:
-      shape(fmt::format("M{0:.2f} {1:.2f}h{2:.2f}v{2:.2f}h-{2:.2f}z", x - r, y - r, 2 * r), false);
+      shape(fmt::format("M{0:.2f} {1:.2f}h{2:.2f}v{2:.2f}h-{2:.2f}z", x - r, y - r, 2 * r));
       break;
     case Mark::diamond:
       shape(fmt::format("M{0:.2f} {1:.2f}l{2:.2f} {2:.2f}l-{2:.2f} {2:.2f}l-{2:.2f} -{2:.2f}z", x,
-                        y - 1.3 * r, 1.3 * r),
-            false);
+                        y - 1.3 * r, 1.3 * r));
       break;
     case Mark::triangle:
       shape(fmt::format("M{0:.2f} {1:.2f}l{2:.2f} {3:.2f}h-{4:.2f}z", x, y - 1.2 * r, 1.15 * r,
-                        2 * r, 2.3 * r),
-            false);
+                        2 * r, 2.3 * r));
       break;
     case Mark::cross:
       shape(fmt::format("M{0:.2f} {1:.2f}l{2:.2f} {2:.2f}m0 -{2:.2f}l-{2:.2f} {2:.2f}", x - r,
-                        y - r, 2 * r),
-            false);
+                        y - r, 2 * r));
       break;
   }
 }

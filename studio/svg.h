@@ -18,7 +18,7 @@ struct TextStyle {
   bool upwards = false;  // turned a quarter to the left
 };
 
-enum class Mark { disc, ring, square, diamond, triangle, cross };
+enum class Mark { disc, square, diamond, triangle, cross };
 
 // Collects shapes; coordinates are pixels, x to the right, y down.
 class Svg {
@@ -34,7 +34,9 @@ class Svg {
   void rectangle(double x, double y, double width, double height, std::string_view fill);
   void frame(double x, double y, double width, double height, std::string_view colour);
   void text(double x, double y, std::string_view text, const TextStyle& style = {});
-  void mark(double x, double y, Mark mark, double radius, std::string_view colour);
+  // Filled, or its outline; a cross is all outline.
+  void mark(
+      double x, double y, Mark mark, double radius, std::string_view colour, bool filled = true);
 
   std::string finish() const;
 
