@@ -290,11 +290,26 @@ class VisibilityFinder {
           const std::uint64_t bits = block4 << bx;
           if ((lit & w_.same4[wi] & bits) != bits) continue;
           test(first, i, word, offset4(light) + bx);
+          if (looks_outwards(light)) test_border(first, i, word, bx);
           rest &= ~bits;
         }
       }
       test_pixels(first, i, word, rest);
     }
+  }
+
+  // Bright light has sharp shadows, and one that comes in from the next cell by less than a block
+  // is seen by none of this cell's blocks, unless they look at the cell's border too.
+  bool looks_outwards(std::uint32_t light) const {
+    return block_ < 4 && context_.table->lights[light].compact != 0;
+  }
+
+  // Tests a pixel where a block touches the border of the cell.
+  void test_border(std::uint32_t first, std::size_t i, int word, int bx) {
+    constexpr int last = cell_size - 4;  // block's column
+    const int x = bx == 0 ? 0 : bx == last ? cell_size - 1 : bx + 1;
+    const int y = word == 0 ? 0 : word == 3 ? 3 : 1;
+    if (bx == 0 || bx == last || word == 0 || word == 3) test(first, i, word, bit_of(x, y));
   }
 
   // Tests pixels one by one, or one of each smooth 2x2 block.
@@ -316,20 +331,21 @@ class VisibilityFinder {
     for (; pixels != 0; pixels &= pixels - 1) test(first, i, word, std::countr_zero(pixels));
   }
 
-  // Where a block's pixel disagrees with those of the blocks around it, looks closer.
+  // Where a block's pixels disagree with each other or with those of the blocks around it, looks
+  // closer.
   void refine(std::uint32_t first, std::size_t i) {
-    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
     if (!coarse_) return;
     // 4 x 4 flags of blocks: bit by * 4 + bx.
-    unsigned whole = 0, sees = 0, tinted = 0;
+    unsigned whole = 0, sees = 0, hidden = 0, tinted = 0;
     for (int by = 0; by < 4; ++by) {
       const auto wi = static_cast<std::size_t>(by);
       for (int bx = 0; bx < 4; ++bx) {
         const std::uint64_t bits = block4 << (4 * bx);
         if ((w_.lit[i][wi] & w_.same4[wi] & bits) != bits) continue;
         whole |= 1U << (by * 4 + bx);
-        const std::uint64_t tested = bit(offset4(light) + 4 * bx);
+        const std::uint64_t tested = w_.tested[i][wi] & bits;
         if (w_.seen[i][wi] & tested) sees |= 1U << (by * 4 + bx);
+        if (~w_.seen[i][wi] & tested) hidden |= 1U << (by * 4 + bx);
         if (tinted_[i][wi] & tested) tinted |= 1U << (by * 4 + bx);
       }
     }
@@ -337,7 +353,6 @@ class VisibilityFinder {
       const unsigned rows = f | (f << 4) | (f >> 4);
       return (rows | ((rows & 0x7777U) << 1) | ((rows & 0xEEEEU) >> 1)) & 0xFFFFU;
     };
-    const unsigned hidden = whole & ~sees;
     const unsigned differ = (grown(hidden) & sees) | (grown(sees) & hidden) | grown(tinted);
     for (int by = 0; by < 4; ++by) {
       const auto wi = static_cast<std::size_t>(by);

@@ -1,0 +1,53 @@
+// Where the shadows of sharp light lie, whatever the kernel's cells.
+#include <gtest/gtest.h>
+
+#include "made_shot.h"
+
+namespace compositing {
+namespace {
+
+using capture::float_from_half;
+
+// A floor seen from straight above, 100 pixels a metre, half of it in the shadow of a wide roof
+// under a sun straight above: the shadow's edge is the picture's row `row`, less `slope` a column.
+MadeShot half_shaded(float row, float slope) {
+  render::SceneDescription scene = made_scene(false);
+  auto roof = std::make_shared<render::Mesh>();
+  // Behind the camera, as wide as all the picture and more: y is up in it.
+  const auto y_at = [&](float column) { return (31.5F - row + slope * column) / 100; };
+  roof->positions = {{-2, -5, 20}, {2, -5, 20}, {2, y_at(231.5F), 20}, {-2, y_at(-168.5F), 20}};
+  roof->triangles = {{0, 1, 2}, {0, 2, 3}};
+  roof->materials = {1};
+  scene.meshes.push_back(std::move(roof));
+  scene.instances.emplace_back().mesh = 1;
+  MadeShot shot = made_shot(64, 64, std::move(scene));
+  shot.directions = calibrate::make_direction_table({"pinhole", 64, 64, {1000, 1000, 31.5, 31.5}});
+  shot.job.cam_from_set = calibrate::look_at({0, 0, 10}, {0, 0, 0}, 0);
+  shot.job.lights.lights = {{{0, 0, 1}, {3, 3, 3}, 0.01F, 1}};
+  return shot;
+}
+
+TEST(RenderFrame, CastsTheSunsShadowAcrossTheBordersOfCells) {
+  // The edge enters a cell by less than a block of pixels; so flat that no block beside it tells.
+  for (const float row : {14.5F, 15.5F, 16.5F, 17.5F, 30.5F, 33.5F}) {
+    for (const float slope : {0.0F, 0.05F}) {
+      MadeShot shot = half_shaded(row, slope);
+      render::FrameResult adaptive, all;
+      shot.job.effort.adaptive_visibility = true;
+      render_frame(shot.inputs(), shot.job, shot.plate, adaptive);
+      shot.job.effort.adaptive_visibility = false;
+      render_frame(shot.inputs(), shot.job, shot.plate, all);
+      std::size_t dark = 0, wrong = 0;
+      for (std::size_t i = 0; i < all.matte.pixels.size(); ++i) {
+        dark += float_from_half(all.matte.pixels[i]) > 0.5F;
+        wrong += all.matte.pixels[i] != adaptive.matte.pixels[i];
+      }
+      EXPECT_NEAR(static_cast<double>(dark), 64 * (64 - row - 0.5 + 31.5 * slope), 64);
+      // What is left may touch a border between the pixels tested there: a tip of a wedge.
+      EXPECT_LE(wrong, slope > 0 ? 6U : 0U) << "row " << row << ", slope " << slope;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace compositing
