@@ -23,16 +23,8 @@ bool receives_light(const ShadePoint& p) {
   return p.diffuse != Vec3f{} || p.catches_shadow || p.catches_lamps;
 }
 
-// The mean width of a cone. What goes straight on keeps it.
-float spread_of(const Spread& spread, const ShadePoint& from) {
-  const float area = length(spread.a) * length(spread.b);
-  return area > 0 ? std::min(std::sqrt(area), 1.0F) : from.spread_rad;
-}
-
 float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
 float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
-
-constexpr std::uint16_t nowhere = 0xFFFF;
 
 }  // namespace
 
@@ -110,63 +102,6 @@ void CellBaker::pack() {
   join(t.shared, [](const CellTransport::SharedTerm& s) {
     return (s.slot * 65536U + s.centre) * 2U + s.shadow;
   });
-}
-
-void CellBaker::add_environment(std::size_t slot,
-                                std::size_t target,
-                                Vec3f direction,
-                                float roughness,
-                                const Spread& spread,
-                                Vec3f weight) {
-  std::array<MapSample, most_map_samples> places;
-  const std::size_t count =
-      find_map_samples(*frame_->planned, direction, roughness, spread, places);
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto& [x, y, share, level] = places[i];
-    transport_->environment.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
-                                       static_cast<std::uint16_t>(level)});
-    samples_[slot].added += weight * radiance_at(*frame_->planned_levels[level], x, y) * share;
-  }
-}
-
-void CellBaker::push(const ShadePoint& from, const NewRay& ray) {
-  const float weight = largest(ray.throughput);
-  if (!(weight > 0)) return;
-  const bool straight = ray.kind == RayKind::camera;
-  if (!straight && ray.normal != Vec3f{}) {
-    const float share = share_without_compact(*frame_->planned, ray.roughness, ray.spread);
-    if (share > 0) {
-      lobes_.push_back({&from, ray.throughput, ray.normal, ray.spread, ray.roughness, share,
-                        ray.kind == RayKind::difference});
-    }
-  }
-  const Effort& effort = frame_->job->effort;
-  // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
-  const bool deep = from.depth >= effort.max_depth || queue_.size() == queue_.capacity();
-  if (deep) ++statistics_->depth_limit_hits;
-  const auto too_dim = [&] {
-    const float least = 1 - effort.accuracy;
-    if (straight || weight >= least) return weight < least;
-    return weight *
-               largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread)) <
-           least;
-  };
-  if (deep || too_dim()) {
-    if (straight) {
-      CellTransport::Base& base = base_[target_of(from)];
-      samples_[from.slot].plate += ray.throughput;
-      base.plate += ray.throughput;
-      base.passed += mean(ray.throughput);
-      base.seen += mean(ray.throughput);
-    } else if (ray.kind == RayKind::reflection) {
-      add_environment(from.slot, target_of(from), ray.direction, ray.roughness, ray.spread,
-                      ray.throughput);
-    }
-    return;
-  }
-  queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.footprint_m,
-                    spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1)});
 }
 
 void CellBaker::trace(int count, bool coherent, RayKind kind) {
@@ -271,6 +206,7 @@ void CellBaker::shade_points(int count, bool grid) {
   if (count == 0) return;
   const ShadeContext context{&frame_->inputs.scene->description()};
   lobes_.clear();
+  pushing_ = nullptr;
   for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
     for (ShadePoint* p : group_points) clear_answer(*p);
     shader.shade(context, group_points, *this);
@@ -310,7 +246,8 @@ void CellBaker::collect(const ShadePoint& p) {
   base.radiance += own;
   sample.added += own + p.throughput * p.diffuse * light.arriving;
   if (p.environment_share != Vec3f{}) {
-    add_environment(p.slot, target_of(p), p.incoming, 0, {}, p.throughput * p.environment_share);
+    add_environment(p.slot, target_of(p), p.incoming, 0, {}, false,
+                    p.throughput * p.environment_share);
   }
   if (p.kind != RayKind::camera) return;
   const Vec3f share = p.throughput * p.plate_share;
@@ -487,46 +424,6 @@ void CellBaker::add_lamps(const ShadePoint& p, std::size_t light_point) {
   }
 }
 
-// What lobes mirror of compact lights that their points see; of a real surface's, less those that
-// virtual objects hide, for the plate shows them.
-void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid) {
-  if (lobes_.empty()) return;
-  const CellVisibility& cell = transport_->visibility;
-  for (const Lobe& lobe : lobes_) {
-    const auto i = static_cast<std::size_t>(lobe.point - points_.data());
-    const bool shared = receiver_of_point[i] == nowhere;
-    if (!grid && !shared) continue;
-    const std::size_t k = shared ? static_cast<std::size_t>(lender_[i]) : receiver_of_point[i];
-    for (const std::uint32_t light : frame_->compact) {
-      const auto in = [&](const CellMask& mask) { return (mask[k / 64] >> (k % 64) & 1) != 0; };
-      if (!in(cell.lit[light])) continue;
-      add_compact(lobe, light, in(cell.seen[light]) ? Vec3f{1, 1, 1} : Vec3f{});
-    }
-  }
-  if (grid) return;
-  for (const PointLight& l : tested_) {
-    if (frame_->job->lights.lights[l.light].compact == 0) continue;
-    for (const Lobe& lobe : lobes_) {
-      const auto i = static_cast<std::size_t>(lobe.point - points_.data());
-      if (receiver_of_point[i] == l.point) add_compact(lobe, l.light, l.passed);
-    }
-  }
-}
-
-void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
-  const Vec3f share = lobe.difference ? passed - Vec3f{1, 1, 1} : passed;
-  if (share == Vec3f{}) return;
-  const DirectionalLight& l = frame_->job->lights.lights[light];
-  const ShadePoint& p = *lobe.point;
-  const float density =
-      compact_lobe(lobe.normal, -p.incoming, lobe.roughness, lobe.spread, l) * lobe.share;
-  if (!(density > 0)) return;
-  const Vec3f weight = lobe.throughput * share * density;
-  transport_->lights.push_back(
-      {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
-  samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;
-}
-
 void CellBaker::bounce() {
   while (!queue_.empty()) {
     const std::size_t n = std::min<std::size_t>(queue_.size(), stream_rays);
@@ -548,12 +445,14 @@ void CellBaker::bounce() {
       const std::size_t target = q.slot < cell_pixels ? q.pixel : cell_pixels + q.pixel;
       if (!hit && q.kind != RayKind::camera) {
         if (q.kind == RayKind::reflection) {
-          add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.throughput);
+          add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
+                          q.throughput);
         }
         continue;
       }
       if (hit && q.kind == RayKind::difference) {
-        add_environment(q.slot, target, q.direction, q.roughness, q.spread, -q.throughput);
+        add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
+                        -q.throughput);
       }
       ShadePoint& p =
           hit ? points_[static_cast<std::size_t>(count++)] : points_[stream_rays - ++leaving];

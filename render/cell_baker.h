@@ -9,6 +9,7 @@
 
 #include "render/cell_transport.h"
 #include "render/kernel.h"
+#include "render/sample_sequence.h"
 
 namespace render {
 
@@ -39,6 +40,7 @@ class CellBaker final : public RaySink {
  private:
   static constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
   static constexpr int ring_pixels = ring_size * ring_size;
+  static constexpr std::uint16_t nowhere = 0xFFFF;  // no receiver
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;
@@ -48,6 +50,7 @@ class CellBaker final : public RaySink {
     std::uint32_t pixel, slot;
     RayKind kind;
     std::uint8_t depth;
+    bool one_of_many;  // of rays all over a rough lobe: its compact light is found apart
   };
 
   // A lobe, whose compact light waits until it is known who sees which.
@@ -56,6 +59,7 @@ class CellBaker final : public RaySink {
     Vec3f throughput, normal;
     Spread spread;
     float roughness, share;
+    std::uint32_t number;  // of the lobe on its path, for random numbers
     bool difference;
   };
 
@@ -83,6 +87,7 @@ class CellBaker final : public RaySink {
     none,
     surface,  // another surface begins: those that meet what a neighbour met share its radiance
     glint,    // mirrored light changes quickly: they share only the light that arrives
+    shadow,   // the light that arrives does: they share nothing
   };
 
   struct Further {
@@ -122,17 +127,24 @@ class CellBaker final : public RaySink {
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_shared(const ShadePoint& p, std::size_t centre);
   void add_lamps(const ShadePoint& p, std::size_t light_point);
+  void collect(const ShadePoint& p);
+  void bounce();
+  void pack();
+
+  // cell_lobes.cpp
+  std::uint32_t sample_of(const ShadePoint& p) const;
+  SampleSequence numbers_of(const ShadePoint& p, std::uint32_t number, std::uint32_t sample) const;
+  bool turn_within_lobe(const ShadePoint& from, std::uint32_t number, NewRay& ray) const;
   void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
   void add_compact(const Lobe& lobe, std::size_t light, Vec3f passed);
+  float compact_density(const Lobe& lobe, std::size_t light) const;
   void add_environment(std::size_t slot,
                        std::size_t target,
                        Vec3f direction,
                        float roughness,
                        const Spread& spread,
+                       bool one_of_many,
                        Vec3f weight);
-  void collect(const ShadePoint& p);
-  void bounce();
-  void pack();
 
   // cell_edges.cpp
   Met met_at(int i) const;
@@ -140,6 +152,7 @@ class CellBaker final : public RaySink {
   void trace_ring();
   void find_edges();
   void find_glints();
+  bool lit_unlike(std::size_t a, std::size_t b) const;
   void sample_edges();
   void finish_further(int count);
   int neighbour_of(int i, const Further& f) const;
@@ -159,7 +172,9 @@ class CellBaker final : public RaySink {
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<PointLight> tested_;
   std::vector<Lobe> lobes_;
-  std::vector<QueuedRay> queue_;  // capacity reserved
+  std::vector<QueuedRay> queue_;         // capacity reserved
+  const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
+  std::uint32_t pushed_ = 0;
 
   std::array<Sample, slots> samples_;  // centres, then further ones shaded on their own
   std::array<CellTransport::Base, slots> base_;
@@ -168,6 +183,7 @@ class CellBaker final : public RaySink {
   std::array<Edge, cell_pixels> edge_;
   std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_;  // of further samples
   std::array<std::uint16_t, cell_pixels> counts_;
+  std::array<std::uint16_t, cell_pixels> index_of_slot_;  // of further samples, in the pattern
   int samples_each_ = 1;  // of the pixels that take further ones now
   std::array<std::array<std::uint16_t, 9>, cell_pixels> borrowed_;  // by neighbour, row by row
   std::array<Further, stream_rays> further_;

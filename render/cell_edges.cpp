@@ -16,6 +16,8 @@ constexpr float plate_contrast =
     0.4F;  // by which virtual things are taken to differ from the plate
 constexpr Scene::Surface no_hit{~0U, ~0U};
 
+float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
   return {std::min(v.x, display_limit), std::min(v.y, display_limit), std::min(v.z, display_limit)};
 }
@@ -100,16 +102,19 @@ void CellBaker::find_edges() {
   }
 }
 
-// Marks pixels whose own light differs from a neighbour's by more than the effort allows.
+// Marks pixels whose virtual light, or the shadow that they catch, differs from a neighbour's by
+// more than the effort allows.
 void CellBaker::find_glints() {
   const float least = frame_->job->effort.glint_contrast;
   if (!(least > 0)) return;
-  const auto shown = [&](std::size_t k) { return clipped(samples_[k].added); };
   const auto compare = [&](std::size_t a, std::size_t b) {
     if (!is_inside(a) || !is_inside(b)) return;
-    const Vec3f d = shown(a) - shown(b);
-    if (std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) > least)
-      edge_[a] = edge_[b] = Edge::glint;
+    if (largest(abs(clipped(samples_[a].added) - clipped(samples_[b].added))) > least) {
+      for (const std::size_t k : {a, b}) {
+        if (edge_[k] != Edge::shadow) edge_[k] = Edge::glint;
+      }
+    }
+    if (lit_unlike(a, b)) edge_[a] = edge_[b] = Edge::shadow;
   };
   for (std::size_t y = 0; y < cell_size; ++y) {
     for (std::size_t x = 0; x < cell_size; ++x) {
@@ -118,6 +123,26 @@ void CellBaker::find_glints() {
       if (y + 1 < cell_size) compare(k, k + cell_size);
     }
   }
+}
+
+// Whether the light that arrives at two neighbours of one surface shows by more than the effort
+// allows that a shadow ends between them.
+bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
+  const auto met = [&](std::size_t k) -> const Met& {
+    return met_[(k / cell_size + 1) * ring_size + k % cell_size + 1];
+  };
+  const CellMask& receiving = transport_->receiving;
+  const auto receives = [&](std::size_t k) { return (receiving[k / 64] >> (k % 64) & 1) != 0; };
+  if (!receives(a) || !receives(b) ||
+      !continuous(met(a), met(b), frame_->pixel_angle, frame_->camera))
+    return false;
+  const auto shown = [&](std::size_t k) {
+    const Light& light = light_[k];
+    return transport_->diffuse[k] * light.arriving +
+           transport_->shadow[k] * passing(light.open, light.open - light.arriving) *
+               plate_contrast;
+  };
+  return largest(abs(clipped(shown(a)) - clipped(shown(b)))) > frame_->job->effort.glint_contrast;
 }
 
 // The nearest pixel whose centre shows the same surface as a further_ ray met_, or -1.
@@ -165,6 +190,7 @@ void CellBaker::finish_further(int count) {
     }
     const std::size_t slot = cell_pixels + used;
     samples_[slot] = {};
+    index_of_slot_[used] = f.index;
     pixel_of[used++] = f.pixel;
     const bool hit = stream_.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID;
     ShadePoint& p =
@@ -172,7 +198,7 @@ void CellBaker::finish_further(int count) {
     set_point(p, i, f.pixel, static_cast<std::uint32_t>(slot));
     p.spread_rad *= finer;
     p.footprint_m *= finer;
-    if (hit && neighbour >= 0)
+    if (hit && neighbour >= 0 && edge_[f.pixel] != Edge::shadow)
       lender_[static_cast<std::size_t>(shaded - 1)] = static_cast<std::int16_t>(neighbour);
     if (!hit) group_[leaving - 1] = &p;
   }

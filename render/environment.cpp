@@ -120,8 +120,14 @@ ConeSteps cone_steps(const Environment& env, float alpha, const Spread& spread) 
 // Gathers the samples of one direction.
 class MapSampler {
  public:
-  MapSampler(const Environment& env, std::span<MapSample, most_map_samples> samples)
-      : env_(env), samples_(samples) {}
+  MapSampler(const Environment& env,
+             std::span<MapSample, most_map_samples> samples,
+             bool diffused = false)
+      : env_(env),
+        samples_(samples),
+        diffused_(diffused && !env.diffused.empty()
+                      ? static_cast<std::uint32_t>(env.halved.size() + env.smoothed.size())
+                      : 0) {}
 
   std::size_t count() const { return count_; }
 
@@ -162,7 +168,7 @@ class MapSampler {
     if (!(share > 0)) return;
     samples_[count_++] = {at.u * static_cast<float>(map.width) - 0.5F,
                           at.v * static_cast<float>(map.height) - 0.5F, share,
-                          static_cast<std::uint32_t>(level)};
+                          static_cast<std::uint32_t>(level) + diffused_};
   }
 
  private:
@@ -172,6 +178,7 @@ class MapSampler {
 
   const Environment& env_;
   std::span<MapSample, most_map_samples> samples_;
+  std::uint32_t diffused_;  // from where on levels are counted
   std::size_t count_ = 0;
 };
 
@@ -182,6 +189,26 @@ void copy_counted(const capture::Image& map, capture::Image& level) {
   level.channels = map.channels;
   level.pixels.resize(map.pixels.size());
   std::ranges::transform(map.pixels, level.pixels.begin(), counted_radiance);
+}
+
+// `diffused` from the first level.
+void diffuse(Environment& env, const CompactTexels& compact) {
+  const capture::Image& whole = env.smoothed[0];
+  env.diffused.resize(1 + env.halved.size());
+  capture::Image& first = env.diffused[0];
+  first = whole;
+  const int side = whole.height / compact.height;
+  for (int y = 0; y < compact.height; ++y) {
+    for (int x = 0; x < 2 * compact.height; ++x) {
+      if (compact.is_compact[static_cast<std::size_t>(y * 2 * compact.height + x)] == 0) continue;
+      for (int row = y * side; row < (y + 1) * side; ++row) {
+        std::fill_n(&first.pixels[first.index(row, x * side)], 3 * side, 0.0F);
+      }
+    }
+  }
+  for (std::size_t k = 0; k < env.halved.size(); ++k) {
+    area_average(env.diffused[k], env.diffused[k].height / 2, env.diffused[k + 1]);
+  }
 }
 
 // Down to 8 rows: cones as wide as those texels are lobes of the smoothed levels.
@@ -238,11 +265,27 @@ std::size_t find_map_samples(const Environment& env,
   return sampler.count();
 }
 
+std::size_t find_diffused_samples(const Environment& env,
+                                  Vec3f direction,
+                                  const Spread& spread,
+                                  std::span<MapSample, most_map_samples> samples) {
+  if (env.diffused.empty()) return find_map_samples(env, direction, 0, spread, samples);
+  if (!std::isfinite(direction.x + direction.y + direction.z)) return 0;
+  MapSampler sampler(env, samples, true);
+  const ConeSteps steps = cone_steps(env, 0, spread);
+  Vec3f at = direction - steps.step * (0.5F * (steps.count - 1));
+  for (float k = 0; k < steps.count; ++k, at += steps.step) {
+    sampler.add_cone(map_point(at), steps.width_rad, 1 / steps.count);
+  }
+  return sampler.count();
+}
+
 std::vector<const capture::Image*> levels_of(const Environment& env) {
   if (env.smoothed.empty()) return {&env.radiance};
   std::vector<const capture::Image*> levels{&env.smoothed[0]};
   for (const capture::Image& level : env.halved) levels.push_back(&level);
   for (std::size_t k = 1; k < env.smoothed.size(); ++k) levels.push_back(&env.smoothed[k]);
+  for (const capture::Image& level : env.diffused) levels.push_back(&level);
   return levels;
 }
 
@@ -341,6 +384,9 @@ void smooth_for_reflections(Environment& env, const CompactTexels& compact, int 
       if (compact.is_compact[i] != 0) std::fill_n(&shrunk.pixels[3 * i], 3, 0.0F);
     }
     source = &shrunk;
+    diffuse(env, compact);
+  } else {
+    env.diffused.clear();
   }
   for (int k = 1; k < levels; ++k) {
     const float roughness = static_cast<float>(k) / static_cast<float>(levels - 1);

@@ -30,6 +30,9 @@ struct Environment {
   // Levels from 1 on lack the light of the sources that the light table marks as compact: rough
   // lobes see those one by one, where nothing hides them.
   bool compact_apart = false;
+  // Then also `smoothed[0]` and `halved` without that light, in this order, for the narrow cones
+  // that rays take all over a rough lobe.
+  std::vector<capture::Image> diffused;
   float unseen_share = 0;  // of the irradiance on a surface that faces up: filled, not measured
 };
 
@@ -74,7 +77,7 @@ Vec3f radiance_of(const Environment& env,
 struct MapSample {
   float x, y;  // in texels, (0, 0) the centre of the top-left one
   float share;
-  std::uint32_t level;  // `smoothed` [0], then `halved`, then the rest of `smoothed`
+  std::uint32_t level;  // `smoothed` [0], `halved`, the rest of `smoothed`, `diffused`
 };
 inline constexpr std::size_t most_map_samples = 112;
 std::size_t find_map_samples(const Environment& env,
@@ -82,6 +85,11 @@ std::size_t find_map_samples(const Environment& env,
                              float roughness,
                              const Spread& spread,
                              std::span<MapSample, most_map_samples> samples);
+// Of a cone without the light of compact sources, where they are apart.
+std::size_t find_diffused_samples(const Environment& env,
+                                  Vec3f direction,
+                                  const Spread& spread,
+                                  std::span<MapSample, most_map_samples> samples);
 // All levels in the order that MapSample counts them.
 std::vector<const capture::Image*> levels_of(const Environment& env);
 // A level's radiance at a place, bilinear. Poles and the seam are passed as on the sphere.

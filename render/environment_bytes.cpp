@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t environment_magic = 0x334E4550;  // "PEN3"
+constexpr std::uint32_t environment_magic = 0x344E4550;  // "PEN4"
 
 void put(ByteWriter& out, const capture::Image& image) {
   out.put(image.height), out.put(image.width), out.put(image.channels);
@@ -36,7 +36,7 @@ std::vector<std::byte> serialize(const Environment& environment) {
   out.put_all(environment.seen);
   out.put(environment.unseen_share);
   out.put(environment.compact_apart);
-  for (const auto* levels : {&environment.smoothed, &environment.halved}) {
+  for (const auto* levels : {&environment.smoothed, &environment.halved, &environment.diffused}) {
     out.put(static_cast<std::uint64_t>(levels->size()));
     for (const capture::Image& level : *levels) put(out, level);
   }
@@ -55,7 +55,7 @@ Environment parse_environment(std::span<const std::byte> bytes) {
   if (!environment.seen.empty() && environment.seen.size() != texels) {
     in.fail("has a coverage of another size than its map");
   }
-  for (auto* levels : {&environment.smoothed, &environment.halved}) {
+  for (auto* levels : {&environment.smoothed, &environment.halved, &environment.diffused}) {
     for (std::size_t n = in.get_count(3 * sizeof(int) + sizeof(std::uint64_t)); n > 0; --n) {
       levels->push_back(get_image(in));
     }

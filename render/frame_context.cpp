@@ -69,7 +69,8 @@ bool alike(const Environment& a, const Environment& b) {
     return std::ranges::equal(x, y, {}, &capture::Image::height, &capture::Image::height);
   };
   return a.radiance.height == b.radiance.height && same_sizes(a.smoothed, b.smoothed) &&
-         same_sizes(a.halved, b.halved) && a.compact_apart == b.compact_apart;
+         same_sizes(a.halved, b.halved) && same_sizes(a.diffused, b.diffused) &&
+         a.compact_apart == b.compact_apart;
 }
 
 // Places in a pixel, -.5..+.5: every first 4^n of them are spread well (Sobol's sequence).

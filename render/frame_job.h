@@ -19,7 +19,7 @@ struct Effort {
   int aa_samples = 16;  // camera rays in pixels where an edge passes; 1 = no anti-aliasing
   // Standard error, in radiance, that a pixel of further camera rays may have before it takes more
   // of them, up to 256; 0 = aa_samples must do.
-  float aa_tolerance = 0.05F;
+  float aa_tolerance = 0.1F;
   // Radiance by which the virtual light of neighbouring pixels may differ before they are sampled
   // like edges; 0 = it never matters.
   float glint_contrast = 0.1F;

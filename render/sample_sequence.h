@@ -1,5 +1,4 @@
-// Numbers for the reference's paths: well spread over the samples of a pixel, unlike between
-// pixels.
+// Random numbers of paths: well spread over the samples of a pixel, unlike between pixels.
 #pragma once
 
 #include <array>

@@ -189,18 +189,20 @@ float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction) {
   return unfolded_density(v, l, alpha) + unfolded_density(v, {l.x, l.y, -l.z}, alpha);
 }
 
-float compact_lobe(Vec3f normal,
+float blurred_lobe(Vec3f normal,
+                   Vec3f geometric_normal,
                    Vec3f view,
                    float roughness,
-                   const Spread& spread,
-                   const DirectionalLight& light) {
+                   float blur_rad,
+                   Vec3f direction) {
   // Half of a lobe lies within 2 alpha of the mirrored direction, as half of a disc of radius r
-  // does within .7 r: so wide is the light itself, and the cone of the sample.
+  // does within .7 r.
   constexpr float alpha_of_radius = 0.35F;
-  const float cone_radius_rad = 0.5F * std::sqrt(length(spread.a) * length(spread.b));
-  const float alpha = std::hypot(roughness * roughness,
-                                 alpha_of_radius * std::hypot(light.spread, cone_radius_rad));
-  return lobe_density(normal, view, std::min(std::sqrt(alpha), 1.0F), light.direction);
+  const float alpha = std::hypot(roughness * roughness, alpha_of_radius * blur_rad);
+  const float blurred = std::min(std::sqrt(alpha), 1.0F);
+  const Vec3f below = direction - geometric_normal * (2 * dot(direction, geometric_normal));
+  return lobe_density(normal, view, blurred, direction) +
+         lobe_density(normal, view, blurred, below);
 }
 
 }  // namespace render

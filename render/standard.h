@@ -129,9 +129,14 @@ inline Vec3f mirrored(Vec3f view, Vec3f normal) { return normal * (2 * dot(norma
 Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random);
 float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction);
 
-// What a lobe mirrors to `view` of a compact light, per irradiance of it: the lobe's density,
-// blurred by the light's own size and by the cone of the sample.
-float compact_lobe(
-    Vec3f normal, Vec3f view, float roughness, const Spread& spread, const DirectionalLight& light);
+// What a lobe mirrors to `view` of light from `direction`, per irradiance of it, if both are
+// blurred as by a disc of radius blur_rad. What an interpolated or mapped normal would send below
+// the triangle, of unit normal `geometric_normal`, is mirrored up again.
+float blurred_lobe(Vec3f normal,
+                   Vec3f geometric_normal,
+                   Vec3f view,
+                   float roughness,
+                   float blur_rad,
+                   Vec3f direction);
 
 }  // namespace render

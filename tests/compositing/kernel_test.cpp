@@ -7,9 +7,11 @@
 #include <cstdlib>
 #include <new>
 
+#include "../render/sun_and_sky.h"
 #include "made_shot.h"
 #include "render/kept_transport.h"
 #include "render/light_follower.h"
+#include "render/reference.h"
 
 namespace {
 std::atomic<long> allocations{0};
@@ -302,6 +304,66 @@ TEST(RenderFrame, SamplesGlintsAndErrsLessTheLessItTolerates) {
     EXPECT_LT(error, 0.9 * before) << tolerance;
     before = error;
   }
+}
+
+// Balls, more and less rough, beside each other under a small sun, on a floor that catches their
+// shadows: lobes that something blocks, shadow edges, a sun in all of them.
+struct SunnyBalls {
+  MadeShot shot;
+  std::array<capture::Image, 2> references;
+
+  SunnyBalls() : shot(make_shot()) {
+    shot.environment = render::make_sun_and_sky({}, 128);
+    render::LightFollower follower;
+    render::LightFollowerSettings settings;
+    settings.table.count = 256;
+    shot.job.lights = follower.follow(shot.environment, settings);
+    render::smooth_for_reflections(shot.environment, follower.compact_texels());
+    for (const std::uint32_t seed : {1U, 2U}) {
+      render::ReferenceSettings reference;
+      reference.samples = 128;
+      reference.seed = seed;
+      references[seed - 1] = render::render_reference(shot.inputs(), shot.job, plate(), reference);
+    }
+  }
+  static MadeShot make_shot() {
+    render::SceneDescription scene = made_scene(false);
+    const auto add = [&](render::Vec3f centre, float roughness, float metallic) {
+      render::StandardParameters p;
+      p.roughness = roughness;
+      p.metallic = metallic;
+      p.base_color[1] = 0.4F;
+      scene.materials.push_back(render::make_standard_material("ball", p));
+      scene.meshes.push_back(
+          made_ball(centre, 0.5F, static_cast<std::uint32_t>(scene.materials.size() - 1)));
+      scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+    };
+    add({0, 0, 0.5F}, 0.5F, 1);
+    add({0.9F, 0.5F, 0.5F}, 0.3F, 1);
+    add({0.3F, -0.9F, 0.5F}, 0.7F, 0);
+    return made_shot(96, 72, std::move(scene));
+  }
+  capture::Image plate() const { return capture::to_float(shot.plate); }
+  double error() const {
+    return render::picture_error(capture::to_float(render(shot).rgba), references,
+                                 render::affected_mask(references[0], plate()))
+        .relative_rms;
+  }
+};
+
+TEST(RenderFrame, NearsTheReferenceTheMoreEffortItTakes) {
+  SunnyBalls balls;
+  render::Effort& effort = balls.shot.job.effort;
+  effort = {};
+  const double normal = balls.error();
+  EXPECT_LT(normal, 0.04);
+  effort.aa_tolerance = 0.02F;
+  effort.glint_contrast = 0.005F;
+  effort.accuracy = 0.999F;
+  effort.adaptive_visibility = false;
+  const double most = balls.error();
+  EXPECT_LT(most, 0.015);
+  EXPECT_LT(most, 0.6 * normal);
 }
 
 TEST(RenderTile, DoesNotAllocate) {

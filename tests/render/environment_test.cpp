@@ -258,7 +258,8 @@ TEST(SmoothForReflections, LeavesCompactSourcesForTheLightsThatStandForThem) {
   const auto mirrored_compact = [&](Vec3f normal, Vec3f view, float roughness) {
     Vec3f sum{};
     for (const DirectionalLight& light : compact) {
-      sum += light.irradiance * compact_lobe(normal, view, roughness, {}, light);
+      sum += light.irradiance *
+             blurred_lobe(normal, normal, view, roughness, light.spread, light.direction);
     }
     return sum * share_without_compact(apart, roughness, {});
   };
@@ -274,6 +275,27 @@ TEST(SmoothForReflections, LeavesCompactSourcesForTheLightsThatStandForThem) {
       EXPECT_NEAR(sum / radiance_of(plain, d, roughness).y, 1, 0.05)
           << "roughness " << roughness << ", " << away;
     }
+  }
+  // The cones of rays all over a lobe see no sun either, and all else as narrow cones do.
+  const auto diffused = [&](Vec3f direction, float width_rad) {
+    const auto [a, b] = across(direction);
+    std::array<MapSample, most_map_samples> places;
+    const std::size_t count =
+        find_diffused_samples(apart, direction, {a * width_rad, b * width_rad}, places);
+    const std::vector<const capture::Image*> levels = levels_of(apart);
+    float sum = 0;
+    for (const auto& [x, y, share, level] : std::span(places).first(count))
+      sum += share * radiance_at(*levels[level], x, y).y;
+    return sum;
+  };
+  for (const float width_rad : {0.0F, 0.02F, 0.1F}) {
+    EXPECT_LT(diffused(sun, width_rad), 3) << width_rad;
+    EXPECT_GT(radiance_of(plain, sun, 0).y, 1000);
+    const Vec3f elsewhere = at_angle(sun, 0.8F, 0.7F);
+    const auto [a, b] = across(elsewhere);
+    EXPECT_NEAR(diffused(elsewhere, width_rad),
+                radiance_of(plain, elsewhere, 0, {a * width_rad, b * width_rad}).y, 0.02)
+        << width_rad;
   }
   // Mirrors see the sun in the map itself.
   EXPECT_EQ(radiance_of(apart, sun, 0), radiance_of(plain, sun, 0));

@@ -136,6 +136,31 @@ TEST(LobeDensity, IsZeroBelowTheSurfaceAndFiniteFromBelowTheShadingNormal) {
   EXPECT_TRUE(std::isfinite(render::lobe_density(normal, below, 0.3F, l)));
 }
 
+// Interpolated normals lean away from the triangle's own: what would go below it is mirrored up.
+TEST(BlurredLobe, KeepsAllItsEnergyAboveTheTriangle) {
+  const Vec3f triangle{0, 0, 1};
+  for (const float lean_rad : {0.0F, 0.4F, 0.9F}) {
+    const Vec3f normal{std::sin(lean_rad), 0, std::cos(lean_rad)};
+    for (const float blur_rad : {0.0F, 0.5F}) {
+      const Vec3f view = normalize(Vec3f{-0.5F, 0.6F, 0.8F});
+      double integral = 0;
+      const int steps = 300;
+      for (int j = 0; j < steps; ++j) {
+        for (int i = 0; i < 4 * steps; ++i) {
+          const double z = (j + 0.5) / steps;
+          const double phi = 2 * std::numbers::pi * (i + 0.5) / (4 * steps);
+          const double r = std::sqrt(1 - z * z);
+          const Vec3f l{static_cast<float>(r * std::cos(phi)),
+                        static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
+          integral += render::blurred_lobe(normal, triangle, view, 0.6F, blur_rad, l);
+        }
+      }
+      integral *= 2 * std::numbers::pi / (4.0 * steps * steps);
+      EXPECT_NEAR(integral, 1, 0.01) << "lean " << lean_rad << ", blur " << blur_rad;
+    }
+  }
+}
+
 TEST(StandardParameters, ComeBackFromTheirMaterial) {
   render::StandardParameters p;
   p.roughness = 0.125F;

@@ -1,0 +1,213 @@
+// Mirrored light of a cell: rays into lobes, and what lobes mirror of compact sources.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/cell_baker.h"
+#include "render/standard.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+constexpr float pi = std::numbers::pi_v<float>;
+constexpr float widest_rad = 1;  // cones end here
+// A lobe whose alpha is more than so many radii of a compact source sees it as a point, others in
+// so many parts.
+constexpr float wide_lobe = 2;
+constexpr std::uint32_t parts_of_source = 4;
+
+float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
+float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+
+// The mean width of a cone. What goes straight on keeps it.
+float spread_of(const Spread& spread, const ShadePoint& from) {
+  const float area = length(spread.a) * length(spread.b);
+  return area > 0 ? std::min(std::sqrt(area), widest_rad) : from.spread_rad;
+}
+
+// Unit vectors across a unit direction.
+struct Across {
+  Vec3f a, b;
+  explicit Across(Vec3f direction)
+      : a(normalize(
+            cross(std::abs(direction.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}, direction))),
+        b(cross(direction, a)) {}
+};
+
+}  // namespace
+
+// Which of the pattern's places in its pixel a further sample has.
+std::uint32_t CellBaker::sample_of(const ShadePoint& p) const {
+  return p.slot < cell_pixels ? 0 : index_of_slot_[p.slot - cell_pixels];
+}
+
+// Alike for the same pixel, depth and number, however the picture is cut into tiles.
+SampleSequence CellBaker::numbers_of(const ShadePoint& p,
+                                     std::uint32_t number,
+                                     std::uint32_t sample) const {
+  const std::uint32_t x = static_cast<std::uint32_t>(x0_) + p.pixel % cell_size;
+  const std::uint32_t y = static_cast<std::uint32_t>(y0_) + p.pixel / cell_size;
+  return {number * 64U + p.depth, y << 16U | x, sample};
+}
+
+// Further samples of a pixel share a rough lobe among them: each follows one of its directions, and
+// stands for a cone about it that is the wider the less likely it is. False if the ray is left in
+// the middle of its lobe.
+bool CellBaker::turn_within_lobe(const ShadePoint& from, std::uint32_t number, NewRay& ray) const {
+  if (from.slot < cell_pixels || ray.normal == Vec3f{} || ray.roughness < mirror_roughness)
+    return false;
+  const Vec3f view = -from.incoming;
+  SampleSequence numbers = numbers_of(from, number, sample_of(from));
+  Vec3f direction = sample_lobe(ray.normal, view, ray.roughness, numbers.next_pair());
+  const float density = lobe_density(ray.normal, view, ray.roughness, direction);
+  if (!(density > 0)) return false;
+  const float own_rad = 0.5F * (length(ray.spread.a) + length(ray.spread.b));
+  const float share_rad = 2 / std::sqrt(pi * density * static_cast<float>(samples_each_));
+  const float width_rad = std::min(std::hypot(own_rad, share_rad), widest_rad);
+  const float into = dot(direction, from.hit.geometric_normal);
+  if (into < 0) direction -= from.hit.geometric_normal * (2 * into);
+  const Across across(direction);
+  ray.direction = direction;
+  ray.origin = offset_origin(from.hit, direction);
+  ray.roughness = 0;
+  ray.spread = {across.a * width_rad, across.b * width_rad};
+  return true;
+}
+
+void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
+  const float weight = largest(asked.throughput);
+  if (!(weight > 0)) return;
+  pushed_ = pushing_ == &from ? pushed_ + 1 : 0;
+  pushing_ = &from;
+  NewRay ray = asked;
+  const bool one_of_many = turn_within_lobe(from, pushed_, ray);
+  const bool straight = ray.kind == RayKind::camera;
+  if (!straight && asked.normal != Vec3f{} && frame_->planned->compact_apart) {
+    const float share =
+        one_of_many ? 1.0F : share_without_compact(*frame_->planned, ray.roughness, ray.spread);
+    if (share > 0) {
+      lobes_.push_back({&from, asked.throughput, asked.normal, asked.spread, asked.roughness, share,
+                        pushed_, asked.kind == RayKind::difference});
+    }
+  }
+  const Effort& effort = frame_->job->effort;
+  // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
+  const bool deep = from.depth >= effort.max_depth || queue_.size() == queue_.capacity();
+  if (deep) ++statistics_->depth_limit_hits;
+  const auto too_dim = [&] {
+    const float least = 1 - effort.accuracy;
+    if (straight || weight >= least) return weight < least;
+    return weight *
+               largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread)) <
+           least;
+  };
+  if (deep || too_dim()) {
+    if (straight) {
+      CellTransport::Base& base = base_[target_of(from)];
+      samples_[from.slot].plate += ray.throughput;
+      base.plate += ray.throughput;
+      base.passed += mean(ray.throughput);
+      base.seen += mean(ray.throughput);
+    } else if (ray.kind == RayKind::reflection) {
+      add_environment(from.slot, target_of(from), ray.direction, ray.roughness, ray.spread,
+                      one_of_many, ray.throughput);
+    }
+    return;
+  }
+  queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.footprint_m,
+                    spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
+                    static_cast<std::uint8_t>(from.depth + 1), one_of_many});
+}
+
+void CellBaker::add_environment(std::size_t slot,
+                                std::size_t target,
+                                Vec3f direction,
+                                float roughness,
+                                const Spread& spread,
+                                bool one_of_many,
+                                Vec3f weight) {
+  std::array<MapSample, most_map_samples> places;
+  const std::size_t count =
+      one_of_many ? find_diffused_samples(*frame_->planned, direction, spread, places)
+                  : find_map_samples(*frame_->planned, direction, roughness, spread, places);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [x, y, share, level] = places[i];
+    transport_->environment.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
+                                       static_cast<std::uint16_t>(level)});
+    samples_[slot].added += weight * radiance_at(*frame_->planned_levels[level], x, y) * share;
+  }
+}
+
+// What lobes mirror of compact lights that their points see; of a real surface's, less those that
+// virtual objects hide, for the plate shows them.
+void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid) {
+  if (lobes_.empty()) return;
+  const CellVisibility& cell = transport_->visibility;
+  for (const Lobe& lobe : lobes_) {
+    const auto i = static_cast<std::size_t>(lobe.point - points_.data());
+    const bool shared = receiver_of_point[i] == nowhere;
+    if (!grid && !shared) continue;
+    const std::size_t k = shared ? static_cast<std::size_t>(lender_[i]) : receiver_of_point[i];
+    for (const std::uint32_t light : frame_->compact) {
+      const auto in = [&](const CellMask& mask) { return (mask[k / 64] >> (k % 64) & 1) != 0; };
+      if (!in(cell.lit[light])) continue;
+      add_compact(lobe, light, in(cell.seen[light]) ? Vec3f{1, 1, 1} : Vec3f{});
+    }
+  }
+  if (grid || frame_->compact.empty()) return;
+  const auto receiver_of = [&](const Lobe& lobe) {
+    return receiver_of_point[static_cast<std::size_t>(lobe.point - points_.data())];
+  };
+  std::ranges::sort(lobes_, {},
+                    [&](const Lobe& lobe) { return receiver_of(lobe) * 256U + lobe.number; });
+  for (const PointLight& l : tested_) {
+    if (frame_->job->lights.lights[l.light].compact == 0) continue;
+    for (const Lobe& lobe : std::ranges::equal_range(lobes_, l.point, {}, receiver_of)) {
+      add_compact(lobe, l.light, l.passed);
+    }
+  }
+}
+
+void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
+  const Vec3f share = lobe.difference ? passed - Vec3f{1, 1, 1} : passed;
+  if (share == Vec3f{}) return;
+  const float density = compact_density(lobe, light) * lobe.share;
+  if (!(density > 0)) return;
+  const ShadePoint& p = *lobe.point;
+  const Vec3f weight = lobe.throughput * share * density;
+  transport_->lights.push_back(
+      {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
+  samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;
+}
+
+// What a lobe mirrors of a compact light, per irradiance. A lobe that is not much wider than the
+// source takes it in parts, or its far slopes would be lit as if the lobe were as wide: in parts
+// here, and in others in every further sample of the pixel.
+float CellBaker::compact_density(const Lobe& lobe, std::size_t light) const {
+  const DirectionalLight& l = frame_->job->lights.lights[light];
+  const ShadePoint& p = *lobe.point;
+  const float cone_rad = 0.5F * std::sqrt(length(lobe.spread.a) * length(lobe.spread.b));
+  const auto density = [&](Vec3f direction, float part_rad) {
+    return blurred_lobe(lobe.normal, p.hit.geometric_normal, -p.incoming, lobe.roughness,
+                        std::hypot(part_rad, cone_rad), direction);
+  };
+  if (std::max(lobe.roughness * lobe.roughness, cone_rad) > wide_lobe * l.spread)
+    return density(l.direction, l.spread);
+  const bool further = p.slot >= cell_pixels;
+  const std::uint32_t samples = further ? static_cast<std::uint32_t>(samples_each_) : 1;
+  const float part_rad = l.spread / std::sqrt(static_cast<float>(parts_of_source * samples));
+  const Across across(l.direction);
+  const std::uint32_t number = (static_cast<std::uint32_t>(light) + 1) * 16 + lobe.number;
+  float sum = 0;
+  for (std::uint32_t i = 0; i < parts_of_source; ++i) {
+    const auto [area, turn] = numbers_of(p, number, sample_of(p) * parts_of_source + i).next_pair();
+    const float radius = l.spread * std::sqrt(area);
+    sum += density(normalize(l.direction + across.a * (radius * std::cos(2 * pi * turn)) +
+                             across.b * (radius * std::sin(2 * pi * turn))),
+                   part_rad);
+  }
+  return sum * (1.0F / parts_of_source);
+}
+
+}  // namespace render
