@@ -18,7 +18,7 @@ struct CameraInfo {
   int width = 0;
   int height = 0;
   Rational rate;            // 0/1 = unknown or not constant (stills)
-  std::int64_t frames = 0;  // 0 = unknown or endless
+  std::int64_t frames = 0;  // about, where only length and rate are told; 0 = unknown or endless
   std::string description;  // for people: codec, format, colour tags and how they were read
   int sound_channels = 0;   // 0 = silent
   int sound_rate = 0;       // samples per second

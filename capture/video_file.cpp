@@ -26,6 +26,7 @@ constexpr std::size_t max_lost_at_start = 1000;
 // Frames nearer than this are counted from the start; and so far before a frame the decoder starts,
 // so that pictures which it cannot yet build are behind it.
 constexpr std::int64_t min_jump = 50;
+constexpr double most_frames = 1e12;  // a longer length is a broken one
 
 // The rate that the container counts in, if its average agrees; else the average.
 Rational rate_of(const AVStream& stream) {
@@ -86,6 +87,22 @@ class VideoFile : public Camera {
 
 AVCodecID codec_of(const MediaFile& file) { return file.video().codecpar->codec_id; }
 
+// The container's own count; of one that has none, such as Matroska, what its length and rate
+// suggest; 0 = it does not tell these either.
+std::int64_t count_frames(const MediaFile& file, Rational rate) {
+  const AVStream& video = file.video();
+  if (video.nb_frames > 0 || rate.num <= 0) return video.nb_frames;
+  const AVFormatContext& context = file.context();
+  double length_s = 0;
+  if (video.duration > 0) {
+    length_s = static_cast<double>(video.duration) * av_q2d(video.time_base);
+  } else if (context.duration > 0) {
+    length_s = static_cast<double>(context.duration) / AV_TIME_BASE;
+  }
+  const double frames = length_s * rate.value();
+  return frames < most_frames ? std::llround(frames) : 0;
+}
+
 VideoFile::VideoFile(const std::string& path,
                      const CameraOptions& options,
                      const LightCurves& curves)
@@ -95,7 +112,7 @@ VideoFile::VideoFile(const std::string& path,
       lineariser_(curves) {
   open();
   info_.rate = rate_of(file_->video());
-  info_.frames = loop_ ? 0 : file_->video().nb_frames;
+  info_.frames = loop_ ? 0 : count_frames(*file_, info_.rate);
   clock_.emplace(Rational{file_->video().time_base.num, file_->video().time_base.den}, info_.rate);
   if (options.frame) {
     skip_to(*options.frame);
