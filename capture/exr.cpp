@@ -107,7 +107,8 @@ Imf::Header make_header(int width, int height, const ExrOptions& options) {
         t.seconds > 59 || t.frames < 0 || t.frames > 39) {
       throw std::invalid_argument("a time code in an EXR file ends at 23:59:59:39");
     }
-    Imf::addTimeCode(header, Imf::TimeCode(t.hours, t.minutes, t.seconds, t.frames, t.drop_frame));
+    Imf::addTimeCode(header, Imf::TimeCode(t.hours, t.minutes, t.seconds, t.frames, t.drop_frame,
+                                           false, t.second_of_pair));
   }
   if (options.frames_per_second) {
     const Rational& rate = *options.frames_per_second;

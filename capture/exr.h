@@ -13,13 +13,15 @@
 
 namespace capture {
 
-// SMPTE ST 12-1 hours:minutes:seconds:frames. The file has room for frames 0 to 39.
+// SMPTE ST 12-1 hours:minutes:seconds:frames. The file has room for frames 0 to 39; above 30 frames
+// per second, the standard counts pairs of frames and marks the second of each.
 struct ExrTimecode {
   int hours = 0;
   int minutes = 0;
   int seconds = 0;
   int frames = 0;
   bool drop_frame = false;
+  bool second_of_pair = false;  // the field mark
   friend bool operator==(const ExrTimecode&, const ExrTimecode&) = default;
 };
 

@@ -32,6 +32,24 @@ capture::ExrCompression compression_from_name(const std::string& name) {
   throw std::invalid_argument("no EXR compression \"" + name + "\"; there are " + names);
 }
 
+// A label as the file counts it, at `base` frames in a second of timecode: nothing where there is
+// no room for it.
+//
+// SMPTE ST 12-1, "Time and Control Code", clause 12: at 48, 50 and 60 frames per second, pairs are
+// counted, and the field mark tells the second frame of a pair.
+std::optional<capture::ExrTimecode> label_of(const Timecode& timecode, int base) {
+  constexpr int most_counted = 40;  // the attribute counts 0 to 39
+  const bool in_pairs = base == 48 || base == 50 || base == 60;
+  if (base > most_counted && !in_pairs) return std::nullopt;
+  capture::ExrTimecode label{timecode.hours, timecode.minutes, timecode.seconds, timecode.frames,
+                             timecode.drop_frame};
+  if (in_pairs) {
+    label.frames = timecode.frames / 2;
+    label.second_of_pair = timecode.frames % 2 != 0;
+  }
+  return label;
+}
+
 }  // namespace
 
 ExrSequence::ExrSequence(const ExrSequenceSettings& settings) : settings_(settings) {
@@ -58,14 +76,10 @@ void ExrSequence::write(std::int64_t number,
                         const capture::HalfImage& rgba,
                         const capture::HalfImage& matte,
                         const std::optional<Timecode>& timecode) const {
-  constexpr int most_frames_per_second = 40;  // the attribute counts frames 0..39
   capture::ExrOptions options;
   options.compression = compression_from_name(settings_.compression);
   options.frames_per_second = settings_.rate;
-  if (timecode && timecode_base(settings_.rate) <= most_frames_per_second) {
-    options.timecode = capture::ExrTimecode{timecode->hours, timecode->minutes, timecode->seconds,
-                                            timecode->frames, timecode->drop_frame};
-  }
+  if (timecode) options.timecode = label_of(*timecode, timecode_base(settings_.rate));
   const std::array<capture::ExrPlanes, 2> planes{capture::ExrPlanes{rgba, {"R", "G", "B", "A"}},
                                                  capture::ExrPlanes{matte, {"matte"}}};
   capture::write_exr(path_of(number), planes, options);

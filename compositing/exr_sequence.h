@@ -24,9 +24,9 @@ class ExrSequence {
   explicit ExrSequence(const ExrSequenceSettings& settings);
 
   // Writes frame.NNNNNN.exr: rgba (height, width, 4), matte (height, width, 1), bits as they are,
-  // with the timecode where the rate leaves it room (up to 40 per second). A file has its name only
-  // once it is whole. Throws std::invalid_argument if the images do not fit together,
-  // std::runtime_error with path and reason if the file cannot be written.
+  // with the timecode where the rate leaves it room (up to 40 per second; 48, 50 and 60 in pairs).
+  // A file has its name only once it is whole. Throws std::invalid_argument if the images do not
+  // fit together, std::runtime_error with path and reason if the file cannot be written.
   void write(std::int64_t number,
              const capture::HalfImage& rgba,
              const capture::HalfImage& matte,

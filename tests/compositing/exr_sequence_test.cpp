@@ -86,8 +86,37 @@ TEST_F(ExrSequenceTest, SaysChannelsRateAndTimecode) {
   EXPECT_NE(info.find("smpte:TimeCode: 00:01:00:02"), std::string::npos) << info;
 }
 
+// The attribute's first 32 bits, found by its name and type in the file itself.
+std::uint32_t time_and_flags(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  const std::string name("timeCode\0timecode\0\x08\0\0\0", 22);
+  const std::size_t at = bytes.find(name);
+  if (at == std::string::npos) return 0;
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, bytes.data() + at + name.size(), sizeof bits);
+  return bits;
+}
+
+// SMPTE ST 12-1: frames in bits 0 to 5 as decimal digits, drop-frame bit 6, field mark bit 15 of
+// the word for 60 fields.
+TEST_F(ExrSequenceTest, CountsPairsOfFramesAtHighRates) {
+  const auto bits_of = [&](capture::Rational rate, int frames, bool drop) {
+    const ExrSequence sequence({path("take"), rate, "none"});
+    sequence.write(0, random_halves(2, 2, 4, 1), random_halves(2, 2, 1, 2),
+                   Timecode{0, 0, 1, frames, drop});
+    return time_and_flags(sequence.path_of(0));
+  };
+  constexpr std::uint32_t second = 1U << 8, mark = 1U << 15, drop = 1U << 6;
+  EXPECT_EQ(bits_of({50, 1}, 48, false), second | 0x24U);
+  EXPECT_EQ(bits_of({50, 1}, 49, false), second | 0x24U | mark);
+  EXPECT_EQ(bits_of({60000, 1001}, 59, true), second | 0x29U | mark | drop);
+  EXPECT_EQ(bits_of({48, 1}, 1, false), second | mark);
+  EXPECT_EQ(bits_of({30, 1}, 29, false), second | 0x29U) << "no pairs";
+}
+
 TEST_F(ExrSequenceTest, LeavesTheTimecodeOutWhereTheFileHasNoRoom) {
-  const ExrSequence sequence({path("take"), {50, 1}, "none"});
+  const ExrSequence sequence({path("take"), {90, 1}, "none"});
   sequence.write(0, random_halves(2, 2, 4, 1), random_halves(2, 2, 1, 2), Timecode{0, 0, 0, 49});
   const std::string info = output_of("oiiotool --info -v " + sequence.path_of(0));
   EXPECT_EQ(info.find("TimeCode"), std::string::npos) << info;
