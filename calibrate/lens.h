@@ -55,6 +55,7 @@ struct DirectionTable {
   int width = 0;
   int height = 0;
   std::vector<float> x, y, z;
+  std::vector<float> sensitivity = {};  // of the lens, for each entry (vignetting.h); empty = even
 
   std::size_t index(int row, int column) const {
     return static_cast<std::size_t>(row + 1) * static_cast<std::size_t>(width + 2) +

@@ -1,6 +1,7 @@
 // How much a lens dims towards its rim.
 #include "calibrate/vignetting.h"
 
+#include <cmath>
 #include <cstddef>
 #include <stdexcept>
 
@@ -11,6 +12,16 @@ double sensitivity(std::span<const double> vignetting, double angle_rad) {
   double sum = 0;
   for (std::size_t i = vignetting.size(); i > 0; --i) sum = (sum + vignetting[i - 1]) * squared;
   return 1 + sum;
+}
+
+void add_vignetting(std::span<const double> vignetting, DirectionTable& table) {
+  table.sensitivity.clear();
+  if (vignetting.empty()) return;
+  table.sensitivity.reserve(table.z.size());
+  for (std::size_t i = 0; i < table.z.size(); ++i) {
+    const double angle_rad = std::atan2(std::hypot(table.x[i], table.y[i]), table.z[i]);
+    table.sensitivity.push_back(static_cast<float>(sensitivity(vignetting, angle_rad)));
+  }
 }
 
 void check_vignetting(std::span<const double> vignetting, double max_angle_rad) {

@@ -3,11 +3,16 @@
 
 #include <span>
 
+#include "calibrate/lens.h"
+
 namespace calibrate {
 
 // The sensitivity of a lens at an angle off its axis, 1 on it: 1 + v1 angle^2 + v2 angle^4 + ...,
 // in radians. No terms = even.
 double sensitivity(std::span<const double> vignetting, double angle_rad);
+
+// Fills in the table's sensitivity; empties it if there are no terms.
+void add_vignetting(std::span<const double> vignetting, DirectionTable& table);
 
 // Throws std::invalid_argument unless the sensitivity stays above 0.05 up to an angle: below, a
 // correction would show noise only.

@@ -13,7 +13,12 @@ namespace compositing {
 // where E is the irradiance of the real light there, lost what virtual objects take away of it,
 // E_virtual that of virtual lamps, F Fresnel's share and L_hit what the mirrored ray hits. Each
 // term is exactly 0 where nothing virtual changes the light. The albedo is pi plate / E, or the
-// set's own where E or the plate is too dark or clipped.
+// set's own where E or the plate is too dark or clipped. F's term may take light away, but leaves
+// no pixel darker than black that was not so before.
+//
+// One that occludes (Instance::occludes) hides virtual objects behind it. One that does not only
+// catches light: it shows where no virtual object is seen before it or behind it, as far as the
+// next one that does occlude.
 //
 // Debevec, "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, section 5 (differential
 // rendering), as ratios instead of differences: the plate's own texture stays under the shadow.

@@ -6,6 +6,7 @@
 
 #include "render/cell_baker.h"
 #include "render/kept_transport.h"
+#include "render/stand_in_parameters.h"
 #include "render/trace.h"
 
 namespace render {
@@ -21,7 +22,8 @@ struct TileWorkspace::Impl {
       const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result);
   void load_plate(const TileJob& tile, int x0, int y0);
   void light(const FrameContext& frame, const CellTransport& cell, RenderStatistics& statistics);
-  void write(const TileJob& tile, int x0, int y0, TileResult& result) const;
+  void write(
+      const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) const;
 };
 
 TileWorkspace::TileWorkspace() : impl_(std::make_unique<Impl>()) {}
@@ -65,8 +67,10 @@ void TileWorkspace::Impl::light(const FrameContext& frame,
                   statistics);
 }
 
-void TileWorkspace::Impl::write(const TileJob& tile, int x0, int y0, TileResult& result) const {
+void TileWorkspace::Impl::write(
+    const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) const {
   const Rect& rect = tile.rect;
+  const calibrate::DirectionTable& directions = *frame.inputs.directions;
   RenderStatistics& statistics = result.statistics;
   const auto finish = [&statistics](float value) {
     if (std::abs(value) <= capture::half_max) return value;
@@ -78,7 +82,10 @@ void TileWorkspace::Impl::write(const TileJob& tile, int x0, int y0, TileResult&
       const int row = y0 + y - rect.y, column = x0 + x - rect.x;
       if (row < 0 || column < 0 || row >= rect.height || column >= rect.width) continue;
       const auto k = static_cast<std::size_t>(y * cell_size + x);
-      const Vec3f rgb = plate[k] * picture.share[k] + picture.added[k];
+      const float sensitivity = directions.sensitivity.empty()
+                                    ? 1.0F
+                                    : directions.sensitivity[directions.index(y0 + y, x0 + x)];
+      const Vec3f rgb = with_light(plate[k] * picture.share[k], picture.added[k] * sensitivity);
       const float coverage = 1 - picture.seen[k], matte = 1 - picture.passed[k];
       const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(rect.width) +
                              static_cast<std::size_t>(column);
@@ -108,7 +115,7 @@ void TileWorkspace::Impl::render_cell(
     light(frame, fresh, result.statistics);
     if (room) memory->keep(column, row);
   }
-  write(tile, x0, y0, result);
+  write(frame, tile, x0, y0, result);
 }
 
 void render_tile(const FrameContext& context,

@@ -173,7 +173,6 @@ PathTracer::PathTracer(const Scene& scene,
       const StandInParameters stand_in = stand_in_parameters(material);
       std::copy_n(stand_in.albedo, 3, surfacing.parameters.base_color);
       surfacing.matte = true;
-      surfacing.occludes = stand_in.occludes != 0;
     } else {
       surfacing.parameters = standard_parameters(material, description.textures.size());
     }
@@ -325,11 +324,6 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
         scene_.hit_point(met->geom_id, met->prim_id, met->inst_id, met->u, met->v, w.direction);
     const bool real = scene_.description().instances[hit.instance].kind == ObjectKind::stand_in;
     if (real && sees_plate) {
-      if (!materials_[hit.material].occludes &&
-          closest_hit(scene_, w.origin, w.direction, 0, mask_virtual, w.kind)) {
-        w.mask = mask_virtual;
-        continue;
-      }
       w.result.end = CameraPath::End::stand_in;
       w.result.hit = hit;
       break;

@@ -98,8 +98,7 @@ class PathTracer {
   PathRules rules_;
   struct Surfacing {
     StandardParameters parameters;
-    bool matte = false;    // a stand-in: all its light is diffuse
-    bool occludes = true;  // stand-ins only
+    bool matte = false;  // a stand-in: all its light is diffuse
   };
   std::vector<Surfacing> materials_;
 };

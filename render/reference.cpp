@@ -99,10 +99,11 @@ class Composite {
       p.background.add(path.through);
   }
 
-  // (R, G, B, coverage) of a pixel from its `count` samples.
-  std::array<float, 4> finish(const Pixel& p, Vec3f plate, int count) const {
+  // (R, G, B, coverage) of a pixel from its `count` samples, where the lens is so sensitive.
+  std::array<float, 4> finish(const Pixel& p, Vec3f plate, float sensitivity, int count) const {
     const auto n = static_cast<double>(count);
-    Vec3f rgb = p.added.over(n) + times(plate, p.background.over(n));
+    Vec3f added = p.added.over(n) * sensitivity;
+    Vec3f rgb = times(plate, p.background.over(n));
     for (const StandInSums& s : p.stand_ins) {
       Vec3f share{1, 1, 1};
       if (s.parameters.catches_shadow != 0)
@@ -118,8 +119,9 @@ class Composite {
         rgb +=
             times(plate, {light.x / irradiance.x, light.y / irradiance.y, light.z / irradiance.z});
       else
-        rgb += times(albedo, light) * (1 / pi);
+        added += times(albedo, light) * (sensitivity / pi);
     }
+    rgb = with_light(rgb, added);
     return {rgb.x, rgb.y, rgb.z, static_cast<float>(1 - p.seen / n)};
   }
 
@@ -277,7 +279,9 @@ capture::Image render_reference(const FrameInputs& inputs,
       composite.sample(rays.origin(), rays.direction(x, y, dx - 0.5F, dy - 0.5F), numbers, pixel);
     }
     const Vec3f behind{plate.at(y, x, 0), plate.at(y, x, 1), plate.at(y, x, 2)};
-    return composite.finish(pixel, behind, count);
+    const float sensitivity =
+        directions.sensitivity.empty() ? 1.0F : directions.sensitivity[directions.index(y, x)];
+    return composite.finish(pixel, behind, sensitivity, count);
   };
   const std::vector<int> counts = plan_samples(
       directions, settings,

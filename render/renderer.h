@@ -15,7 +15,7 @@ class KeptTransport;
 struct FrameInputs {
   const Scene* scene = nullptr;
   const calibrate::DirectionTable* directions =
-      nullptr;                               // of the job's lens; its size is the picture's
+      nullptr;  // of the job's lens, by which virtual light is dimmed; its size is the picture's
   const Environment* environment = nullptr;  // of the job's time, match applied, smoothed
   // An earlier one, of the same sizes, by whose light sampling is decided, so that the decisions
   // stay while the light changes a little; null: `environment`.

@@ -39,7 +39,8 @@ bool is_finite(Vec3f p) { return std::isfinite(p.x) && std::isfinite(p.y) && std
 
 unsigned mask_of(const Instance& instance) {
   if (instance.kind == ObjectKind::virtual_object) return mask_virtual;
-  return instance.blocks_light ? mask_stand_in | mask_real_blocker : mask_stand_in;
+  return mask_stand_in | (instance.blocks_light ? mask_real_blocker : 0U) |
+         (instance.occludes ? mask_occluder : 0U);
 }
 
 void check(const SceneDescription& scene) {
@@ -101,7 +102,8 @@ struct Scene::Impl {
   SceneDescription description;
   std::vector<std::shared_ptr<const Shader>> shaders;  // per material
   std::shared_ptr<const BackgroundShader> background;
-  std::vector<std::uint8_t> filtered;  // per material
+  std::vector<std::uint8_t> filtered;        // per material
+  std::vector<std::uint8_t> may_stand_back;  // per mesh: of a stand-in that does not occlude
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
   std::vector<RTCScene> mesh_scenes;  // of meshes used more than once, else null
@@ -152,6 +154,7 @@ struct Scene::Impl {
   static void filter_closest(const RTCFilterFunctionNArguments* args);
   static void filter_any(const RTCFilterFunctionNArguments* args);
   Vec3f passes(const RTCFilterFunctionNArguments* args, unsigned lane, RayKind kind) const;
+  bool stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const;
 };
 
 // Splits the blockers' triangles in halves, four times, along the longest side of their centres.
@@ -235,7 +238,13 @@ void Scene::Impl::build() {
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
 
   std::vector<int> uses(description.meshes.size(), 0);
-  for (const Instance& instance : description.instances) ++uses[instance.mesh];
+  may_stand_back.assign(description.meshes.size(), 0);
+  for (const Instance& instance : description.instances) {
+    ++uses[instance.mesh];
+    if (instance.kind == ObjectKind::stand_in && !instance.occludes) {
+      may_stand_back[instance.mesh] = 1;
+    }
+  }
   mesh_scenes.assign(description.meshes.size(), nullptr);
   parts_of_mesh.resize(description.meshes.size());
 
@@ -345,10 +354,10 @@ void Scene::Impl::add_part(std::uint32_t mesh_index,
   part->positions = positions;
   rtcSetGeometryMask(geometry, mask);
   rtcSetGeometryUserData(geometry, part.get());
-  if (with_filter) {
+  if (with_filter || may_stand_back[mesh_index]) {
     rtcSetGeometryIntersectFilterFunction(geometry, filter_closest);
-    rtcSetGeometryOccludedFilterFunction(geometry, filter_any);
   }
+  if (with_filter) rtcSetGeometryOccludedFilterFunction(geometry, filter_any);
   rtcCommitGeometry(geometry);
   if (instance == none) {
     auto& inner = parts_of_mesh[mesh_index];
@@ -460,12 +469,54 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
                                               incoming, kind);
 }
 
+// Whether a camera ray passes a real surface that hides nothing: it does where it meets something
+// virtual, on either side, before anything real that hides.
+bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const {
+  const unsigned n = args->N;
+  if ((RTCRayN_mask(args->ray, n, lane) & mask_stand_in) == 0) return false;
+  std::uint32_t met = 0;
+  part(RTCHitN_geomID(args->hit, n, lane), RTCHitN_instID(args->hit, n, lane, 0), met);
+  const Instance& real = description.instances[met];
+  if (real.kind != ObjectKind::stand_in || real.occludes) return false;
+  Vec3f origin{RTCRayN_org_x(args->ray, n, lane), RTCRayN_org_y(args->ray, n, lane),
+               RTCRayN_org_z(args->ray, n, lane)};
+  Vec3f direction{RTCRayN_dir_x(args->ray, n, lane), RTCRayN_dir_y(args->ray, n, lane),
+                  RTCRayN_dir_z(args->ray, n, lane)};
+  if (RTCHitN_instID(args->hit, n, lane, 0) != RTC_INVALID_GEOMETRY_ID) {
+    // Inside an instance the ray is in the object's frame.
+    origin = transform_point(real.set_from_object, origin);
+    direction = transform_vector(real.set_from_object, direction);
+  }
+  TraceContext context(RayKind::camera, false);
+  RTCRayHit ray{};
+  ray.ray = {.org_x = origin.x,
+             .org_y = origin.y,
+             .org_z = origin.z,
+             .tnear = RTCRayN_tnear(args->ray, n, lane),
+             .dir_x = direction.x,
+             .dir_y = direction.y,
+             .dir_z = direction.z,
+             .time = 0,
+             .tfar = std::numeric_limits<float>::max(),
+             .mask = mask_virtual | mask_occluder,
+             .id = 0,
+             .flags = 0};
+  ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(scene, &context.context, &ray);
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+  part(ray.hit.geomID, ray.hit.instID[0], met);
+  return description.instances[met].kind == ObjectKind::virtual_object;
+}
+
 void Scene::Impl::filter_closest(const RTCFilterFunctionNArguments* args) {
   const auto& part = *static_cast<const Part*>(args->geometryUserPtr);
   const auto& context = *reinterpret_cast<const TraceContext*>(args->context);
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
-    if (part.impl->passes(args, i, context.kind) == Vec3f{1, 1, 1}) args->valid[i] = 0;
+    if (part.impl->passes(args, i, context.kind) == Vec3f{1, 1, 1} ||
+        part.impl->stands_back(args, i)) {
+      args->valid[i] = 0;
+    }
   }
 }
 

@@ -21,10 +21,12 @@ class Shader;
 
 enum class ObjectKind : std::uint8_t { virtual_object = 0, stand_in = 1 };
 
-// Embree ray masks.
+// Embree ray masks. What a camera ray sees of the real world is mask_stand_in; of these, those that
+// hide virtual objects are mask_occluder too.
 inline constexpr unsigned mask_virtual = 1;       // virtual objects
 inline constexpr unsigned mask_stand_in = 2;      // stand-ins, seen by camera and reflection rays
 inline constexpr unsigned mask_real_blocker = 4;  // stand-ins that block real light
+inline constexpr unsigned mask_occluder = 8;
 
 struct Instance {
   std::string name;
@@ -32,6 +34,7 @@ struct Instance {
   std::array<float, 12> set_from_object{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // rows of 3x4
   ObjectKind kind = ObjectKind::virtual_object;
   bool blocks_light = true;  // stand-ins only: shadows cast by the real thing it stands for
+  bool occludes = true;      // stand-ins only: hides virtual objects behind it
   friend bool operator==(const Instance&, const Instance&) = default;
 };
 

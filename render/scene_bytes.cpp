@@ -5,7 +5,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x31435350;  // "PSC1"
+constexpr std::uint32_t scene_magic = 0x32435350;  // "PSC2"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);
@@ -85,6 +85,7 @@ std::vector<std::byte> serialize(const SceneDescription& scene) {
     for (const float value : instance.set_from_object) out.put(value);
     out.put(instance.kind);
     out.put(static_cast<std::uint8_t>(instance.blocks_light));
+    out.put(static_cast<std::uint8_t>(instance.occludes));
   }
   return out.take();
 }
@@ -108,7 +109,7 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
     material.shader = in.get_text();
     in.get_all(material.parameters);
   }
-  for (std::size_t n = in.get_count(count_size + 4 + 12 * 4 + 2); n > 0; --n) {
+  for (std::size_t n = in.get_count(count_size + 4 + 12 * 4 + 3); n > 0; --n) {
     Instance& instance = scene.instances.emplace_back();
     instance.name = in.get_text();
     in.get(instance.mesh);
@@ -118,6 +119,7 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
       in.fail("has an unknown object kind");
     instance.kind = static_cast<ObjectKind>(kind);
     instance.blocks_light = in.get<std::uint8_t>() != 0;
+    instance.occludes = in.get<std::uint8_t>() != 0;
   }
   in.expect_end();
   return scene;

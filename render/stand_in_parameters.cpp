@@ -9,7 +9,7 @@
 namespace render {
 
 static_assert(std::is_trivially_copyable_v<StandInParameters>);
-static_assert(sizeof(StandInParameters) == 36, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandInParameters) == 32, "blocks travel: no padding, no surprise");
 
 StandInParameters stand_in_parameters(const Material& material) {
   const auto refuse = [&](const std::string& why) {

@@ -17,7 +17,6 @@ struct StandInParameters {
   std::uint32_t catches_shadow = 1;      // switches, 0 or 1
   std::uint32_t catches_reflection = 0;
   std::uint32_t catches_light = 1;  // of virtual lamps
-  std::uint32_t occludes = 1;       // hides virtual objects behind it
 };
 
 // The block in a material of the shader "stand_in". Throws std::invalid_argument, naming the
@@ -37,6 +36,15 @@ inline bool plate_tells_albedo(Vec3f plate, Vec3f irradiance) {
   const auto tells = [](float value, float e) { return value > dark_plate && pi * value <= e; };
   return std::max({plate.x, plate.y, plate.z}) < clipped_plate && tells(plate.x, irradiance.x) &&
          tells(plate.y, irradiance.y) && tells(plate.z, irradiance.z);
+}
+
+// A pixel of the plate, and the light that comes to it. Where a stand-in mirrors something virtual
+// that is darker than what was there, light goes away: but no more than the pixel has.
+inline Vec3f with_light(Vec3f plate, Vec3f added) {
+  const auto sum = [](float p, float a) {
+    return a < 0 ? std::max(p + a, std::min(p, 0.0F)) : p + a;
+  };
+  return {sum(plate.x, added.x), sum(plate.y, added.y), sum(plate.z, added.z)};
 }
 
 }  // namespace render

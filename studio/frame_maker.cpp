@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "calibrate/vignetting.h"
 #include "studio/set_scene.h"
 
 namespace studio {
@@ -80,6 +81,13 @@ calibrate::Lens lens_of(const Set& set) {
            (height - 1) / 2.0}};
 }
 
+std::shared_ptr<const calibrate::DirectionTable> directions_of(const Set& set) {
+  auto directions =
+      std::make_shared<calibrate::DirectionTable>(calibrate::make_direction_table(lens_of(set)));
+  calibrate::add_vignetting(set.camera.vignetting, *directions);
+  return directions;
+}
+
 std::optional<calibrate::Track> track_of(const Set& set) {
   if (set.camera.pose.track.empty()) return std::nullopt;
   try {
@@ -117,8 +125,7 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
       std::async(std::launch::async, [this] { return std::make_unique<LightFeed>(set_); });
   plate_ = open_plate(set_);
   track_ = track_of(set_);
-  directions_ =
-      std::make_shared<calibrate::DirectionTable>(calibrate::make_direction_table(lens_of(set_)));
+  directions_ = directions_of(set_);
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
   rate_ = rate.value_or(set_.show.fps.value_or(own));
@@ -221,8 +228,7 @@ void FrameMaker::change_set(Set set) {
   // All that may fail comes before anything is taken over.
   auto light = std::make_unique<LightFeed>(set);
   auto track = track_of(set);
-  auto directions =
-      std::make_shared<calibrate::DirectionTable>(calibrate::make_direction_table(lens_of(set)));
+  auto directions = directions_of(set);
   Set before = std::exchange(set_, std::move(set));
   try {
     build_scene();

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "calibrate/vignetting.h"
-
 namespace studio {
 namespace {
 
@@ -63,8 +61,7 @@ std::optional<calibrate::Vec3f> floor_of_plate(const capture::Image* plate,
 
 }  // namespace
 
-LightFeed::LightFeed(const Set& set)
-    : settings_(set.probe), plate_vignetting_(set.camera.vignetting) {
+LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
   if (!settings_) {
     environment_ = darkness();
     return;
@@ -99,20 +96,17 @@ LightFeed::LightFeed(const Set& set)
 
 // What light is measured by. The picture itself keeps its vignetting.
 const capture::Image* LightFeed::even_plate(const LightRequest& request) {
-  if (plate_vignetting_.empty() || request.plate == nullptr || request.directions == nullptr) {
+  if (request.plate == nullptr || request.directions == nullptr ||
+      request.directions->sensitivity.empty()) {
     return request.plate;
   }
-  const calibrate::DirectionTable& directions = *request.directions;
-  if (evening_.size() != directions.z.size()) {
-    evening_.resize(directions.z.size());
-    for (std::size_t i = 0; i < evening_.size(); ++i) {
-      const double angle_rad =
-          std::atan2(std::hypot(directions.x[i], directions.y[i]), directions.z[i]);
-      evening_[i] = static_cast<float>(1 / calibrate::sensitivity(plate_vignetting_, angle_rad));
+  evened_ = *request.plate;
+  for (int y = 0; y < evened_.height; ++y) {
+    for (int x = 0; x < evened_.width; ++x) {
+      const float sensitivity = request.directions->sensitivity[request.directions->index(y, x)];
+      for (int c = 0; c < 3; ++c) evened_.at(y, x, c) /= sensitivity;
     }
   }
-  evened_ = *request.plate;
-  for (std::size_t i = 0; i < evened_.pixels.size(); ++i) evened_.pixels[i] *= evening_[i / 3];
   return &evened_;
 }
 

@@ -54,9 +54,7 @@ class LightFeed {
   bool follow_match(const LightRequest& request);
 
   std::optional<ProbeSettings> settings_;
-  std::vector<double> plate_vignetting_;
-  std::vector<float> evening_;  // per pixel of the plate: 1 / the lens's sensitivity; empty = even
-  capture::Image evened_;       // the present plate times that
+  capture::Image evened_;                  // the present plate without its lens's vignetting
   const capture::Image* plate_ = nullptr;  // as a lens without vignetting would take it
   std::unique_ptr<ProbeSource> source_;
   std::unique_ptr<render::ProbeMapper> mapper_;  // null = latitude-longitude

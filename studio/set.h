@@ -124,6 +124,7 @@ struct StandInSettings {
   float reflectance = 0.04F;
   float roughness = 0.3F;
   bool blocks_light = false;
+  bool occludes = true;
 };
 
 // A virtual lamp: a point that shines to all sides, or as a small disc that faces somewhere.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <stdexcept>
 #include <vector>
 
@@ -16,6 +17,19 @@ TEST(Sensitivity, IsOneOnTheAxisAndEverywhereForAnEvenLens) {
 
 TEST(Sensitivity, AddsEvenPowersOfTheAngle) {
   EXPECT_DOUBLE_EQ(sensitivity(std::vector<double>{-0.3, 0.1}, 0.5), 1 - 0.3 * 0.25 + 0.1 * 0.0625);
+}
+
+TEST(AddVignetting, TellsTheSensitivityOfEveryPixel) {
+  DirectionTable table = make_direction_table({"pinhole", 9, 5, {4, 4, 4, 2}});
+  const std::vector<double> terms{-0.3, 0.1};
+  add_vignetting(terms, table);
+  EXPECT_EQ(table.sensitivity[table.index(2, 4)], 1);
+  const double angle_rad = std::atan(0.5);  // two pixels off the axis
+  for (const std::size_t i : {table.index(0, 4), table.index(2, 2), table.index(2, 6)}) {
+    EXPECT_FLOAT_EQ(table.sensitivity[i], static_cast<float>(sensitivity(terms, angle_rad)));
+  }
+  add_vignetting({}, table);
+  EXPECT_TRUE(table.sensitivity.empty());
 }
 
 TEST(CheckVignetting, RefusesALensThatIsBlindBeforeItsRim) {

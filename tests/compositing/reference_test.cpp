@@ -152,13 +152,12 @@ TEST(RenderReference, ShowsThePlateThroughThinGlass) {
 }
 
 TEST(RenderReference, HidesVirtualObjectsBehindStandInsUnlessTheyDoNotOcclude) {
-  for (const std::uint32_t occludes : {1U, 0U}) {
-    StandInParameters parameters;
-    parameters.occludes = occludes;
-    Floor floor(3, parameters);
+  for (const bool occludes : {true, false}) {
+    Floor floor(3);
+    floor.description.instances[0].occludes = occludes;
     floor.add(make_square(2, -1));
     const Environment even = make_even_environment(1, 16);
-    EXPECT_EQ(floor.middle(floor.render(even, 16), 3), occludes != 0 ? 0 : 1);
+    EXPECT_EQ(floor.middle(floor.render(even, 16), 3), occludes ? 0 : 1);
   }
 }
 

@@ -47,6 +47,7 @@ SceneDescription made_scene() {
   instance.name = "thing";
   instance.kind = ObjectKind::stand_in;
   instance.blocks_light = false;
+  instance.occludes = false;
   scene.instances.push_back(instance);
   scene.version = 9;
   return scene;

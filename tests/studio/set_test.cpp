@@ -95,6 +95,7 @@ albedo = [0.1, 0.2, 0.3]
 reflectance = 0.05
 roughness = 0.1
 blocks_light = true
+occludes = false
 [[lamp]]
 position = [0, 0, 2]
 facing = [0, 0, -0.9]
@@ -146,6 +147,7 @@ timecode = "10:00:00:00"
   EXPECT_FALSE(set.stand_ins[0].catches_shadow);
   EXPECT_TRUE(set.stand_ins[0].catches_reflection);
   EXPECT_TRUE(set.stand_ins[0].blocks_light);
+  EXPECT_FALSE(set.stand_ins[0].occludes);
   ASSERT_EQ(set.lamps.size(), 1U);
   EXPECT_FLOAT_EQ(set.lamps[0].intensity[2], 3);
   EXPECT_EQ(set.lamps[0].facing, (calibrate::Vec3{0, 0, -1}));
