@@ -131,8 +131,7 @@ void label_points(Svg& svg,
     // Where variants crowd, the front's names and the peers' tell the others'.
     const bool strong = p->on_front || p->by_default;
     if (p->label.empty() || (!p->variant.empty() && !strong && !p->peer)) continue;
-    const std::string label = p->by_default ? p->label + ": default" : p->label;
-    const double w = text_width(label, size);
+    const double w = text_width(p->label, size);
     const double px = x(p->time_ms);
     const double py = y(p->error);
     // Below left of the front is empty by its nature, so its own names go there.
@@ -148,7 +147,7 @@ void label_points(Svg& svg,
       if (!inside || std::ranges::any_of(taken, [&](const Box& b) { return b.meets(box); })) {
         continue;
       }
-      svg.text(tx, ty, label, {size, Anchor::start, strong ? ink : faint_ink, strong});
+      svg.text(tx, ty, p->label, {size, Anchor::start, strong ? ink : faint_ink, strong});
       taken.push_back(box);
       break;
     }

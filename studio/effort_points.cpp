@@ -32,16 +32,23 @@ int whole(const Json& settings, const char* name, int low, int high) {
   return value;
 }
 
+// As short as a float tells it: .95 and not .949999988.
+double as_written(float value) { return std::round(static_cast<double>(value) * 1e6) * 1e-6; }
+
 EffortPoint point_of(const Json& point, render::Effort effort) {
   const Json& settings = point.at("settings");
-  effort.aa_samples = whole(settings, "aa_samples", 1, 64);
+  effort.aa_samples = whole(settings, "aa_samples", 1, 256);
+  effort.aa_tolerance = settings.at("aa_tolerance").get<float>();
+  effort.glint_contrast = settings.at("glint_contrast").get<float>();
   effort.light_samples = whole(settings, "light_samples", 1, 4096);
   effort.interleave = whole(settings, "interleave", 1, 4);
+  effort.adaptive_visibility = settings.at("adaptive_visibility").get<bool>();
   effort.accuracy = settings.at("accuracy").get<float>();
   const EffortPoint result{effort, point.at("time_ms").get<double>(),
                            point.at("error").get<double>()};
   const bool good = effort.interleave != 3 && effort.accuracy >= 0 && effort.accuracy <= 1 &&
-                    result.time_ms > 0 && result.error >= 0;
+                    effort.aa_tolerance >= 0 && effort.glint_contrast >= 0 && result.time_ms > 0 &&
+                    result.error >= 0;
   if (!good) throw std::runtime_error("a point's figures cannot be");
   return result;
 }
@@ -49,12 +56,13 @@ EffortPoint point_of(const Json& point, render::Effort effort) {
 }  // namespace
 
 std::vector<std::pair<std::string, ChartValue>> settings_of(const render::Effort& effort) {
-  // As short as a float tells it: .95 and not .949999988.
-  const double accuracy = std::round(static_cast<double>(effort.accuracy) * 1e6) * 1e-6;
   return {{"aa_samples", static_cast<double>(effort.aa_samples)},
+          {"aa_tolerance", as_written(effort.aa_tolerance)},
+          {"glint_contrast", as_written(effort.glint_contrast)},
           {"light_samples", static_cast<double>(effort.light_samples)},
           {"interleave", static_cast<double>(effort.interleave)},
-          {"accuracy", accuracy}};
+          {"adaptive_visibility", effort.adaptive_visibility},
+          {"accuracy", as_written(effort.accuracy)}};
 }
 
 std::string effort_points_file(const std::string& set_path) {

@@ -190,9 +190,9 @@ class LightsChart {
                   {"visibility", std::string(visibility.name)},
                   {"adaptive_visibility", visibility.adaptive},
                   {"interleave", static_cast<double>(visibility.interleave)}};
-    p.label = fmt::format("{}", settings.count);
     p.by_default =
         settings == LightTableSettings{default_lights} && p.variant == adaptive_grid.name;
+    p.label = fmt::format("{}{}", settings.count, p.by_default ? ": default" : "");
     const capture::Image a = shot_.render(light_of(noisy_[0], settings), visibility);
     const capture::Image b = shot_.render(light_of(noisy_[1], settings), visibility);
     p.figures = {{"flicker", difference(a, b, truth_.mask)},

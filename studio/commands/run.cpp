@@ -43,10 +43,10 @@ void choose_effort(const RunOptions& options, Set& set, Console& console) {
       options.fps ? most_accurate_at(points, *options.fps) : fastest_within(points, *options.error);
   const auto& [effort, time_ms, error] = choice.point;
   const std::string chosen = fmt::format(
-      "{} samples at edges, {} lights, interleave {}, accuracy {:.3g}: {:.1f} ms a frame at error "
-      "{:.2f} %",
-      effort.aa_samples, effort.light_samples, effort.interleave, effort.accuracy, time_ms,
-      error * 100);
+      "{} rays at edges and glints (contrast {:.3g}, tolerance {:.3g}), {} lights, interleave {}, "
+      "accuracy {:.3g}: {:.1f} ms a frame at error {:.2f} %",
+      effort.aa_samples, effort.glint_contrast, effort.aa_tolerance, effort.light_samples,
+      effort.interleave, effort.accuracy, time_ms, error * 100);
   if (choice.holds) {
     console.say(chosen);
   } else if (options.fps) {

@@ -213,6 +213,9 @@ TEST_F(Runs, TakeTheEffortThatTheChartOfTheirSetFoundBest) {
   for (const char* name : {"aa_samples", "light_samples", "interleave"}) {
     EXPECT_EQ(taken[name].get<int>(), (*best)["settings"][name].get<int>()) << name;
   }
+  for (const char* name : {"aa_tolerance", "glint_contrast", "accuracy"}) {
+    EXPECT_NEAR(taken[name].get<double>(), (*best)["settings"][name].get<double>(), 1e-6) << name;
+  }
   const Outcome hopeless = run("run " + set + " --frames 1 --error 0");
   EXPECT_EQ(hopeless.status, 0);
   EXPECT_THAT(hopeless.err, HasSubstr("no measured setting is within 0 %"));

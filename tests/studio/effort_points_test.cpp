@@ -21,6 +21,10 @@ using testing::ThrowsMessage;
 EffortPoint point(int lights, double time_ms, double error) {
   EffortPoint p{{}, time_ms, error};
   p.effort.light_samples = lights;
+  p.effort.aa_samples = 4 * lights / 16;
+  p.effort.aa_tolerance = 1.6F / static_cast<float>(lights);
+  p.effort.glint_contrast = 0.3F;
+  p.effort.adaptive_visibility = lights < 256;
   return p;
 }
 
@@ -97,7 +101,8 @@ TEST_F(EffortPointsFile, IsRefusedWithTheCommandThatMakesItAnew) {
   const std::string here = "\"machine\": {\"cpu\": \"" + this_machine().cpu +
                            "\", \"threads\": " + std::to_string(this_machine().threads) + "}";
   const std::string settings =
-      "\"settings\": {\"aa_samples\": 4, \"light_samples\": 99999, \"interleave\": 1, "
+      "\"settings\": {\"aa_samples\": 4, \"aa_tolerance\": 0.1, \"glint_contrast\": 0.1, "
+      "\"light_samples\": 99999, \"interleave\": 1, \"adaptive_visibility\": true, "
       "\"accuracy\": 0.95}";
   for (const auto& [content, reason] : {
            std::pair<std::string, std::string>{"{", "is no chart of a set"},
