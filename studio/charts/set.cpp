@@ -62,8 +62,7 @@ std::vector<Setting> dial(const render::Effort& base) {
                             {4, 0.1F, 0.2F, 64, 1, true, 0.95F},
                             {16, 0.05F, 0.1F, 64, 1, true, 0.95F},
                             {16, 0.03F, 0.05F, 128, 1, false, 0.98F},
-                            {64, 0.02F, 0.03F, 128, 1, false, 0.99F},
-                            {64, 0.02F, 0.02F, 256, 1, false, 0.995F}};
+                            {64, 0.02F, 0.03F, 128, 1, false, 0.99F}};
   std::vector<Setting> settings;
   for (const Step& step : steps) {
     render::Effort effort = base;
@@ -109,8 +108,11 @@ std::vector<Setting> settings_to_measure(const render::Effort& base, bool quick)
        {0.0F, 0.2F, 0.1F, 0.02F});
   vary(all, "contrast of glints", base, &Effort::glint_contrast, {0.0F, 0.4F, 0.2F, 0.05F, 0.02F});
   vary(all, "lights", base, &Effort::light_samples, {16, 32, 128, 256});
-  vary(all, "interleave", base, &Effort::interleave, {2, 4});
-  vary(all, "adaptive grid", base, &Effort::adaptive_visibility, {false});
+  vary(all, "shadow rays", base, &Effort::interleave, {2, 4});
+  if (base.adaptive_visibility) {
+    all.push_back({"shadow rays", "every pixel", base});
+    all.back().effort.adaptive_visibility = false;
+  }
   vary(all, "accuracy", base, &Effort::accuracy, {0.8F, 0.9F, 0.98F, 0.99F});
   return all;
 }
