@@ -58,9 +58,9 @@ std::vector<Setting> dial(const render::Effort& base) {
   constexpr Step steps[] = {{1, 0, 0, 16, 4, true, 0.9F},
                             {1, 0, 0, 32, 2, true, 0.9F},
                             {4, 0, 0, 32, 1, true, 0.95F},
-                            {4, 0.2F, 0.4F, 32, 1, true, 0.95F},
-                            {4, 0.1F, 0.2F, 64, 1, true, 0.95F},
-                            {16, 0.05F, 0.1F, 64, 1, true, 0.95F},
+                            {4, 0.4F, 0.4F, 32, 1, true, 0.95F},
+                            {4, 0.2F, 0.2F, 64, 1, true, 0.95F},
+                            {16, 0.1F, 0.1F, 64, 1, true, 0.95F},
                             {16, 0.03F, 0.05F, 128, 1, false, 0.98F},
                             {64, 0.02F, 0.03F, 128, 1, false, 0.99F}};
   std::vector<Setting> settings;
@@ -105,7 +105,7 @@ std::vector<Setting> settings_to_measure(const render::Effort& base, bool quick)
                        [&](const Setting& s) { return s.effort != base; });
   vary(all, "rays at edges and glints", base, &Effort::aa_samples, {1, 4, 64});
   vary(all, "tolerance of uncertain pixels", base, &Effort::aa_tolerance,
-       {0.0F, 0.2F, 0.1F, 0.02F});
+       {0.0F, 0.4F, 0.2F, 0.1F, 0.05F, 0.02F});
   vary(all, "contrast of glints", base, &Effort::glint_contrast, {0.0F, 0.4F, 0.2F, 0.05F, 0.02F});
   vary(all, "lights", base, &Effort::light_samples, {16, 32, 128, 256});
   vary(all, "shadow rays", base, &Effort::interleave, {2, 4});
