@@ -270,17 +270,29 @@ class VisibilityFinder {
           });
   }
 
-  // The pixel that stands for a block: another one for each light.
-  static int offset4(std::uint32_t light) {
-    const std::uint32_t o = (light * 7 + light / 16) & 15;
-    return bit_of(static_cast<int>(o & 3), static_cast<int>(o >> 2));
+  // The pixel that stands for a block: another one for each light. Where blocks are looked at more
+  // closely, it is an outermost one at the border of the cell, so that no shadow comes in unseen
+  // from the cell beside, and the two cells agree where they meet.
+  int first_of_block(std::uint32_t light, int word, int bx) const {
+    const auto any = static_cast<int>((light * 7 + light / 16) & 15);
+    if (block_ == 4) return bit_of(bx + (any & 3), any >> 2);
+    return bit_of(bx + outermost(bx / 4, any & 3), outermost(word, any >> 2));
   }
+  // The same block's pixel towards the middle of the cell: thin shadows of bright light slip
+  // through where blocks' pixels are far apart.
+  static int second_of_block(std::uint32_t light, int word, int bx) {
+    const auto any = static_cast<int>((light * 7 + light / 16) & 15);
+    return bit_of(bx + outermost(3 - bx / 4, any & 3), outermost(3 - word, any >> 2));
+  }
+  // Of four pixels, in the first to last of four blocks.
+  static int outermost(int block, int any) { return block == 0 ? 0 : block == 3 ? 3 : any; }
   static int offset2(std::uint32_t light) {
     return bit_of(static_cast<int>(light & 1), static_cast<int>((light >> 1) & 1));
   }
 
   void test_first(std::uint32_t first, std::size_t i) {
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    const bool compact = context_.table->lights[light].compact != 0;
     for (int word = 0; word < 4; ++word) {
       const auto wi = static_cast<std::size_t>(word);
       const std::uint64_t lit = w_.lit[i][wi];
@@ -289,27 +301,13 @@ class VisibilityFinder {
         for (int bx = 0; bx < cell_size; bx += 4) {
           const std::uint64_t bits = block4 << bx;
           if ((lit & w_.same4[wi] & bits) != bits) continue;
-          test(first, i, word, offset4(light) + bx);
-          if (looks_outwards(light)) test_border(first, i, word, bx);
+          test(first, i, word, first_of_block(light, word, bx));
+          if (compact && block_ < 4) test(first, i, word, second_of_block(light, word, bx));
           rest &= ~bits;
         }
       }
       test_pixels(first, i, word, rest);
     }
-  }
-
-  // Bright light has sharp shadows, and one that comes in from the next cell by less than a block
-  // is seen by none of this cell's blocks, unless they look at the cell's border too.
-  bool looks_outwards(std::uint32_t light) const {
-    return block_ < 4 && context_.table->lights[light].compact != 0;
-  }
-
-  // Tests a pixel where a block touches the border of the cell.
-  void test_border(std::uint32_t first, std::size_t i, int word, int bx) {
-    constexpr int last = cell_size - 4;  // block's column
-    const int x = bx == 0 ? 0 : bx == last ? cell_size - 1 : bx + 1;
-    const int y = word == 0 ? 0 : word == 3 ? 3 : 1;
-    if (bx == 0 || bx == last || word == 0 || word == 3) test(first, i, word, bit_of(x, y));
   }
 
   // Tests pixels one by one, or one of each smooth 2x2 block.
@@ -331,7 +329,7 @@ class VisibilityFinder {
     for (; pixels != 0; pixels &= pixels - 1) test(first, i, word, std::countr_zero(pixels));
   }
 
-  // Where a block's pixels disagree with each other or with those of the blocks around it, looks
+  // Where what was tested of a block disagrees in itself or with the blocks around it, looks
   // closer.
   void refine(std::uint32_t first, std::size_t i) {
     if (!coarse_) return;
@@ -341,8 +339,7 @@ class VisibilityFinder {
       const auto wi = static_cast<std::size_t>(by);
       for (int bx = 0; bx < 4; ++bx) {
         const std::uint64_t bits = block4 << (4 * bx);
-        if ((w_.lit[i][wi] & w_.same4[wi] & bits) != bits) continue;
-        whole |= 1U << (by * 4 + bx);
+        if ((w_.lit[i][wi] & w_.same4[wi] & bits) == bits) whole |= 1U << (by * 4 + bx);
         const std::uint64_t tested = w_.tested[i][wi] & bits;
         if (w_.seen[i][wi] & tested) sees |= 1U << (by * 4 + bx);
         if (~w_.seen[i][wi] & tested) hidden |= 1U << (by * 4 + bx);

@@ -78,9 +78,9 @@ struct CellVisibility {
 };
 
 // Finds that for the pixels of a cell, and adds up their light: open and lost. Shadow rays go to
-// one pixel of every 4x4 block of a smooth surface first, another for each light, and for compact
-// lights to the cell's border; where blocks disagree with their neighbours or in themselves, to
-// their 2x2 blocks or pixels, as the effort's interleave asks.
+// one pixel of every 4x4 block of a smooth surface first, another for each light, but an outermost
+// one at the cell's border; where blocks disagree with their neighbours, to their 2x2 blocks or
+// pixels, as the effort's interleave asks.
 void gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,

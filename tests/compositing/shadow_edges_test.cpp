@@ -1,6 +1,9 @@
 // Where the shadows of sharp light lie, whatever the kernel's cells.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <string>
+
 #include "made_shot.h"
 
 namespace compositing {
@@ -47,6 +50,34 @@ TEST(RenderFrame, CastsTheSunsShadowAcrossTheBordersOfCells) {
       EXPECT_LE(wrong, slope > 0 ? 6U : 0U) << "row " << row << ", slope " << slope;
     }
   }
+}
+
+TEST(RenderFrame, MakesSoftShadowsWithoutSeamsBetweenCells) {
+  MadeShot shot = made_shot(192, 144, made_scene(), 256);
+  render::FrameResult adaptive, all;
+  render_frame(shot.inputs(), shot.job, shot.plate, adaptive);
+  shot.job.effort.adaptive_visibility = false;
+  render_frame(shot.inputs(), shot.job, shot.plate, all);
+  // The error's rms at the borders of cells, and inside them.
+  double border = 0, inside = 0;
+  int border_pixels = 0, inside_pixels = 0;
+  for (int y = 0; y < 144; ++y) {
+    for (int x = 0; x < 192; ++x) {
+      if (all.rgba.pixels[all.rgba.index(y, x, 3)] != 0) continue;
+      const double error =
+          static_cast<double>(float_from_half(adaptive.matte.pixels[adaptive.matte.index(y, x)])) -
+          static_cast<double>(float_from_half(all.matte.pixels[all.matte.index(y, x)]));
+      const bool at_border = y % 16 == 0 || y % 16 == 15 || x % 16 == 0 || x % 16 == 15;
+      (at_border ? border : inside) += error * error;
+      ++(at_border ? border_pixels : inside_pixels);
+    }
+  }
+  border = std::sqrt(border / border_pixels);
+  inside = std::sqrt(inside / inside_pixels);
+  EXPECT_LT(inside, 0.0015);
+  EXPECT_LT(border, 1.6 * inside);
+  RecordProperty("border", std::to_string(border));
+  RecordProperty("inside", std::to_string(inside));
 }
 
 }  // namespace
