@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "render/light_table.h"
+#include "render/light_follower.h"
 #include "render/made_studio.h"
 #include "render/reference.h"
 
@@ -120,8 +120,11 @@ PhotographTrial::PhotographTrial(const std::string& set_file,
                        {.samples = settings.photograph_samples, .seed = seed++}),
       strength);
   true_light_.seen.assign(true_light_.radiance.pixels.size() / 3, 1);
-  smooth_for_reflections(true_light_);
-  true_table_ = make_light_table(true_light_, {frame_.job.effort.light_samples});
+  render::LightFollower follower;
+  render::LightFollowerSettings following;
+  following.table.count = frame_.job.effort.light_samples;
+  true_table_ = follower.follow(true_light_, following);
+  smooth_for_reflections(true_light_, follower.compact_texels());
   true_table_.lamps = frame_.job.lights.lamps;
 
   progress(0.95, "the matte");
@@ -148,7 +151,7 @@ capture::Image PhotographTrial::render(const Truths& truths,
   render::FrameJob job = frame_.job;
   render::FrameInputs inputs = frame_.inputs();
   if (truths.light) {
-    inputs.environment = &true_light_;
+    inputs.environment = inputs.planned = &true_light_;
     job.lights = true_table_;
   }
   if (!truths.calibration) {
