@@ -13,7 +13,8 @@ namespace {
 
 constexpr float display_limit = 4;  // brighter light than this, in display white, looks alike
 constexpr float plate_contrast =
-    0.4F;  // by which virtual things are taken to differ from the plate
+    0.4F;                         // by which virtual things are taken to differ from the plate
+constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
 constexpr Scene::Surface no_hit{~0U, ~0U};
 
 float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
@@ -109,7 +110,9 @@ void CellBaker::find_glints() {
   if (!(least > 0)) return;
   const auto compare = [&](std::size_t a, std::size_t b) {
     if (!is_inside(a) || !is_inside(b)) return;
-    if (largest(abs(clipped(samples_[a].added) - clipped(samples_[b].added))) > least) {
+    const Vec3f shown_a = clipped(samples_[a].added), shown_b = clipped(samples_[b].added);
+    const float brightest = std::clamp(std::max(largest(shown_a), largest(shown_b)), darkest, 1.0F);
+    if (largest(abs(shown_a - shown_b)) > least * std::sqrt(brightest)) {
       for (const std::size_t k : {a, b}) {
         if (edge_[k] != Edge::shadow) edge_[k] = Edge::glint;
       }

@@ -21,13 +21,14 @@ struct Effort {
   // of them, up to 256; 0 = aa_samples must do.
   float aa_tolerance = 0.1F;
   // Radiance by which the virtual light of neighbouring pixels may differ before they are sampled
-  // like edges; 0 = it never matters.
+  // like edges, where it is 1 or more; below, by the root of the radiance less. 0 = it never
+  // matters.
   float glint_contrast = 0.1F;
   int light_samples = 64;  // lights in the table
   int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
   bool cull_lights = true;          // skip shadow rays that no object can block
-  float accuracy = 0.95F;      // rays whose share of the pixel falls below 1 - accuracy are cut
+  float accuracy = 0.97F;      // rays whose share of the pixel falls below 1 - accuracy are cut
   int max_depth = 8;           // safety net; counted when hit
   int tile_size = 64;          // pixels, a multiple of 16
   int progressive_sample = 0;  // samples accumulated so far (later issues)
