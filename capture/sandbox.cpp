@@ -25,6 +25,12 @@
 #include <system_error>
 #include <vector>
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define PLATELIGHT_SANITIZED 1
+#else
+#define PLATELIGHT_SANITIZED 0
+#endif
+
 namespace capture {
 namespace {
 
@@ -41,7 +47,7 @@ void set_limit(__rlimit_resource resource, std::size_t value, const char* what) 
 // fails with EPERM, so that a decoder that was taken over can neither open a file nor start
 // anything.
 void allow_only_computing() {
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__)
+#if defined(__x86_64__) && !PLATELIGHT_SANITIZED
   constexpr std::array allowed{
       SYS_read,        SYS_pread64,   SYS_write,          SYS_writev,
       SYS_lseek,       SYS_fstat,     SYS_newfstatat,     SYS_close,
@@ -93,8 +99,7 @@ struct SpawnPlan {
 void confine_this_process(const SandboxLimits& limits) {
   set_limit(RLIMIT_CORE, 0, "core files");
   set_limit(RLIMIT_CPU, static_cast<std::size_t>(limits.processor_time.count()), "processor time");
-#if !defined( \
-    __SANITIZE_ADDRESS__)  // the sanitizer's shadow memory alone takes terabytes of address space
+#if !PLATELIGHT_SANITIZED  // a sanitizer's shadow memory alone takes terabytes of address space
   set_limit(RLIMIT_AS, limits.memory_bytes, "memory");
 #endif
   if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0) {

@@ -99,7 +99,7 @@ TEST(SandboxedChild, SaysWhichProgramDoesNotStart) {
 }
 
 TEST(ConfineThisProcess, LeavesComputingButNoFilesAndNoMemoryBeyondTheLimit) {
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "the sanitizer needs what the sandbox takes";
 #endif
   // In a process of its own, which answers by its exit status.

@@ -18,8 +18,8 @@ std::atomic<long> allocations{0};
 thread_local bool counting = false;
 }  // namespace
 
-// Counted, to show that nothing allocates in the tile loop; address sanitizers want their own.
-#if !defined(__SANITIZE_ADDRESS__)
+// Counted, to show that nothing allocates in the tile loop; sanitizers want their own.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // Not inlined, so that the compiler does not see malloc behind new.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   if (counting) ++allocations;
@@ -367,8 +367,8 @@ TEST(RenderFrame, NearsTheReferenceTheMoreEffortItTakes) {
 }
 
 TEST(RenderTile, DoesNotAllocate) {
-#if defined(__SANITIZE_ADDRESS__)
-  GTEST_SKIP() << "an address sanitizer allocates by itself";
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer allocates by itself";
 #endif
   const MadeShot shot = made_shot(128, 96, made_scene());
   const render::FrameContext context = make_frame_context(shot.inputs(), shot.job);
