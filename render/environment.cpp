@@ -125,9 +125,8 @@ class MapSampler {
              bool diffused = false)
       : env_(env),
         samples_(samples),
-        diffused_(diffused && !env.diffused.empty()
-                      ? static_cast<std::uint32_t>(env.halved.size() + env.smoothed.size())
-                      : 0) {}
+        diffused_(diffused ? static_cast<std::uint32_t>(env.halved.size() + env.smoothed.size())
+                           : 0) {}
 
   std::size_t count() const { return count_; }
 

@@ -1,6 +1,9 @@
 // Environments as bytes.
 #include "render/environment_bytes.h"
 
+#include <algorithm>
+#include <vector>
+
 #include "render/bytes.h"
 
 namespace render {
@@ -61,6 +64,15 @@ Environment parse_environment(std::span<const std::byte> bytes) {
     }
   }
   in.expect_end();
+  // Places are found by the sizes of the one and looked up in the other.
+  if (!environment.diffused.empty()) {
+    if (environment.smoothed.empty()) in.fail("has diffused levels alone");
+    std::vector<int> heights{environment.smoothed[0].height};
+    for (const capture::Image& level : environment.halved) heights.push_back(level.height);
+    if (!std::ranges::equal(environment.diffused, heights, {}, &capture::Image::height)) {
+      in.fail("has diffused levels of other sizes than its own");
+    }
+  }
   return environment;
 }
 

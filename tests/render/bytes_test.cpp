@@ -61,6 +61,7 @@ Environment made_environment() {
   env.smoothed = {env.radiance};
   env.halved = {capture::make_image(1, 2, 3)};
   env.halved[0].at(0, 1, 1) = 3;
+  env.diffused = {env.radiance, env.halved[0]};
   env.compact_apart = true;
   return env;
 }
@@ -92,7 +93,21 @@ TEST(Serialize, KeepsAnEnvironment) {
   EXPECT_EQ(b.smoothed[0].pixels, a.smoothed[0].pixels);
   ASSERT_EQ(b.halved.size(), 1U);
   EXPECT_EQ(b.halved[0].pixels, a.halved[0].pixels);
+  ASSERT_EQ(b.diffused.size(), 2U);
+  EXPECT_EQ(b.diffused[1].pixels, a.diffused[1].pixels);
   EXPECT_TRUE(b.compact_apart);
+}
+
+TEST(ParseEnvironment, RefusesDiffusedLevelsOfOtherSizes) {
+  Environment shorter = made_environment();
+  shorter.diffused.pop_back();
+  EXPECT_THROW(parse_environment(serialize(shorter)), std::runtime_error);
+  Environment smaller = made_environment();
+  smaller.diffused[0] = smaller.halved[0];
+  EXPECT_THROW(parse_environment(serialize(smaller)), std::runtime_error);
+  Environment alone = made_environment();
+  alone.smoothed.clear();
+  EXPECT_THROW(parse_environment(serialize(alone)), std::runtime_error);
 }
 
 // Every prefix, and thousands of changed bytes: refused, or read as something of the same kind, but

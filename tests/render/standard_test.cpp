@@ -84,6 +84,23 @@ TEST(StandardWeights, NeverPassOnMoreThanArrives) {
   }
 }
 
+// The integral of a density over the upper hemisphere.
+template <class Density>
+double over_hemisphere(Density density) {
+  constexpr int steps = 400;
+  double sum = 0;
+  for (int j = 0; j < steps; ++j) {
+    for (int i = 0; i < 4 * steps; ++i) {
+      const double z = (j + 0.5) / steps;
+      const double phi = 2 * std::numbers::pi * (i + 0.5) / (4 * steps);
+      const double r = std::sqrt(1 - z * z);
+      sum += density(Vec3f{static_cast<float>(r * std::cos(phi)),
+                           static_cast<float>(r * std::sin(phi)), static_cast<float>(z)});
+    }
+  }
+  return sum * 2 * std::numbers::pi / (4.0 * steps * steps);
+}
+
 TEST(SampleLobe, KeepsAllItsEnergyAboveTheSurface) {
   Random random(3);
   for (const float roughness : {render::mirror_roughness, 0.1F, 0.3F, 0.6F, 1.0F}) {
@@ -104,22 +121,11 @@ TEST(SampleLobe, KeepsAllItsEnergyAboveTheSurface) {
       }
       // The same share by integrating the density over the hemisphere.
       if (roughness < 0.3F) continue;
-      double integral = 0;
-      double share = 0;
-      const int steps = 400;
-      for (int j = 0; j < steps; ++j) {
-        for (int i = 0; i < 4 * steps; ++i) {
-          const double z = (j + 0.5) / steps;
-          const double phi = 2 * std::numbers::pi * (i + 0.5) / (4 * steps);
-          const double r = std::sqrt(1 - z * z);
-          const Vec3f l{static_cast<float>(r * std::cos(phi)),
-                        static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
-          const double piece = render::lobe_density(normal, view, roughness, l) * 2 *
-                               std::numbers::pi / (4.0 * steps * steps);
-          integral += piece;
-          if (l.x < 0) share += piece;
-        }
-      }
+      const auto density = [&](Vec3f l) {
+        return render::lobe_density(normal, view, roughness, l);
+      };
+      const double integral = over_hemisphere(density);
+      const double share = over_hemisphere([&](Vec3f l) { return l.x < 0 ? density(l) : 0.0F; });
       EXPECT_NEAR(integral, 1, 5e-3) << "roughness " << roughness << ", cosine " << cosine;
       EXPECT_NEAR(inside / count, share, 0.015)
           << "roughness " << roughness << ", cosine " << cosine;
@@ -143,19 +149,8 @@ TEST(BlurredLobe, KeepsAllItsEnergyAboveTheTriangle) {
     const Vec3f normal{std::sin(lean_rad), 0, std::cos(lean_rad)};
     for (const float blur_rad : {0.0F, 0.5F}) {
       const Vec3f view = normalize(Vec3f{-0.5F, 0.6F, 0.8F});
-      double integral = 0;
-      const int steps = 300;
-      for (int j = 0; j < steps; ++j) {
-        for (int i = 0; i < 4 * steps; ++i) {
-          const double z = (j + 0.5) / steps;
-          const double phi = 2 * std::numbers::pi * (i + 0.5) / (4 * steps);
-          const double r = std::sqrt(1 - z * z);
-          const Vec3f l{static_cast<float>(r * std::cos(phi)),
-                        static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
-          integral += render::blurred_lobe(normal, triangle, view, 0.6F, blur_rad, l);
-        }
-      }
-      integral *= 2 * std::numbers::pi / (4.0 * steps * steps);
+      const double integral = over_hemisphere(
+          [&](Vec3f l) { return render::blurred_lobe(normal, triangle, view, 0.6F, blur_rad, l); });
       EXPECT_NEAR(integral, 1, 0.01) << "lean " << lean_rad << ", blur " << blur_rad;
     }
   }
