@@ -26,6 +26,13 @@ constexpr double largest_bright_share = 0.04;
 constexpr double error_of_edges = 0.25;
 // Lights of very wide regions (fewer than about eight in all) err even without shadows.
 constexpr double error_of_size = 2;
+// Half a disc over the horizon, in terms of the whole disc's irradiance and radius; and how much it
+// counts, beside edges.
+constexpr double irradiance_of_rim = 0.2;
+constexpr double error_of_rim = 4;
+// More irradiance than this looks the same: a surface of albedo 1/2 is then four times as bright as
+// display white, where errors of pictures are cut off as well.
+constexpr double irradiance_that_shows = 4 * pi / 0.5;
 
 // Energy and first moment: luminance times (1, direction).
 struct Moments {
@@ -368,6 +375,32 @@ DirectionalLight make_light(const RegionLight& region) {
   return light;
 }
 
+namespace {
+
+// Squared error of surfaces behind edges that a light makes which stands for a source of irradiance
+// e, in terms of e^2 / 12: where the truth is a ramp, min(e t, limit) over 0 < t < 1, the light
+// makes a step in its middle. A source far beyond the limit shows nearly all of its penumbra fully
+// lit, so that half of it is wrong by all of the limit.
+double squared_error_of_edge(double e, double limit) {
+  const double s = limit / e;
+  if (s >= 1) return e * e;
+  const double dark_half = s < 0.5 ? s * s / 2 - 2 * s * s * s / 3 : 1.0 / 24;
+  const double bright_half = s < 0.5 ? 0 : (s - 0.5) * (s - 0.5) * (s - 0.5) / 3;
+  return 12 * e * e * (dark_half + bright_half);
+}
+
+// The same of all that a light of a radius makes, in a sum over lights.
+double squared_error(double e, double radius_rad) {
+  constexpr double limit = irradiance_that_shows;
+  // Surfaces that face away from the source's middle, but not from its rim.
+  const double rim = std::min(irradiance_of_rim * e * radius_rad, limit);
+  const double size = std::min(e * radius_rad * radius_rad, limit);
+  return (squared_error_of_edge(e, limit) + error_of_rim * rim * rim) * radius_rad +
+         error_of_size * size * size;
+}
+
+}  // namespace
+
 float estimate_light_error(std::span<const DirectionalLight> lights, int map_height) {
   // The map cannot tell where in a texel its light is, nor sources smaller than a texel apart.
   const double texel_radius_rad = std::sqrt(pi) / map_height;
@@ -377,13 +410,15 @@ float estimate_light_error(std::span<const DirectionalLight> lights, int map_hei
   for (const DirectionalLight& light : lights) {
     const double e = luminance(light.irradiance.x, light.irradiance.y, light.irradiance.z);
     const double r = std::max(static_cast<double>(light.spread), texel_radius_rad);
-    errors += e * e * (r + error_of_size * r * r * r * r);
+    errors += squared_error(e, r);
     flux += e;
     sum += to_double(light.direction) * e;
   }
   if (!(flux > 0)) return 0;
   // The mean square of irradiance over all normals, from its first two spherical harmonics.
-  const double irradiance_squared = flux * flux / 16 + dot(sum, sum) / 12;
+  // At most half of them face a source that is too bright to show.
+  const double irradiance_squared = std::min(flux * flux / 16 + dot(sum, sum) / 12,
+                                             irradiance_that_shows * irradiance_that_shows / 2);
   return static_cast<float>(error_of_edges * std::sqrt(errors / irradiance_squared));
 }
 

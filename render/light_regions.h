@@ -52,7 +52,8 @@ DirectionalLight make_light(const RegionLight& region);
 // The relative RMS error of shading to be expected of lights made from an environment of a height:
 // of the irradiance on surfaces of all orientations behind occluders of all orientations. A light
 // errs where a shadow's edge passes through its region, by a part of its energy; the chance of that
-// grows with the region's radius.
+// grows with the region's radius. In units of the plate: what is brighter than four times display
+// white counts as that bright, as in the error of a picture.
 float estimate_light_error(std::span<const DirectionalLight> lights, int map_height);
 
 // Luminance of linear Rec.709 colours.

@@ -118,7 +118,7 @@ render::Environment make_bench_sky(const BenchSky& wanted) {
   add_sun(1);
   const float clear_day = upward_luminance(environment);
   add_sun(wanted.sun_to_sky - 1);
-  const float exposure = clear_day / upward_luminance(environment);
+  const float exposure = wanted.exposure_locked ? 1 : clear_day / upward_luminance(environment);
   std::mt19937 random(wanted.noise_seed);
   std::normal_distribution<float> normal(1, wanted.noise);
   for (float& value : pixels) {

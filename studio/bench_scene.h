@@ -35,12 +35,14 @@ enum class BenchFinish {
 // Throws std::invalid_argument if a side is below 16.
 BenchScene make_bench_scene(int width, int height, BenchFinish finish = BenchFinish::real);
 
-// The sun's share and size may be changed, to see where methods fail. Radiance is then scaled to
-// what it was on a surface that faces up, as a camera's exposure would.
+// The sun's share and size may be changed, to see where methods fail. Unless the exposure is
+// locked, radiance is then scaled to what it was on a surface that faces up, as a camera's would
+// be.
 struct BenchSky {
   float sun_radius_rad = 0;  // 0 = the made sky's own sun, about half a degree
   float sun_to_sky = 1;      // times the sun of a clear day
-  float noise = 0;           // relative, per texel
+  bool exposure_locked = false;
+  float noise = 0;  // relative, per texel
   std::uint32_t noise_seed = 1;
 };
 

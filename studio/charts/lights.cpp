@@ -149,7 +149,9 @@ class LightsChart {
                             {{"flicker", "table made anew for every frame"},
                              {"flicker_followed", "light followed, as in a show"}}});
     chart.stressors.push_back(sun_size());
-    chart.stressors.push_back(sun_strength());
+    chart.stressors.push_back(sun_strength(false, default_lights));
+    chart.stressors.push_back(sun_strength(true, default_lights));
+    chart.stressors.push_back(sun_strength(true, 4));
     chart.stressors.push_back(light_count());
     chart.stressors.push_back(whole_picture());
     return chart;
@@ -253,11 +255,11 @@ class LightsChart {
   }
 
   // Error and the table's own estimate of it, for one sky, in a smaller picture.
-  StressorSample stressed(double value, const BenchSky& wanted) {
+  StressorSample stressed(double value, const BenchSky& wanted, int count = default_lights) {
     progress("skies that are hard to sum up", 0.75);
     if (!small_) small_ = std::make_unique<MatteShot>(quick_ ? 160 : 320, quick_ ? 120 : 240);
     const render::Environment sky = make_bench_sky(wanted);
-    return sample(value, *small_, small_->truth(sky, quick_ ? 256 : 2048), sky, default_lights);
+    return sample(value, *small_, small_->truth(sky, quick_ ? 256 : 2048), sky, count);
   }
 
   // Every pixel tests every light: the estimate is the table's, and knows no short cuts.
@@ -282,15 +284,18 @@ class LightsChart {
     return stressor;
   }
 
-  Stressor sun_strength() {
-    Stressor stressor{
-        fmt::format("strength of the sun, times a clear day's; {} lights", default_lights),
-        "",
-        true,
-        {}};
+  // With the exposure locked, strong suns are cut off at the brightest that a display shows.
+  Stressor sun_strength(bool exposure_locked, int count) {
+    Stressor stressor{fmt::format("strength of the sun, times a clear day's, {}; {} lights",
+                                  exposure_locked ? "exposure locked" : "exposed alike", count),
+                      "",
+                      true,
+                      {}};
     for (const double strength : quick_ ? std::vector{0.01, 1.0, 1000.0}
                                         : std::vector{0.01, 0.1, 1.0, 10.0, 100.0, 1000.0}) {
-      stressor.samples.push_back(stressed(strength, {.sun_to_sky = static_cast<float>(strength)}));
+      stressor.samples.push_back(stressed(
+          strength,
+          {.sun_to_sky = static_cast<float>(strength), .exposure_locked = exposure_locked}, count));
     }
     return stressor;
   }

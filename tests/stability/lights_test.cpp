@@ -4,7 +4,9 @@
 // of lights spoils first.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
+#include <vector>
 
 #include "render/light_table.h"
 #include "tests/render/made_shading.h"
@@ -57,6 +59,33 @@ TEST(LightsStability, EstimateStaysAboveTheErrorFromSmallSunsToLargeOnes) {
     }
   }
   EXPECT_TRUE(failed_somewhere) << "the sweep must go past the edge";
+}
+
+// A camera whose exposure is locked clips what the sun lights, and with it most of a penumbra.
+TEST(LightsStability, EstimateStaysAboveTheErrorOfWhatADisplayShows) {
+  constexpr double brightest = 8 * std::numbers::pi;  // 4 times white, on an albedo of 1/2
+  const auto surfaces = shaded_surfaces(PLATELIGHT_FULL_TESTS ? 4000 : 500);
+  const auto shown = [brightest](std::vector<double> irradiance) {
+    for (double& e : irradiance) e = std::min(e, brightest);
+    return irradiance;
+  };
+  bool clipped = false;
+  for (const float irradiance : {2.5F, 25.F, 250.F, 2500.F, 25000.F}) {
+    for (const float radius_deg : {0.27F, 1.5F, 5.F}) {
+      const Environment env = make_sun_and_sky(
+          {.sun_radius_rad = radius_deg * degree, .sun_irradiance = irradiance}, 128);
+      const std::vector<double> truth = shade_by_map(env, surfaces).shadowed;
+      clipped = clipped || shown(truth) != truth;
+      for (const int count : {1, 2, 4, 16, 64, 256}) {
+        const LightTable table = make_light_table(env, {count});
+        const double error =
+            relative_rms(shown(shade_by_table(table, surfaces).shadowed), shown(truth));
+        EXPECT_GE(table.error_estimate, error)
+            << radius_deg << " degrees, irradiance " << irradiance << ", " << count << " lights";
+      }
+    }
+  }
+  EXPECT_TRUE(clipped);
 }
 
 TEST(LightsStability, EstimateWarnsOfEveryTableThatIsUseless) {
