@@ -18,9 +18,9 @@ class SampleSequence {
 
   std::array<float, 2> next_pair() {
     const std::uint32_t key = mixed(seed_ + 0x9E3779B9U * ++pair_);
-    const std::uint32_t index = scrambled(sample_, key);
-    return {unit(scrambled(reversed(index), mixed(key ^ 0x68BC21EBU))),
-            unit(scrambled(second_dimension(index), mixed(key ^ 0x02E5BE93U)))};
+    const std::uint32_t index = reversed(hashed(reversed(sample_), key));
+    return {unit(reversed(hashed(index, mixed(key ^ 0x68BC21EBU)))),
+            unit(reversed(hashed(second_dimension(index), mixed(key ^ 0x02E5BE93U))))};
   }
   float next() { return next_pair()[0]; }
 
@@ -33,30 +33,28 @@ class SampleSequence {
     return x ^ x >> 16;
   }
   static std::uint32_t reversed(std::uint32_t x) {
-    x = x << 16 | x >> 16;
-    x = (x & 0x00FF00FFU) << 8 | (x & 0xFF00FF00U) >> 8;
+    x = __builtin_bswap32(x);
     x = (x & 0x0F0F0F0FU) << 4 | (x & 0xF0F0F0F0U) >> 4;
     x = (x & 0x33333333U) << 2 | (x & 0xCCCCCCCCU) >> 2;
     return (x & 0x55555555U) << 1 | (x & 0xAAAAAAAAU) >> 1;
   }
-  // Owen's scrambling: every bit flips by a hash of the bits above it.
-  static std::uint32_t scrambled(std::uint32_t x, std::uint32_t key) {
-    x = reversed(x);
+  // Owen's scrambling of a number whose bits are reversed: each flips by a hash of the lower ones.
+  static std::uint32_t hashed(std::uint32_t x, std::uint32_t key) {
     x += key;
     x ^= x * 0x6C50B47CU;
     x ^= x * 0xB82F1E52U;
     x ^= x * 0xC7AFE638U;
-    x ^= x * 0x8D22F6E6U;
-    return reversed(x);
+    return x ^ x * 0x8D22F6E6U;
   }
-  // Sobol's second dimension: direction numbers are the rows of Pascal's triangle modulo 2.
+  // Sobol's second dimension, bits reversed: bit j is the sum of the index's bits k with binomial
+  // (k, j) odd, which is where k has all bits of j (Lucas). The first dimension is the index
+  // itself.
   static std::uint32_t second_dimension(std::uint32_t index) {
-    std::uint32_t result = 0;
-    for (std::uint32_t direction = 1U << 31; index != 0; index >>= 1) {
-      if ((index & 1U) != 0) result ^= direction;
-      direction ^= direction >> 1;
-    }
-    return result;
+    index ^= index >> 1 & 0x55555555U;
+    index ^= index >> 2 & 0x33333333U;
+    index ^= index >> 4 & 0x0F0F0F0FU;
+    index ^= index >> 8 & 0x00FF00FFU;
+    return index ^ (index >> 16 & 0x0000FFFFU);
   }
   static float unit(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24F; }
 
