@@ -1,6 +1,7 @@
 // Small vectors and 3x3 matrices.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -51,6 +52,13 @@ Vec3T<T> normalize(Vec3T<T> a) {
 using Vec2 = Vec2T<double>;
 using Vec3 = Vec3T<double>;
 using Vec3f = Vec3T<float>;
+
+inline float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
+inline float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+
+// Without the care of std::hypot for numbers near the limits, and several times as fast.
+inline double hypotenuse(double a, double b) { return std::sqrt(a * a + b * b); }
+inline float hypotenuse(float a, float b) { return std::sqrt(a * a + b * b); }
 
 inline Vec3f to_float(Vec3 v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};

@@ -23,9 +23,6 @@ bool receives_light(const ShadePoint& p) {
   return p.diffuse != Vec3f{} || p.catches_shadow || p.catches_lamps;
 }
 
-float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
-float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
-
 }  // namespace
 
 CellBaker::CellBaker() {

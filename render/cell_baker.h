@@ -10,6 +10,7 @@
 #include "render/cell_transport.h"
 #include "render/kernel.h"
 #include "render/sample_sequence.h"
+#include "render/standard.h"
 
 namespace render {
 
@@ -56,8 +57,9 @@ class CellBaker final : public RaySink {
   // A lobe, whose compact light waits until it is known who sees which.
   struct Lobe {
     const ShadePoint* point;
-    Vec3f throughput, normal;
-    Spread spread;
+    SeenLobe seen;
+    Vec3f throughput;
+    float cone_rad;  // of what the point stands for, mirrored
     float roughness, share;
     std::uint32_t number;  // of the lobe on its path, for random numbers
     bool difference;

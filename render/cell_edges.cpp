@@ -17,7 +17,6 @@ constexpr float plate_contrast =
 constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
 constexpr Scene::Surface no_hit{~0U, ~0U};
 
-float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
 Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
   return {std::min(v.x, display_limit), std::min(v.y, display_limit), std::min(v.z, display_limit)};

@@ -16,9 +16,8 @@ constexpr float widest_rad = 1;  // cones end here
 // so many parts.
 constexpr float wide_lobe = 2;
 constexpr std::uint32_t parts_of_source = 4;
-
-float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
-float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+// Of a source so many of its radii from a lobe's middle, places that are not drawn will do.
+constexpr float far_source = 3;
 
 // The mean width of a cone. What goes straight on keeps it.
 float spread_of(const Spread& spread, const ShadePoint& from) {
@@ -64,7 +63,7 @@ bool CellBaker::turn_within_lobe(const ShadePoint& from, std::uint32_t number, N
   if (!(density > 0)) return false;
   const float own_rad = 0.5F * (length(ray.spread.a) + length(ray.spread.b));
   const float share_rad = 2 / std::sqrt(pi * density * static_cast<float>(samples_each_));
-  const float width_rad = std::min(std::hypot(own_rad, share_rad), widest_rad);
+  const float width_rad = std::min(calibrate::hypotenuse(own_rad, share_rad), widest_rad);
   const float into = dot(direction, from.hit.geometric_normal);
   if (into < 0) direction -= from.hit.geometric_normal * (2 * into);
   const Across across(direction);
@@ -87,8 +86,10 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     const float share =
         one_of_many ? 1.0F : share_without_compact(*frame_->planned, ray.roughness, ray.spread);
     if (share > 0) {
-      lobes_.push_back({&from, asked.throughput, asked.normal, asked.spread, asked.roughness, share,
-                        pushed_, asked.kind == RayKind::difference});
+      const float area = length(asked.spread.a) * length(asked.spread.b);
+      lobes_.push_back({&from, SeenLobe(asked.normal, from.hit.geometric_normal, -from.incoming),
+                        asked.throughput, 0.5F * std::sqrt(area), asked.roughness, share, pushed_,
+                        asked.kind == RayKind::difference});
     }
   }
   const Effort& effort = frame_->job->effort;
@@ -186,26 +187,35 @@ void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
 // here, and in others in every further sample of the pixel.
 float CellBaker::compact_density(const Lobe& lobe, std::size_t light) const {
   const DirectionalLight& l = frame_->job->lights.lights[light];
-  const ShadePoint& p = *lobe.point;
-  const float cone_rad = 0.5F * std::sqrt(length(lobe.spread.a) * length(lobe.spread.b));
-  const auto density = [&](Vec3f direction, float part_rad) {
-    return blurred_lobe(lobe.normal, p.hit.geometric_normal, -p.incoming, lobe.roughness,
-                        std::hypot(part_rad, cone_rad), direction);
+  const float alpha = lobe.roughness * lobe.roughness;
+  if (std::max(alpha, lobe.cone_rad) > wide_lobe * l.spread) {
+    const float blur_rad = calibrate::hypotenuse(l.spread, lobe.cone_rad);
+    return lobe.seen.blurred(lobe.roughness, blur_rad, l.direction);
+  }
+  const Across across(l.direction);
+  const auto part = [&](float x, float y, float blur_rad) {
+    const Vec3f direction = l.direction + (across.a * x + across.b * y) * l.spread;
+    return lobe.seen.blurred(lobe.roughness, blur_rad, normalize(direction));
   };
-  if (std::max(lobe.roughness * lobe.roughness, cone_rad) > wide_lobe * l.spread)
-    return density(l.direction, l.spread);
+  const Vec3f away = l.direction - lobe.seen.middle();
+  if (dot(away, away) > far_source * far_source * l.spread * l.spread) {
+    // Hardly changes over the source: four places that give the mean of any cubic over a disc.
+    constexpr float out = std::numbers::sqrt2_v<float> / 2;
+    const float blur_rad = lobe.cone_rad;
+    return 0.25F * (part(out, 0, blur_rad) + part(-out, 0, blur_rad) + part(0, out, blur_rad) +
+                    part(0, -out, blur_rad));
+  }
+  const ShadePoint& p = *lobe.point;
   const bool further = p.slot >= cell_pixels;
   const std::uint32_t samples = further ? static_cast<std::uint32_t>(samples_each_) : 1;
   const float part_rad = l.spread / std::sqrt(static_cast<float>(parts_of_source * samples));
-  const Across across(l.direction);
+  const float blur_rad = calibrate::hypotenuse(part_rad, lobe.cone_rad);
   const std::uint32_t number = (static_cast<std::uint32_t>(light) + 1) * 16 + lobe.number;
   float sum = 0;
   for (std::uint32_t i = 0; i < parts_of_source; ++i) {
     const auto [area, turn] = numbers_of(p, number, sample_of(p) * parts_of_source + i).next_pair();
-    const float radius = l.spread * std::sqrt(area);
-    sum += density(normalize(l.direction + across.a * (radius * std::cos(2 * pi * turn)) +
-                             across.b * (radius * std::sin(2 * pi * turn))),
-                   part_rad);
+    const float radius = std::sqrt(area);
+    sum += part(radius * std::cos(2 * pi * turn), radius * std::sin(2 * pi * turn), blur_rad);
   }
   return sum * (1.0F / parts_of_source);
 }

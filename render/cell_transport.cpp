@@ -11,8 +11,6 @@
 namespace render {
 namespace {
 
-float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
-
 // Irradiance at the centres: of all light that is not behind real things, and what of it virtual
 // objects take.
 void add_irradiance(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {

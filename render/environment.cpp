@@ -87,7 +87,7 @@ constexpr std::array<LobeDisc, 6> lobe_discs{
 // Where a lobe lies among the smoothed levels: at 1 or above it is all of them, below it mixes the
 // first of them with narrower cones.
 float level_of(const Environment& env, float alpha, float spread_rad) {
-  const float width_rad = std::hypot(lobe_width * alpha, spread_rad);
+  const float width_rad = calibrate::hypotenuse(lobe_width * alpha, spread_rad);
   return std::min(std::sqrt(width_rad / lobe_width), 1.0F) *
          static_cast<float>(env.smoothed.size() - 1);
 }
@@ -145,7 +145,8 @@ class MapSampler {
       add_cone(at, spread_rad, share * (1 - f));
     } else {
       for (const auto& [radius, disc_share] : lobe_discs) {
-        add_cone(at, std::hypot(2 * radius * alpha, spread_rad), share * (1 - f) * disc_share);
+        add_cone(at, calibrate::hypotenuse(2 * radius * alpha, spread_rad),
+                 share * (1 - f) * disc_share);
       }
     }
     if (f > 0) add_smoothed(1, at, share * f);

@@ -31,8 +31,6 @@ constexpr int split_depth = 2;
 constexpr float caustic_roughness = 0.2F;
 
 Vec3f times(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
-float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
-float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
 
 Vec3f cosine_direction(Vec3f normal, std::array<float, 2> random) {
   const float z = 1 - 2 * random[0];

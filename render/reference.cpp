@@ -28,7 +28,6 @@ using calibrate::Pose;
 constexpr float pi = std::numbers::pi_v<float>;
 
 Vec3f times(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
-float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
 
 // Sums over the samples of a pixel, in double, so that a thousand of them keep their digits.
 class Sum {

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <numbers>
 #include <stdexcept>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -37,20 +38,6 @@ constexpr float grazing_cosine = 1e-3F;
 Vec3f above(Vec3f view, Vec3f normal) {
   const float cosine = dot(view, normal);
   return cosine >= grazing_cosine ? view : normalize(view + normal * (grazing_cosine - cosine));
-}
-
-// Density of the visible normals' reflections at l, before directions below are folded up.
-// v and l are in the frame of the normal; alpha is the GGX width.
-float unfolded_density(Vec3f v, Vec3f l, float alpha) {
-  const Vec3f half = normalize(v + l);
-  const float v_half = dot(v, half);
-  if (half.z <= 0 || v_half <= 0) return 0;
-  const float a2 = alpha * alpha;
-  // 1 - h_z^2 (1 - a2), without cancellation near the peak.
-  const float width = half.x * half.x + half.y * half.y + a2 * half.z * half.z;
-  const float d = a2 / (std::numbers::pi_v<float> * width * width);
-  const float masking = 2 / (1 + std::sqrt(1 + a2 * (v.x * v.x + v.y * v.y) / (v.z * v.z)));
-  return masking * d / (4 * v.z);
 }
 
 Vec3f mapped_normal(const StandardParameters& parameters,
@@ -180,29 +167,45 @@ Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2
 }
 
 float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction) {
-  const float alpha = roughness * roughness;
-  const auto [x, y] = frame_about(normal);
-  view = above(view, normal);
-  const Vec3f v{dot(x, view), dot(y, view), dot(normal, view)};
-  const Vec3f l{dot(x, direction), dot(y, direction), dot(normal, direction)};
-  if (l.z <= 0) return 0;
-  return unfolded_density(v, l, alpha) + unfolded_density(v, {l.x, l.y, -l.z}, alpha);
+  return SeenLobe(normal, normal, view).density(roughness * roughness, direction);
 }
 
-float blurred_lobe(Vec3f normal,
-                   Vec3f geometric_normal,
-                   Vec3f view,
-                   float roughness,
-                   float blur_rad,
-                   Vec3f direction) {
+SeenLobe::SeenLobe(Vec3f normal, Vec3f geometric_normal, Vec3f view)
+    : normal_(normal), geometric_normal_(geometric_normal), middle_(mirrored(view, normal)) {
+  std::tie(x_, y_) = frame_about(normal);
+  view = above(view, normal);
+  view_ = {dot(x_, view), dot(y_, view), dot(normal, view)};
+  slope_squared_ = (view_.x * view_.x + view_.y * view_.y) / (view_.z * view_.z);
+}
+
+float SeenLobe::density(float alpha, Vec3f direction) const {
+  const Vec3f l{dot(x_, direction), dot(y_, direction), dot(normal_, direction)};
+  if (l.z <= 0) return 0;
+  const float a2 = alpha * alpha;
+  // Of the visible normals' reflections, before directions below are folded up. 1 - h_z^2 (1 - a2)
+  // without cancellation near the peak; the factors that all directions share come last.
+  const auto unfolded = [&](float across_x, float across_y, float up) {
+    if (up <= 0) return 0.0F;
+    const float squared = across_x * across_x + across_y * across_y + up * up;
+    const float width = across_x * across_x + across_y * across_y + a2 * up * up;
+    const float relative = squared / width;
+    return relative * relative;
+  };
+  const float across_x = view_.x + l.x, across_y = view_.y + l.y;
+  const float densities =
+      unfolded(across_x, across_y, view_.z + l.z) + unfolded(across_x, across_y, view_.z - l.z);
+  const float masking = 2 / (1 + std::sqrt(1 + a2 * slope_squared_));
+  return densities * masking * a2 / (4 * std::numbers::pi_v<float> * view_.z);
+}
+
+float SeenLobe::blurred(float roughness, float blur_rad, Vec3f direction) const {
   // Half of a lobe lies within 2 alpha of the mirrored direction, as half of a disc of radius r
   // does within .7 r.
   constexpr float alpha_of_radius = 0.35F;
-  const float alpha = std::hypot(roughness * roughness, alpha_of_radius * blur_rad);
-  const float blurred = std::min(std::sqrt(alpha), 1.0F);
-  const Vec3f below = direction - geometric_normal * (2 * dot(direction, geometric_normal));
-  return lobe_density(normal, view, blurred, direction) +
-         lobe_density(normal, view, blurred, below);
+  const float own = roughness * roughness, blur = alpha_of_radius * blur_rad;
+  const float alpha = std::min(std::sqrt(own * own + blur * blur), 1.0F);
+  const Vec3f below = direction - geometric_normal_ * (2 * dot(direction, geometric_normal_));
+  return density(alpha, direction) + density(alpha, below);
 }
 
 }  // namespace render

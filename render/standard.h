@@ -129,14 +129,26 @@ inline Vec3f mirrored(Vec3f view, Vec3f normal) { return normal * (2 * dot(norma
 Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random);
 float lobe_density(Vec3f normal, Vec3f view, float roughness, Vec3f direction);
 
-// What a lobe mirrors to `view` of light from `direction`, per irradiance of it, if both are
-// blurred as by a disc of radius blur_rad. What an interpolated or mapped normal would send below
-// the triangle, of unit normal `geometric_normal`, is mirrored up again.
-float blurred_lobe(Vec3f normal,
-                   Vec3f geometric_normal,
-                   Vec3f view,
-                   float roughness,
-                   float blur_rad,
-                   Vec3f direction);
+// All lobes about a normal as one view sees them.
+class SeenLobe {
+ public:
+  SeenLobe(Vec3f normal, Vec3f geometric_normal, Vec3f view);
+
+  // lobe_density of a lobe of alpha = roughness^2.
+  float density(float alpha, Vec3f direction) const;
+  // What a lobe mirrors to the view of light from `direction`, per irradiance of it, if both are
+  // blurred as by a disc of radius blur_rad. What an interpolated or mapped normal would send below
+  // the triangle, of unit normal `geometric_normal`, is mirrored up again.
+  float blurred(float roughness, float blur_rad, Vec3f direction) const;
+  // The view mirrored at the normal: where narrow lobes have their middle.
+  Vec3f middle() const { return middle_; }
+
+ private:
+  Vec3f x_, y_, normal_;  // the lobe's frame
+  Vec3f geometric_normal_;
+  Vec3f middle_;
+  Vec3f view_;           // in the frame
+  float slope_squared_;  // of the view
+};
 
 }  // namespace render

@@ -259,7 +259,7 @@ TEST(SmoothForReflections, LeavesCompactSourcesForTheLightsThatStandForThem) {
     Vec3f sum{};
     for (const DirectionalLight& light : compact) {
       sum += light.irradiance *
-             blurred_lobe(normal, normal, view, roughness, light.spread, light.direction);
+             SeenLobe(normal, normal, view).blurred(roughness, light.spread, light.direction);
     }
     return sum * share_without_compact(apart, roughness, {});
   };

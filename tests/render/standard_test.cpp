@@ -143,14 +143,15 @@ TEST(LobeDensity, IsZeroBelowTheSurfaceAndFiniteFromBelowTheShadingNormal) {
 }
 
 // Interpolated normals lean away from the triangle's own: what would go below it is mirrored up.
-TEST(BlurredLobe, KeepsAllItsEnergyAboveTheTriangle) {
+TEST(SeenLobe, KeepsAllItsEnergyAboveTheTriangle) {
   const Vec3f triangle{0, 0, 1};
   for (const float lean_rad : {0.0F, 0.4F, 0.9F}) {
     const Vec3f normal{std::sin(lean_rad), 0, std::cos(lean_rad)};
     for (const float blur_rad : {0.0F, 0.5F}) {
       const Vec3f view = normalize(Vec3f{-0.5F, 0.6F, 0.8F});
-      const double integral = over_hemisphere(
-          [&](Vec3f l) { return render::blurred_lobe(normal, triangle, view, 0.6F, blur_rad, l); });
+      const render::SeenLobe lobe(normal, triangle, view);
+      const double integral =
+          over_hemisphere([&](Vec3f l) { return lobe.blurred(0.6F, blur_rad, l); });
       EXPECT_NEAR(integral, 1, 0.01) << "lean " << lean_rad << ", blur " << blur_rad;
     }
   }
