@@ -39,6 +39,7 @@ AxialLens::AxialLens(const Lens& lens) : kind_(kind_of(lens.model).value()) {
   max_angle_rad_ = kind_ == Kind::pinhole ? std::min(lens.max_angle_rad, pinhole_max_angle_rad)
                                           : fold_angle(lens.max_angle_rad);
   max_radius_ = radius(max_angle_rad_);
+  least_cosine_ = std::cos(std::min(max_angle_rad_ * (1 + radius_slack), pi));
 }
 
 double AxialLens::radius(double angle_rad) const {
@@ -121,18 +122,29 @@ Vec2 AxialLens::ray_of_radius(double r) const {
 std::optional<Vec2> AxialLens::project(Vec3 v) const {
   const double l = length(v);
   if (!std::isfinite(l) || l == 0) return std::nullopt;
+  // Straight behind, every direction in the picture is as good as another.
+  if (v.x == 0 && v.y == 0 && v.z < 0) return std::nullopt;
+  const std::optional<double> scale =
+      kind_ == Kind::equisolid ? equisolid_scale(v, l) : scale_by_angle(v, l);
+  if (!scale) return std::nullopt;
+  return Vec2{focal_px_.x * v.x * *scale + centre_.x, focal_px_.y * v.y * *scale + centre_.y};
+}
+
+// The picture radius over the distance from the axis; nothing beyond the largest angle.
+std::optional<double> AxialLens::scale_by_angle(Vec3 v, double l) const {
   const double off_axis = std::hypot(v.x, v.y);
   const double angle_rad = std::atan2(off_axis, v.z);
   if (angle_rad > max_angle_rad_ * (1 + radius_slack)) return std::nullopt;
-  // Straight behind, every direction in the picture is as good as another.
-  if (off_axis == 0 && v.z < 0) return std::nullopt;
-  double scale = 1 / l;
-  if (kind_ == Kind::pinhole) {
-    scale = 1 / v.z;
-  } else if (angle_rad > paraxial_radius) {
-    scale = radius(angle_rad) / off_axis;
-  }
-  return Vec2{focal_px_.x * v.x * scale + centre_.x, focal_px_.y * v.y * scale + centre_.y};
+  if (kind_ == Kind::pinhole) return 1 / v.z;
+  return angle_rad > paraxial_radius ? radius(angle_rad) / off_axis : 1 / l;
+}
+
+// The same without the angle itself: the radius is twice the sine of half of it.
+std::optional<double> AxialLens::equisolid_scale(Vec3 v, double l) const {
+  const double cosine = v.z / l;
+  if (cosine < least_cosine_) return std::nullopt;
+  if (cosine >= 0) return std::sqrt(2 / (1 + cosine)) / l;
+  return std::sqrt(2 * (1 - cosine)) / std::hypot(v.x, v.y);
 }
 
 std::optional<Vec3> AxialLens::unproject(Vec2 q) const {

@@ -42,6 +42,8 @@ class AxialLens {
   double radius_slope(double angle_rad) const;
   double angle(double radius) const;
   double fold_angle(double max_angle_rad) const;
+  std::optional<double> scale_by_angle(Vec3 v, double l) const;
+  std::optional<double> equisolid_scale(Vec3 v, double l) const;
 
   Kind kind_;
   Vec2 focal_px_;
@@ -49,6 +51,7 @@ class AxialLens {
   std::array<double, 4> k_{};
   double max_angle_rad_;
   double max_radius_;
+  double least_cosine_;  // of an angle off the axis
 };
 
 }  // namespace calibrate

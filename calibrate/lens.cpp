@@ -77,10 +77,30 @@ std::optional<Vec2> project(const Lens& lens, Vec3 v_cam) {
   return AxialLens(lens).project(v_cam);
 }
 
+std::vector<std::optional<Vec2>> project_all(const Lens& lens, std::span<const Vec3> v_cam) {
+  check(lens);
+  if (is_mrcal_model(lens.model)) return project_by_mrcal(lens, v_cam);
+  const AxialLens axial(lens);
+  std::vector<std::optional<Vec2>> pixels;
+  pixels.reserve(v_cam.size());
+  for (const Vec3& v : v_cam) pixels.push_back(axial.project(v));
+  return pixels;
+}
+
 std::optional<Vec3> unproject(const Lens& lens, Vec2 q) {
   check(lens);
   if (is_mrcal_model(lens.model)) return unproject_by_mrcal(lens, {&q, 1}).front();
   return AxialLens(lens).unproject(q);
+}
+
+std::vector<std::optional<Vec3>> unproject_all(const Lens& lens, std::span<const Vec2> q) {
+  check(lens);
+  if (is_mrcal_model(lens.model)) return unproject_by_mrcal(lens, q);
+  const AxialLens axial(lens);
+  std::vector<std::optional<Vec3>> directions;
+  directions.reserve(q.size());
+  for (const Vec2& pixel : q) directions.push_back(axial.unproject(pixel));
+  return directions;
 }
 
 Lens cropped(const Lens& lens, int x, int y, int width, int height) {

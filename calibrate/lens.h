@@ -34,9 +34,12 @@ void check(const Lens& lens);
 // The pixel of a direction in the camera's frame (any length), or nothing: behind the lens, beyond
 // its angle, not finite. The pixel may lie outside the picture.
 std::optional<Vec2> project(const Lens& lens, Vec3 v_cam);
+// Of many.
+std::vector<std::optional<Vec2>> project_all(const Lens& lens, std::span<const Vec3> v_cam);
 
 // The unit direction of a pixel, or nothing where the model has none.
 std::optional<Vec3> unproject(const Lens& lens, Vec2 q);
+std::vector<std::optional<Vec3>> unproject_all(const Lens& lens, std::span<const Vec2> q);
 
 // Lens of a part of the picture: crop = x, y, width, height in the lens's pixels.
 Lens cropped(const Lens& lens, int x, int y, int width, int height);

@@ -103,7 +103,7 @@ class Projector {
     if (!std::isfinite(l) || l == 0) return std::nullopt;
     const Vec3 v = direction / l;
     if (!behind_ && v.z <= 0) return std::nullopt;
-    if (std::atan2(std::hypot(v.x, v.y), v.z) > max_angle_rad_) return std::nullopt;
+    if (std::atan2(hypotenuse(v.x, v.y), v.z) > max_angle_rad_) return std::nullopt;
     const mrcal_point3_t p{{v.x, v.y, v.z}};
     mrcal_point2_t q{};
     std::array<mrcal_point3_t, 2> gradient{};
@@ -122,7 +122,7 @@ class Projector {
       const std::optional<Projection> at = (*this)(v);
       if (!at) return std::nullopt;
       const Vec2 miss{wanted.x - at->q.x, wanted.y - at->q.y};
-      const double miss_px = std::hypot(miss.x, miss.y);
+      const double miss_px = hypotenuse(miss.x, miss.y);
       if (step == polish_steps || miss_px < 1e-9) {
         return miss_px <= round_trip_px ? std::optional(v) : std::nullopt;
       }
@@ -172,9 +172,13 @@ std::vector<std::optional<Vec3>> unproject_by_mrcal(const Lens& lens, std::span<
   for (std::size_t i = 0; i < q.size(); ++i) {
     const mrcal_point2_t pixel{{q[i].x, q[i].y}};
     if (!finite(pixel)) continue;
-    // The pixel before it is mostly a neighbour, and a better first guess than libmrcal's own
-    // search.
-    if (i > 0 && result[i - 1]) result[i] = projector.polish(*result[i - 1], q[i]);
+    // The pixels before it are mostly its neighbours, and going on from them is a better first
+    // guess than libmrcal's own search.
+    if (i > 0 && result[i - 1]) {
+      const Vec3 last = *result[i - 1];
+      const Vec3 guess = i > 1 && result[i - 2] ? last * 2 - *result[i - 2] : last;
+      result[i] = projector.polish(guess, q[i]);
+    }
     if (result[i]) continue;
     mrcal_point3_t v{};
     if (mrcal_unproject(&v, &pixel, 1, &projector.model(), lens.parameters.data())) {

@@ -76,20 +76,26 @@ ProbeMapper::ProbeMapper(const Lens& lens,
 
 void ProbeMapper::correct_vignetting(const Lens& lens) {
   if (settings_.vignetting.empty()) return;
-  // Per pixel; 0 = not looked up yet.
   std::vector<float> correction(static_cast<std::size_t>(gather_.width * gather_.height));
   const double to_middle = 0.5 * (gather_.shrink - 1);
-  for (std::size_t i = 0; i < gather_.pixel.size(); ++i) {
-    float& factor = correction[gather_.pixel[i]];
-    if (factor == 0) {
-      const auto pixel = static_cast<int>(gather_.pixel[i]);
-      const calibrate::Vec2 q{pixel % gather_.width * gather_.shrink + to_middle,
-                              pixel / gather_.width * gather_.shrink + to_middle};
-      const Vec3 v = calibrate::unproject(lens, q).value_or(Vec3{0, 0, 1});
-      const double angle_rad = std::atan2(std::hypot(v.x, v.y), v.z);
-      factor = static_cast<float>(1 / calibrate::sensitivity(settings_.vignetting, angle_rad));
+  tbb::parallel_for(tbb::blocked_range<int>(0, gather_.height), [&](const auto& rows) {
+    std::vector<calibrate::Vec2> pixels(static_cast<std::size_t>(gather_.width));
+    for (int y = rows.begin(); y != rows.end(); ++y) {
+      for (int x = 0; x < gather_.width; ++x) {
+        pixels[static_cast<std::size_t>(x)] = {x * gather_.shrink + to_middle,
+                                               y * gather_.shrink + to_middle};
+      }
+      const auto directions = calibrate::unproject_all(lens, pixels);
+      float* const row = &correction[static_cast<std::size_t>(y) * pixels.size()];
+      for (std::size_t x = 0; x < pixels.size(); ++x) {
+        const Vec3 v = directions[x].value_or(Vec3{0, 0, 1});
+        const double angle_rad = std::atan2(calibrate::hypotenuse(v.x, v.y), v.z);
+        row[x] = static_cast<float>(1 / calibrate::sensitivity(settings_.vignetting, angle_rad));
+      }
     }
-    gather_.weight[i] *= factor;
+  });
+  for (std::size_t i = 0; i < gather_.pixel.size(); ++i) {
+    gather_.weight[i] *= correction[gather_.pixel[i]];
   }
 }
 

@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
+#include <optional>
+#include <span>
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -47,37 +50,55 @@ double pixel_solid_angle(const DirectionTable& table, int row, int column) {
   return length(cross(around[1] - around[0], around[3] - around[2])) / 4;
 }
 
+// Angle of a typical pixel's side; 0 if nothing is seen. Every eighth row and column will do.
+double pixel_angle_rad(const DirectionTable& table) {
+  constexpr int step = 8;
+  double total = 0;
+  int seen = 0;
+  for (int y = table.height / 2 % step; y < table.height; y += step) {
+    for (int x = table.width / 2 % step; x < table.width; x += step) {
+      const double solid_angle = pixel_solid_angle(table, y, x);
+      total += solid_angle;
+      seen += solid_angle > 0;
+    }
+  }
+  return seen > 0 ? std::sqrt(total / seen) : 0;
+}
+
 // The probe's picture, shrunk: what of it is seen.
 struct ShrunkProbe {
   int shrink = 1;
   int width = 0, height = 0;
+  double angle_rad = 0;             // of a typical pixel's side; 0 = nothing is seen
   std::vector<double> solid_angle;  // per shrunk pixel; 0 = not wholly seen
-
-  double angle_rad = 0;  // of a typical pixel's side; 0 = nothing is seen
 };
 
-ShrunkProbe shrink_probe(const DirectionTable& table, int shrink) {
-  ShrunkProbe probe{shrink, table.width / shrink, table.height / shrink, {}, 0};
-  double total = 0;
-  int seen = 0;
-  probe.solid_angle.reserve(static_cast<std::size_t>(probe.width) *
-                            static_cast<std::size_t>(probe.height));
-  for (int y = 0; y < probe.height; ++y) {
-    for (int x = 0; x < probe.width; ++x) {
-      double sum = 0;
-      bool whole = true;
-      for (int i = 0; i < shrink * shrink && whole; ++i) {
-        const double part =
-            pixel_solid_angle(table, y * shrink + i / shrink, x * shrink + i % shrink);
-        whole = part > 0;
-        sum += part;
-      }
-      probe.solid_angle.push_back(whole ? sum : 0);
-      total += probe.solid_angle.back();
-      seen += whole;
-    }
+double solid_angle_of(const DirectionTable& table, int shrink, int row, int column) {
+  double sum = 0;
+  for (int i = 0; i < shrink * shrink; ++i) {
+    const double part =
+        pixel_solid_angle(table, row * shrink + i / shrink, column * shrink + i % shrink);
+    if (!(part > 0)) return 0;
+    sum += part;
   }
-  if (seen > 0) probe.angle_rad = std::sqrt(total / seen);
+  return sum;
+}
+
+ShrunkProbe shrink_probe(const DirectionTable& table, double texel_rad) {
+  const double angle_rad = pixel_angle_rad(table);
+  const int shrink =
+      angle_rad > 0 ? std::max(1, static_cast<int>(texel_rad / (pixels_per_texel * angle_rad))) : 1;
+  ShrunkProbe probe{shrink, table.width / shrink, table.height / shrink, shrink * angle_rad, {}};
+  const auto width = static_cast<std::size_t>(probe.width);
+  probe.solid_angle.resize(static_cast<std::size_t>(probe.height) * width);
+  tbb::parallel_for(tbb::blocked_range<int>(0, probe.height), [&](const auto& rows) {
+    for (int y = rows.begin(); y != rows.end(); ++y) {
+      for (int x = 0; x < probe.width; ++x) {
+        probe.solid_angle[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] =
+            solid_angle_of(table, shrink, y, x);
+      }
+    }
+  });
   return probe;
 }
 
@@ -86,42 +107,62 @@ struct Entry {
   float weight;
 };
 
-// Samples one texel after the other.
+// Samples one row of texels after the other.
 class TexelSampler {
  public:
   TexelSampler(const Lens& lens, const Pose& probe_from_set, const ShrunkProbe& probe, int height)
       : lens_(lens), probe_from_set_(probe_from_set), probe_(probe), height_(height) {}
 
-  // The pixels of a texel and their weights; none if it is seen by less than half.
-  std::vector<Entry> sample(int row, int column) const {
+  // The pixels of each texel and their weights; none if it is seen by less than half.
+  void sample_row(int row, std::span<std::vector<Entry>> texels) const {
     const double texel_rad = pi / height_;
     const double wanted = samples_per_pixel * texel_rad / probe_.angle_rad;
     const double narrowing = std::sin((row + 0.5) * texel_rad);
     const int down = std::clamp(static_cast<int>(std::ceil(wanted)), 2, most_samples);
     const int across = std::clamp(static_cast<int>(std::ceil(wanted * narrowing)), 2, most_samples);
+    const auto each = static_cast<std::size_t>(down * across);
+    const std::vector<std::optional<Vec2>> pixels =
+        project_all(lens_, directions_in(row, down, across));
     std::vector<Entry> entries;
-    int seen = 0;
-    // Evenly over the texel's area: in steps of height above the equator, not of angle.
-    const double top = std::cos(row * texel_rad);
-    const double bottom = std::cos((row + 1) * texel_rad);
-    for (int i = 0; i < down * across; ++i) {
-      const double z = top + (bottom - top) * (i / across + 0.5) / down;
-      const double u = (column + (i % across + 0.5) / across) / (2 * height_);
-      const double azimuth_rad = (0.5 - u) * 2 * pi;
-      const double sine = std::sqrt(std::max(1 - z * z, 0.0));
-      seen += add_sample({sine * std::cos(azimuth_rad), sine * std::sin(azimuth_rad), z}, entries);
+    for (std::size_t x = 0; x < texels.size(); ++x) {
+      entries.clear();
+      std::size_t seen = 0;
+      for (const auto& q : std::span(pixels).subspan(x * each, each)) {
+        seen += q && add_sample(*q, entries);
+      }
+      if (2 * seen >= each) texels[x] = largest(entries);
     }
-    if (2 * seen < down * across) return {};
-    return merged(entries);
   }
 
  private:
-  // The four pixels about a direction, as far as they are seen; whether most of it is.
-  bool add_sample(Vec3 v_set, std::vector<Entry>& entries) const {
-    const auto q = calibrate::project(lens_, probe_from_set_.R * v_set);
-    if (!q) return false;
-    const double x = (q->x - 0.5 * (probe_.shrink - 1)) / probe_.shrink;
-    const double y = (q->y - 0.5 * (probe_.shrink - 1)) / probe_.shrink;
+  // Evenly over each texel's area, in the probe's frame: in steps of height above the equator, not
+  // of angle.
+  std::vector<Vec3> directions_in(int row, int down, int across) const {
+    const double top = std::cos(row * pi / height_);
+    const double bottom = std::cos((row + 1) * pi / height_);
+    std::vector<Vec3> directions;
+    directions.reserve(static_cast<std::size_t>(2 * height_ * down * across));
+    std::vector<Vec2> azimuth(static_cast<std::size_t>(across));  // cosine and sine
+    for (int column = 0; column < 2 * height_; ++column) {
+      for (int i = 0; i < across; ++i) {
+        const double azimuth_rad = pi - (column + (i + 0.5) / across) * pi / height_;
+        azimuth[static_cast<std::size_t>(i)] = {std::cos(azimuth_rad), std::sin(azimuth_rad)};
+      }
+      for (int j = 0; j < down; ++j) {
+        const double z = top + (bottom - top) * (j + 0.5) / down;
+        const double sine = std::sqrt(std::max(1 - z * z, 0.0));
+        for (const Vec2& a : azimuth) {
+          directions.push_back(probe_from_set_.R * Vec3{sine * a.x, sine * a.y, z});
+        }
+      }
+    }
+    return directions;
+  }
+
+  // The four pixels about a place, as far as they are seen; whether most of it is.
+  bool add_sample(Vec2 q, std::vector<Entry>& entries) const {
+    const double x = (q.x - 0.5 * (probe_.shrink - 1)) / probe_.shrink;
+    const double y = (q.y - 0.5 * (probe_.shrink - 1)) / probe_.shrink;
     if (!(x > -1 && x < probe_.width && y > -1 && y < probe_.height)) return false;
     const int x0 = static_cast<int>(std::floor(x));
     const int y0 = static_cast<int>(std::floor(y));
@@ -133,27 +174,38 @@ class TexelSampler {
       const auto pixel = static_cast<std::uint32_t>(py * probe_.width + px);
       if (!(probe_.solid_angle[pixel] > 0)) continue;
       const double weight = (1 - std::abs(x - px)) * (1 - std::abs(y - py));
-      entries.push_back({pixel, static_cast<float>(weight)});
+      add({pixel, static_cast<float>(weight)}, entries);
       seen += weight;
     }
     return seen > 0.5;
   }
 
-  // One entry per pixel, the largest ones that make up nearly all.
-  static std::vector<Entry> merged(std::vector<Entry>& entries) {
-    std::ranges::sort(entries, {}, &Entry::pixel);
-    std::vector<Entry> result;
-    float sum = 0;
-    for (const Entry& entry : entries) {
-      if (result.empty() || result.back().pixel != entry.pixel) result.push_back({entry.pixel, 0});
-      result.back().weight += entry.weight;
-      sum += entry.weight;
+  // One entry per pixel. A texel has few, and most samples fall where one before fell.
+  static void add(const Entry& entry, std::vector<Entry>& entries) {
+    const auto same = std::ranges::find(entries, entry.pixel, &Entry::pixel);
+    if (same == entries.end()) {
+      entries.push_back(entry);
+    } else {
+      same->weight += entry.weight;
     }
-    std::erase_if(result, [sum](const Entry& entry) { return entry.weight < least_part * sum; });
-    sum = 0;
-    for (const Entry& entry : result) sum += entry.weight;
-    for (Entry& entry : result) entry.weight /= sum;
-    return result;
+  }
+
+  // The largest ones that make up nearly all, in the picture's order.
+  static std::vector<Entry> largest(const std::vector<Entry>& all) {
+    const auto sum_of = [](const std::vector<Entry>& of) {
+      float sum = 0;
+      for (const Entry& entry : of) sum += entry.weight;
+      return sum;
+    };
+    const float least = least_part * sum_of(all);
+    std::vector<Entry> entries;
+    entries.reserve(all.size());
+    std::ranges::copy_if(all, std::back_inserter(entries),
+                         [&](const Entry& entry) { return entry.weight >= least; });
+    std::ranges::sort(entries, {}, &Entry::pixel);
+    const float sum = sum_of(entries);
+    for (Entry& entry : entries) entry.weight /= sum;
+    return entries;
   }
 
   const Lens& lens_;
@@ -195,12 +247,7 @@ ProbeGather make_probe_gather(const Lens& lens,
                               const Pose& probe_from_set,
                               int environment_height) {
   const DirectionTable table = make_direction_table(lens);
-  ShrunkProbe probe = shrink_probe(table, 1);
-  const double texel_rad = pi / environment_height;
-  if (probe.angle_rad > 0) {
-    const int shrink = static_cast<int>(texel_rad / (pixels_per_texel * probe.angle_rad));
-    if (shrink > 1) probe = shrink_probe(table, shrink);
-  }
+  const ShrunkProbe probe = shrink_probe(table, pi / environment_height);
   ProbeGather gather{probe.shrink, probe.width, probe.height, {}, {}, {}};
   const int width = 2 * environment_height;
   std::vector<std::vector<Entry>> texels(static_cast<std::size_t>(environment_height * width));
@@ -208,9 +255,8 @@ ProbeGather make_probe_gather(const Lens& lens,
     const TexelSampler sampler(lens, probe_from_set, probe, environment_height);
     tbb::parallel_for(tbb::blocked_range<int>(0, environment_height), [&](const auto& rows) {
       for (int y = rows.begin(); y != rows.end(); ++y) {
-        for (int x = 0; x < width; ++x) {
-          texels[static_cast<std::size_t>(y * width + x)] = sampler.sample(y, x);
-        }
+        sampler.sample_row(y, std::span(texels).subspan(static_cast<std::size_t>(y * width),
+                                                        static_cast<std::size_t>(width)));
       }
     });
   }

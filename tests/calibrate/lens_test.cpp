@@ -112,6 +112,34 @@ TEST(Project, SeesNothingBehindAPinholeNorBeyondTheLargestAngle) {
   EXPECT_TRUE(unproject(fisheye, {1412.5 + 902, 932}));
 }
 
+TEST(ProjectAll, AnswersAsOneByOne) {
+  for (const Lens& lens :
+       {Lens{"equisolid", 640, 480, {200, 320, 240}, 100 * degree},
+        Lens{"kannala_brandt", 640, 480, {200, 200, 320, 240, -.03}},
+        Lens{"LENSMODEL_OPENCV4", 640, 480, {500, 500, 320, 240, -.1, .02, 0, 0}}}) {
+    std::vector<Vec3> directions;
+    std::vector<Vec2> pixels;
+    for (const double angle_deg : {0.0, 0.001, 20.0, 60.0, 89.0, 91.0, 99.0, 170.0, 180.0}) {
+      directions.push_back(at_angle(angle_deg * degree, angle_deg));
+      pixels.push_back({320 + 2 * angle_deg, 240 - angle_deg});
+    }
+    const auto projected = project_all(lens, directions);
+    const auto unprojected = unproject_all(lens, pixels);
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      const auto q = project(lens, directions[i]);
+      ASSERT_EQ(projected[i].has_value(), q.has_value()) << lens.model << i;
+      if (q) {
+        EXPECT_EQ(*projected[i], *q);
+      }
+      const auto v = unproject(lens, pixels[i]);
+      ASSERT_EQ(unprojected[i].has_value(), v.has_value()) << lens.model << i;
+      if (v) {
+        EXPECT_LT(length(*unprojected[i] - *v), 1e-9) << lens.model << i;
+      }
+    }
+  }
+}
+
 TEST(Project, SeesNothingWhereTheDistortionTurnsBack) {
   // r = t (1 - .2 t^2) turns back at t = 1.291, at r = .8607.
   const Lens kb{"kannala_brandt", 640, 640, {300, 300, 319.5, 319.5, -.2}};
