@@ -1,6 +1,7 @@
 // Hands values from one thread to another, one at a time.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <optional>
@@ -23,10 +24,16 @@ class Handover {
     return !value_;
   }
 
-  // Waits until the taker has dealt with what it took and asks again. False once closed.
-  bool wait_for_taker() {
+  // Waits until the taker has dealt with what it took and asks again, or until a time. False once
+  // closed.
+  bool wait_for_taker(std::optional<std::chrono::steady_clock::time_point> until = std::nullopt) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || asks_; });
+    const auto asks = [&] { return closed_ || asks_; };
+    if (until) {
+      changed_.wait_until(lock, *until, asks);
+    } else {
+      changed_.wait(lock, asks);
+    }
     return !closed_;
   }
 

@@ -103,7 +103,11 @@ class Show::Stages {
     std::future<void> inputs = std::async(std::launch::async, [this] { make_inputs(); });
     {
       const Closing closing{work_};  // however this ends, the other thread must not wait for ever
-      while (std::optional<Work> work = work_.take()) show_frame(std::move(*work), on_frame);
+      while (std::optional<Work> work = work_.take()) {
+        const Clock::time_point begin = Clock::now();
+        show_frame(std::move(*work), on_frame);
+        rendering_ = (Clock::now() - begin).count();
+      }
     }
     recording_.stop();
     publish(true);
@@ -134,16 +138,27 @@ class Show::Stages {
       Work work;
       if (!apply_commands(work)) return;
       if (options_.live) dropped += wait_until_due(number, start + paused_for_);
+      const Clock::time_point begin = Clock::now();
       std::optional<PreparedFrame> frame = maker_.make(number);
       if (!frame) return;
+      const Clock::duration making = Clock::now() - begin;
       work.frame = std::move(*frame);
       work.dropped = dropped;
       work.plate = maker_.plate().statistics();
       if (!work_.give(std::move(work))) return;
-      // The first frame is rendered with nothing kept, several times as long as the next ones: what
-      // was made meanwhile would be late.
+      // What is made sooner than it can be rendered only waits, and grows old. The first frame is
+      // rendered with nothing kept, several times as long as the next ones.
       if (made == 0 && !work_.wait_for_taker()) return;
+      if (!work_.wait_for_taker(start_of_next(making))) return;
     }
+  }
+
+  // When the frame after the one just taken is to be begun, so that it is ready in time if
+  // rendering and making take as long as last time.
+  Clock::time_point start_of_next(Clock::duration making) const {
+    constexpr double margin = 1.5;
+    const auto early = std::chrono::duration_cast<Clock::duration>(margin * making);
+    return Clock::now() + Clock::duration(rendering_.load()) - early;
   }
 
   // Waits for a live frame's time. A frame whose successor is due as well is left out: moves
@@ -299,6 +314,7 @@ class Show::Stages {
   std::vector<ShowCommand> commands_;
   std::vector<std::string> notes_;
   std::atomic<bool> paused_ = false;
+  std::atomic<Clock::rep> rendering_ = 0;  // how long the last frame took from hand to hand
   Handover<Work> work_;
   std::atomic<std::shared_ptr<const ShowStatus>> status_;
 };
