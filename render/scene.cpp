@@ -7,35 +7,13 @@
 #include <limits>
 #include <stdexcept>
 
+#include "render/blocker_boxes.h"
 #include "render/embree_context.h"
 #include "render/shader.h"
+#include "render/transform.h"
 
 namespace render {
 namespace {
-
-Vec3f transform_point(const std::array<float, 12>& m, Vec3f p) {
-  return {m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
-          m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]};
-}
-
-Vec3f transform_vector(const std::array<float, 12>& m, Vec3f v) {
-  return {m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
-          m[8] * v.x + m[9] * v.y + m[10] * v.z};
-}
-
-// Normals go with the cofactors of the 3x3 part, whatever its scale or handedness.
-std::array<float, 9> normal_matrix(const std::array<float, 12>& m) {
-  const Vec3f a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]};
-  const Vec3f bc = cross(b, c), ca = cross(c, a), ab = cross(a, b);
-  return {bc.x, bc.y, bc.z, ca.x, ca.y, ca.z, ab.x, ab.y, ab.z};
-}
-
-Vec3f transform_normal(const std::array<float, 9>& m, Vec3f n) {
-  return normalize(Vec3f{m[0] * n.x + m[1] * n.y + m[2] * n.z, m[3] * n.x + m[4] * n.y + m[5] * n.z,
-                         m[6] * n.x + m[7] * n.y + m[8] * n.z});
-}
-
-bool is_finite(Vec3f p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 unsigned mask_of(const Instance& instance) {
   if (instance.kind == ObjectKind::virtual_object) return mask_virtual;
@@ -114,7 +92,7 @@ struct Scene::Impl {
   std::vector<std::array<float, 9>> normal_matrices;    // per instance
   Bounds virtual_bounds{};
   Bounds all_bounds{};
-  Bounds blocker_bounds{};
+  Bounds blocker_bounds = no_bounds;
   std::vector<Bounds> blocker_boxes;
   std::size_t skipped = 0;
   bool real_blockers = false;
@@ -138,7 +116,6 @@ struct Scene::Impl {
                 const std::vector<std::uint32_t>& triangles,
                 bool all);
   void grow(Bounds& bounds, const std::array<float, 12>& m, const Mesh& mesh) const;
-  void find_blocker_boxes();
 
   const Part& part(unsigned geom_id, unsigned inst_id, std::uint32_t& instance) const {
     if (inst_id == RTC_INVALID_GEOMETRY_ID) {
@@ -157,69 +134,10 @@ struct Scene::Impl {
   bool stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const;
 };
 
-// Splits the blockers' triangles in halves, four times, along the longest side of their centres.
-void Scene::Impl::find_blocker_boxes() {
-  struct Item {
-    Vec3f lower, upper;
-  };
-  constexpr float inf = std::numeric_limits<float>::infinity();
-  const auto low = [](Vec3f a, Vec3f b) {
-    return Vec3f{std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
-  };
-  const auto high = [](Vec3f a, Vec3f b) {
-    return Vec3f{std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
-  };
-  std::vector<Item> items;
-  for (const Instance& instance : description.instances) {
-    if (instance.kind == ObjectKind::stand_in && !instance.blocks_light) continue;
-    const Mesh& mesh = *description.meshes[instance.mesh];
-    const auto& m = instance.set_from_object;
-    for (const auto& [a, b, c] : mesh.triangles) {
-      const Vec3f p = transform_point(m, mesh.positions[a]);
-      const Vec3f q = transform_point(m, mesh.positions[b]);
-      const Vec3f r = transform_point(m, mesh.positions[c]);
-      if (!is_finite(p) || !is_finite(q) || !is_finite(r)) continue;
-      items.push_back({low(p, low(q, r)), high(p, high(q, r))});
-    }
-  }
-  const auto bounds_of = [&](std::span<const Item> part) {
-    Bounds b{{inf, inf, inf}, {-inf, -inf, -inf}};
-    for (const Item& item : part) {
-      b.lower = low(b.lower, item.lower);
-      b.upper = high(b.upper, item.upper);
-    }
-    return b;
-  };
-  const auto split = [&](auto&& self, std::span<Item> part, int depth) -> void {
-    const Bounds b = bounds_of(part);
-    if (depth == 0 || part.size() < 2) {
-      if (!part.empty()) blocker_boxes.push_back(b);
-      return;
-    }
-    const Vec3f side = b.upper - b.lower;
-    const auto coordinate = [&](const Item& item) {
-      const Vec3f sum = item.lower + item.upper;
-      return side.x >= side.y && side.x >= side.z ? sum.x : side.y >= side.z ? sum.y : sum.z;
-    };
-    const auto middle = part.begin() + static_cast<std::ptrdiff_t>(part.size() / 2);
-    std::nth_element(part.begin(), middle, part.end(),
-                     [&](const Item& p, const Item& q) { return coordinate(p) < coordinate(q); });
-    const auto half = part.size() / 2;
-    self(self, part.first(half), depth - 1);
-    self(self, part.subspan(half), depth - 1);
-  };
-  blocker_bounds = bounds_of(items);
-  split(split, items, 4);
-}
-
 void Scene::Impl::grow(Bounds& bounds, const std::array<float, 12>& m, const Mesh& mesh) const {
   for (const Vec3f& position : mesh.positions) {
     const Vec3f p = transform_point(m, position);
-    if (!is_finite(p)) continue;
-    bounds.lower = {std::min(bounds.lower.x, p.x), std::min(bounds.lower.y, p.y),
-                    std::min(bounds.lower.z, p.z)};
-    bounds.upper = {std::max(bounds.upper.x, p.x), std::max(bounds.upper.y, p.y),
-                    std::max(bounds.upper.z, p.z)};
+    if (is_finite(p)) bounds = joined(bounds, {p, p});
   }
 }
 
@@ -248,8 +166,7 @@ void Scene::Impl::build() {
   mesh_scenes.assign(description.meshes.size(), nullptr);
   parts_of_mesh.resize(description.meshes.size());
 
-  constexpr float inf = std::numeric_limits<float>::infinity();
-  virtual_bounds = all_bounds = {{inf, inf, inf}, {-inf, -inf, -inf}};
+  virtual_bounds = all_bounds = no_bounds;
   for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
     const Instance& instance = description.instances[i];
     const Mesh& mesh = *description.meshes[instance.mesh];
@@ -282,7 +199,8 @@ void Scene::Impl::build() {
     instance_of_geometry.push_back(i);
   }
   rtcCommitScene(scene);
-  find_blocker_boxes();
+  blocker_boxes = find_blocker_boxes(description);
+  for (const Bounds& box : blocker_boxes) blocker_bounds = joined(blocker_bounds, box);
   if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE) {
     throw std::runtime_error("Embree could not build the scene (error " +
                              std::to_string(static_cast<int>(error)) + "): is memory short?");
