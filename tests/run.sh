@@ -20,5 +20,6 @@ while true; do
 done
 cmake -S . -B "$build" -G Ninja -DPLATELIGHT_FULL_TESTS=$full -DPLATELIGHT_SANITIZE="$sanitize" >/dev/null
 cmake --build "$build"
+export LSAN_OPTIONS="suppressions=$PWD/tests/leaks.supp:print_suppressions=0 ${LSAN_OPTIONS:-}"
 export TSAN_OPTIONS="suppressions=$PWD/tests/threads.supp ${TSAN_OPTIONS:-}"
 exec ctest --test-dir "$build" --output-on-failure -j "$(nproc)" "$@"
