@@ -301,6 +301,7 @@ void CellBaker::receive(int count, bool grid) {
   r.active = {};
   r.count = 0;
   r.real_first.fill(0);
+  tested_.clear();
   std::array<std::uint16_t, stream_rays> place;     // of points among receivers
   std::array<std::uint16_t, stream_rays> point_at;  // and back
   std::fill_n(place.begin(), count, nowhere);
@@ -333,7 +334,6 @@ void CellBaker::receive(int count, bool grid) {
       gather_cell(frame_->light, r, gather_, transport_->visibility, *statistics_);
       transport_->receiving = r.active;
     } else {
-      tested_.clear();
       gather_points(frame_->light, r, gather_, tested_, *statistics_);
     }
   }

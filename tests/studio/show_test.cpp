@@ -87,8 +87,9 @@ TEST_F(ShowTest, CountsFramesThatThePlateLost) {
 TEST_F(ShowTest, DropsLateFramesWhenLiveAndKeepsToTheClock) {
   ShowOptions options;
   options.live = true;
+  options.frames = 9;
   std::vector<std::int64_t> numbers;
-  Show show(made_set("grey:20,25,0"), options);
+  Show show(made_set("grey:100000,25,0"), options);
   show.run([&](const ShownFrame& shown) {
     numbers.push_back(shown.prepared.job.frame);
     std::this_thread::sleep_for(95ms);
