@@ -1,15 +1,12 @@
-// Cameras by the show's clock, brackets that roll, and what hands values over.
+// Cameras by the show's clock, and brackets that roll.
 #include "studio/source.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <random>
-#include <thread>
 
-#include "studio/handover.h"
 #include "studio/probe_source.h"
 #include "studio/quantiles.h"
 #include "tests/studio/made_show.h"
@@ -49,49 +46,6 @@ TEST(Source, ShowsASinglePictureForEver) {
 }
 
 TEST(Source, RefusesACameraWithoutFrames) { EXPECT_THROW(grey_source(0, 25), std::runtime_error); }
-
-TEST(Handover, LetsTheGiverWorkOneValueAheadAndNoMore) {
-  Handover<int> handover;
-  std::atomic<int> begun = 0;
-  std::jthread giver([&] {
-    for (int i = 0; i < 50; ++i) {
-      begun = i;
-      if (!handover.give(i)) return;
-    }
-    handover.close();
-  });
-  int expected = 0;
-  while (const auto value = handover.take()) {
-    EXPECT_EQ(*value, expected++);
-    std::this_thread::yield();
-    EXPECT_LE(begun, *value + 1);
-  }
-  EXPECT_EQ(expected, 50);
-}
-
-TEST(Handover, TellsTheGiverWhenTheTakerAsksAgain) {
-  Handover<int> handover;
-  std::atomic<bool> dealt_with = false;
-  std::thread taker([&] {
-    EXPECT_EQ(handover.take(), 1);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    dealt_with = true;
-    EXPECT_EQ(handover.take(), std::nullopt);
-  });
-  EXPECT_TRUE(handover.give(1));
-  EXPECT_TRUE(handover.wait_for_taker());
-  EXPECT_TRUE(dealt_with);
-  handover.close();
-  EXPECT_FALSE(handover.wait_for_taker());
-  taker.join();
-}
-
-TEST(Handover, FreesAGiverWhenItIsClosed) {
-  Handover<int> handover;
-  std::jthread giver([&] { EXPECT_FALSE(handover.give(1)); });
-  std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  handover.close();
-}
 
 TEST(Quantiles, AreRightToOnePercent) {
   std::mt19937 random(2);
