@@ -13,6 +13,7 @@
 #include "capture/replay.h"
 #include "capture/response.h"
 #include "capture/sequence.h"
+#include "capture/v4l2_camera.h"
 #include "capture/video_file.h"
 
 namespace capture {
@@ -64,9 +65,13 @@ std::unique_ptr<Camera> open_replay_uri(std::string_view rest, const CameraOptio
   return open_replay(absolute(rest, options), options, curves_of(options));
 }
 
+std::unique_ptr<Camera> open_v4l2_uri(std::string_view rest, const CameraOptions& options) {
+  return open_v4l2(rest, options, curves_of(options));
+}
+
 std::map<std::string, CameraOpener, std::less<>>& openers() {
-  static std::map<std::string, CameraOpener, std::less<>> by_scheme{{"file", open_file},
-                                                                    {"replay", open_replay_uri}};
+  static std::map<std::string, CameraOpener, std::less<>> by_scheme{
+      {"file", open_file}, {"replay", open_replay_uri}, {"v4l2", open_v4l2_uri}};
   return by_scheme;
 }
 
