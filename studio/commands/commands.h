@@ -9,6 +9,7 @@ Command bench_command();
 Command chart_command();
 Command check_command();
 Command demo_command();
+Command devices_command();
 Command hdr_command();
 Command run_command();
 Command still_command();

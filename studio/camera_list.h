@@ -1,0 +1,20 @@
+// The cameras that there are, in words and as figures.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "capture/v4l2_device.h"
+
+namespace studio {
+
+// One line after the other, without line ends; says so if there is no camera.
+std::vector<std::string> camera_lines(const capture::V4l2Listing& listing);
+
+// {"cameras": [{"uri", "path", "bus", "name", "driver", "modes": [{"format", "read", "min_size",
+// "max_size", "rates", "rates_between"}], "exposure_s": [shortest, longest] or null, "controls":
+// [{"name", "low", "high", "step", "default", "value", "settable", "inactive"}]}],
+// "closed": [{"path", "reason"}]}
+std::string cameras_json(const capture::V4l2Listing& listing);
+
+}  // namespace studio
