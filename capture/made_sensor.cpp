@@ -140,4 +140,14 @@ double light_of_code(const MadeSensor& sensor, int code) {
   return decode(sensor.transfer, (code - sensor.pedestal) / (last_code(sensor) - sensor.pedestal));
 }
 
+NoiseModel noise_of(const MadeSensor& sensor) {
+  check(sensor);
+  if (sensor.transfer != Transfer::linear) {
+    throw std::invalid_argument("the noise model is that of a linear sensor");
+  }
+  const double step = 1 / (last_code(sensor) - sensor.pedestal);
+  const double read = sensor.read_noise_e / sensor.full_well_e;
+  return {.read = read * read + step * step / 12, .shot = 1 / sensor.full_well_e};
+}
+
 }  // namespace capture

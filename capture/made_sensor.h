@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "capture/colour.h"
+#include "capture/hdr.h"
 #include "capture/image.h"
 
 namespace capture {
@@ -51,5 +52,9 @@ MadeShot expose(const MadeSensor& sensor,
 // The light that a code stands for, 0 = black, 1 = full well: what a reader with the right response
 // makes of it.
 double light_of_code(const MadeSensor& sensor, int code);
+
+// The noise of a linear sensor's values, (code - pedestal) / (last code - pedestal): photons,
+// reading and the rounding to codes. Throws std::invalid_argument for other transfers.
+NoiseModel noise_of(const MadeSensor& sensor);
 
 }  // namespace capture

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numbers>
 #include <random>
 #include <stdexcept>
 
@@ -16,23 +15,6 @@
 
 namespace capture {
 namespace {
-
-double normal_density(double x) { return std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi); }
-double normal_share(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
-
-// Fisher's information on radiance from one shot whose values from `saturation` on are known only
-// to lie there.
-double information(double radiance, double exposure_s, const NoiseModel& noise) {
-  const double mean = radiance * exposure_s;
-  const double deviation = std::sqrt(noise.variance(mean));
-  const double edge = (noise.saturation - mean) / deviation;
-  // For a normal value cut off at `edge`: of the part below, the integral of u^2 density; of the
-  // event above, density^2 / share.
-  const double below = normal_share(edge) - edge * normal_density(edge);
-  const double above = normal_share(-edge);
-  const double event = above > 1e-12 ? normal_density(edge) * normal_density(edge) / above : 0;
-  return exposure_s * exposure_s / (deviation * deviation) * (below + event);
-}
 
 Image sample_shot(
     double radiance, double exposure_s, const NoiseModel& noise, int count, std::mt19937& random) {
@@ -85,7 +67,7 @@ TEST(MergeShots, ComesWithin15PercentOfTheCramerRaoBound) {
     std::vector<Shot> shots;
     for (const double exposure_s : exposures_s) {
       shots.push_back({sample_shot(radiance, exposure_s, noise, count, random), exposure_s});
-      bound += information(radiance, exposure_s, noise);
+      bound += made::information(radiance, exposure_s, noise);
     }
     const Image merged = merge_shots(shots, noise);
     double squares = 0;

@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <random>
 #include <vector>
 
+#include "capture/hdr.h"
 #include "capture/response.h"
 
 namespace made {
@@ -68,6 +70,25 @@ capture::Still8 photograph(const Scene& scene,
         std::upper_bound(borders.begin(), borders.end(), light) - borders.begin()));
   }
   return still;
+}
+
+inline double normal_density(double x) {
+  return std::exp(-x * x / 2) / std::sqrt(2 * std::numbers::pi);
+}
+inline double normal_share(double x) { return std::erfc(-x / std::numbers::sqrt2) / 2; }
+
+// Fisher's information on radiance from one shot whose values from `saturation` on are known only
+// to lie there.
+inline double information(double radiance, double exposure_s, const capture::NoiseModel& noise) {
+  const double mean = radiance * exposure_s;
+  const double deviation = std::sqrt(noise.variance(mean));
+  const double edge = (noise.saturation - mean) / deviation;
+  // For a normal value cut off at `edge`: of the part below, the integral of u^2 density; of the
+  // event above, density^2 / share.
+  const double below = normal_share(edge) - edge * normal_density(edge);
+  const double above = normal_share(-edge);
+  const double event = above > 1e-12 ? normal_density(edge) * normal_density(edge) / above : 0;
+  return exposure_s * exposure_s / (deviation * deviation) * (below + event);
 }
 
 }  // namespace made

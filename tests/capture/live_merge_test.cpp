@@ -1,0 +1,434 @@
+// The live merge: radiance with a deviation that is true, and the newest light where shots
+// disagree.
+#include "capture/live_merge.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include "capture/made_sensor.h"
+#include "tests/capture/made_bracket.h"
+
+namespace capture {
+namespace {
+
+// 12 bit: radiance 1 fills the well in 1 s.
+MadeSensor camera() {
+  return {.full_well_e = 20000, .read_noise_e = 4, .bits = 12, .pedestal = 64};
+}
+
+LinearCodes codes_of(const MadeSensor& sensor, int width, int height) {
+  const double white = (1 << sensor.bits) - 1;
+  return {
+      width, height, {sensor.pedestal, sensor.pedestal, sensor.pedestal}, {white, white, white}};
+}
+
+// The newest shots of a camera, the newest last.
+struct Window {
+  std::vector<MadeShot> taken;
+  std::vector<double> exposures_s;
+
+  std::vector<CodedShot16> shots() const {
+    std::vector<CodedShot16> shots;
+    for (std::size_t i = 0; i < taken.size(); ++i) {
+      shots.push_back({taken[i].codes, exposures_s[i]});
+    }
+    return shots;
+  }
+};
+
+Window take(const MadeSensor& sensor,
+            const Image& radiance,
+            const std::vector<double>& exposures_s,
+            std::uint64_t first_shot) {
+  Window window;
+  for (const double exposure_s : exposures_s) {
+    window.taken.push_back(expose(sensor, radiance, exposure_s, first_shot++));
+    window.exposures_s.push_back(exposure_s);
+  }
+  return window;
+}
+
+Image grey(double radiance, int width, int height) {
+  Image image = make_image(height, width);
+  for (float& value : image.pixels) value = static_cast<float>(radiance);
+  return image;
+}
+
+MergedFrame merge(const Window& window,
+                  const MadeSensor& sensor,
+                  double consistency = WindowMergeSettings{}.consistency) {
+  MergedFrame frame;
+  merge_window(window.shots(), codes_of(sensor, window.taken[0].width, window.taken[0].height),
+               {.noise = noise_of(sensor), .consistency = consistency}, frame);
+  return frame;
+}
+
+std::vector<LiveShot> live_shots(const std::vector<Shot>& shots) {
+  std::vector<LiveShot> live;
+  for (const Shot& shot : shots) live.push_back({&shot.linear, shot.exposure_s});
+  return live;
+}
+
+const std::vector<std::vector<double>> brackets{{1, 1.0 / 4, 1.0 / 16, 1.0 / 64, 1.0 / 256},
+                                                {1.0 / 8, 1, 1.0 / 2, 1.0 / 16, 1.0 / 4},
+                                                {1.0 / 64, 1.0 / 8, 1},
+                                                {1, 1, 1}};
+
+TEST(MergeWindow, RecoversRadianceWhateverTheBracket) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> stops(-8, 8);
+  for (int trial = 0; trial < 100; ++trial) {
+    std::vector<double> exposures_s;
+    for (std::size_t i = 0; i <= random() % 6; ++i) exposures_s.push_back(std::exp2(stops(random)));
+    const double shortest = *std::ranges::min_element(exposures_s);
+    Image radiance = make_image(5, 31);  // a whole stretch and a rest
+    for (float& value : radiance.pixels) {
+      value = static_cast<float>(std::exp2(stops(random) - 8) * 0.97 / shortest);
+    }
+    std::vector<Shot> shots;
+    for (const double exposure_s : exposures_s) {
+      Shot shot{radiance, exposure_s};
+      for (float& value : shot.linear.pixels) {
+        value = std::min(1.0F, value * static_cast<float>(exposure_s));
+      }
+      shots.push_back(std::move(shot));
+    }
+    MergedFrame frame;
+    merge_window(live_shots(shots), {}, frame);
+    for (std::size_t i = 0; i < radiance.pixels.size(); ++i) {
+      ASSERT_NEAR(frame.radiance.pixels[i] / radiance.pixels[i], 1, 1e-5);
+    }
+  }
+}
+
+TEST(MergeWindow, ComesWithin15PercentOfTheCramerRaoBound) {
+  const MadeSensor sensor = camera();
+  const NoiseModel noise = noise_of(sensor);
+  for (const std::vector<double>& exposures_s : brackets) {
+    const double shortest = *std::ranges::min_element(exposures_s);
+    double squares_over_bound = 0;
+    int levels = 0;
+    for (double stop = -9; std::exp2(stop) * shortest < 0.9; stop += 0.25, ++levels) {
+      const Image radiance = grey(std::exp2(stop), 32, 24);
+      double information = 0;
+      for (const double exposure_s : exposures_s) {
+        information += made::information(std::exp2(stop), exposure_s, noise);
+      }
+      const auto seed = static_cast<std::uint64_t>(1000 * (stop + 20));
+      const MergedFrame frame = merge(take(sensor, radiance, exposures_s, seed), sensor);
+      double squares = 0;
+      for (const float value : frame.radiance.pixels) {
+        squares += std::pow(static_cast<double>(value) - std::exp2(stop), 2);
+      }
+      squares_over_bound +=
+          squares / static_cast<double>(frame.radiance.pixels.size()) * information;
+    }
+    EXPECT_LT(std::sqrt(squares_over_bound / levels), 1.15) << exposures_s[0];
+  }
+}
+
+TEST(MergeWindow, TellsADeviationThatHoldsTheTruthIn68PercentOfAllValues) {
+  const MadeSensor sensor = camera();
+  for (const std::vector<double>& exposures_s : brackets) {
+    const double shortest = *std::ranges::min_element(exposures_s);
+    for (double stop = -9; std::exp2(stop) * shortest < 0.9; stop += 1) {
+      const double truth = std::exp2(stop);
+      const auto seed = static_cast<std::uint64_t>(1000 * (stop + 20));
+      const MergedFrame frame = merge(take(sensor, grey(truth, 64, 48), exposures_s, seed), sensor);
+      int within = 0;
+      for (std::size_t i = 0; i < frame.radiance.pixels.size(); ++i) {
+        const double error = static_cast<double>(frame.radiance.pixels[i]) - truth;
+        if (std::abs(error) <= static_cast<double>(frame.deviation.pixels[i])) ++within;
+      }
+      EXPECT_NEAR(within / static_cast<double>(frame.radiance.pixels.size()), 0.683, 0.05)
+          << "radiance 2^" << stop << ", first exposure " << exposures_s[0];
+    }
+  }
+}
+
+TEST(MergeWindow, IsUnbiasedNearBlack) {
+  const MadeSensor sensor = camera();
+  constexpr double truth = 2e-4;  // 4 electrons in the longest exposure
+  const MergedFrame frame = merge(take(sensor, grey(truth, 128, 96), {0.25, 1}, 5), sensor);
+  double sum = 0;
+  for (const float value : frame.radiance.pixels) sum += static_cast<double>(value);
+  const auto count = static_cast<double>(frame.radiance.pixels.size());
+  EXPECT_NEAR(sum / count, truth, 4 * 3e-4 / std::sqrt(count));
+}
+
+TEST(MergeWindow, FindsNoMotionWhereThereIsNone) {
+  const MadeSensor sensor = camera();
+  const made::Scene scene = made::patches(128, 96, 6);
+  Image radiance = make_image(scene.height, scene.width);
+  for (std::size_t i = 0; i < radiance.pixels.size(); ++i) {
+    radiance.pixels[i] = static_cast<float>(scene.radiance[i]);
+  }
+  for (const std::vector<double>& exposures_s : brackets) {
+    const MergedFrame frame = merge(take(sensor, radiance, exposures_s, 9), sensor);
+    const double inconsistent =
+        frame.status_shares()[static_cast<std::size_t>(MergeStatus::inconsistent)];
+    EXPECT_LT(inconsistent, 1e-3);
+  }
+}
+
+TEST(MergeWindow, TellsBoundsFromValues) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  // Pixels: saturated in both, in one channel, dark, missing, plain, plain beside what is no value.
+  const std::vector<Shot> shots{
+      {Image{1,
+             6,
+             {1, 1, 1, 1, .2F, .2F, 0, 0, 0, nan, nan, nan, .5F, .5F, .5F, .5F, .5F, -infinity}},
+       1},
+      {Image{1,
+             6,
+             {1, 1, 1, 1, .02F, .02F, 0, 0, 0, nan, nan, -infinity, .05F, .05F, .05F, .05F, nan,
+              .05F}},
+       0.1}};
+  MergedFrame frame;
+  merge_window(live_shots(shots), {}, frame);
+  using enum MergeStatus;
+  EXPECT_EQ(frame.status,
+            (std::vector<MergeStatus>{lower_bound, lower_bound, dark, missing, good, good}));
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 0, 0), 10);
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 1, 0), 10);
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 1, 1), 0.2F);
+  EXPECT_EQ(frame.radiance.at(0, 3, 2), 0);
+  for (int c = 0; c < 3; ++c) EXPECT_FLOAT_EQ(frame.radiance.at(0, 5, c), 0.5F);
+  EXPECT_EQ(frame.deviation.at(0, 0, 0), infinity);
+  EXPECT_EQ(frame.deviation.at(0, 1, 0), infinity);
+  EXPECT_LT(frame.deviation.at(0, 1, 1), 0.01F);
+  EXPECT_EQ(frame.deviation.at(0, 3, 2), infinity);
+}
+
+TEST(MergeWindow, TakesTheNewestLightWhereALampWasSwitched) {
+  // Radiance 0.01 becomes 0.3, or the other way; the newest exposure is the long or the short one.
+  for (const std::vector<double>& exposures_s : {std::vector<double>{0.1, 0.5, 1}, {1, 0.1, 0.5}}) {
+    for (const bool on : {true, false}) {
+      std::vector<Shot> shots;
+      for (const double& exposure_s : exposures_s) {
+        const bool newest = &exposure_s == &exposures_s.back();
+        const double radiance = newest == on ? 0.3 : 0.01;
+        shots.push_back({grey(radiance * exposure_s, 40, 3), exposure_s});
+      }
+      MergedFrame frame;
+      merge_window(live_shots(shots), {}, frame);
+      for (const float value : frame.radiance.pixels) ASSERT_FLOAT_EQ(value, on ? 0.3F : 0.01F);
+      EXPECT_EQ(frame.status_shares()[static_cast<std::size_t>(MergeStatus::inconsistent)], 1);
+    }
+  }
+}
+
+TEST(MergeWindow, BelievesASaturatedNewestShotThatThereIsMoreLight) {
+  // A lamp of radiance 5 is on since the newest, long shot.
+  const std::vector<Shot> shots{
+      {grey(0.001, 40, 3), 0.1}, {grey(0.01, 40, 3), 1}, {grey(1, 40, 3), 1}};
+  MergedFrame frame;
+  merge_window(live_shots(shots), {}, frame);
+  for (const float value : frame.radiance.pixels) ASSERT_FLOAT_EQ(value, 1);
+  EXPECT_EQ(frame.status_shares()[static_cast<std::size_t>(MergeStatus::lower_bound)], 1);
+}
+
+TEST(MergeWindow, LeavesOutAPixelWholeIfOneChannelMoved) {
+  const std::vector<Shot> shots{{Image{1, 1, {.2F, .2F, .3F}}, 1},
+                                {Image{1, 1, {.201F, .201F, .1F}}, 1}};
+  MergedFrame frame;
+  merge_window(live_shots(shots), {}, frame);
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 0, 0), 0.201F);
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 0, 2), 0.1F);
+}
+
+// How pixels are merged together must not show.
+TEST(MergeWindow, GivesAPixelTheSameBitsWhateverItsNeighbours) {
+  const MadeSensor sensor = camera();
+  for (const double level : {0.02, 0.3, 1.5, 20.0}) {
+    for (const std::vector<double>& exposures_s : brackets) {
+      Window window = take(sensor, grey(level, 64, 8), exposures_s, 3);
+      const MergedFrame calm = merge(window, sensor);
+      for (std::size_t i = 0; i < window.taken.size(); ++i) {
+        for (std::size_t p = 0; p < 64 * 8; p += 5) {  // saturated here, and black there
+          for (std::size_t c = 0; c < 3; ++c) {
+            window.taken[i].codes[3 * p + c] = (p + i) % 2 == 0 ? 4095 : 64;
+          }
+        }
+      }
+      const MergedFrame mixed = merge(window, sensor);
+      for (std::size_t p = 0; p < 64 * 8; ++p) {
+        if (p % 5 == 0) continue;
+        ASSERT_EQ(mixed.status[p], calm.status[p]);
+        for (std::size_t i = 3 * p; i < 3 * p + 3; ++i) {
+          ASSERT_EQ(mixed.radiance.pixels[i], calm.radiance.pixels[i]) << level;
+          ASSERT_EQ(mixed.deviation.pixels[i], calm.deviation.pixels[i]) << level;
+        }
+      }
+    }
+  }
+}
+
+TEST(MergeWindow, GivesTheSameBitsInOneThreadAndWithoutNewMemory) {
+  const MadeSensor sensor = camera();
+  const Window window = take(sensor, grey(0.3, 301, 67), brackets[0], 3);
+  MergedFrame frame = merge(window, sensor);
+  const std::vector<float> radiance = frame.radiance.pixels;
+  const float* at = frame.radiance.pixels.data();
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  merge_window(window.shots(), codes_of(sensor, 301, 67), {.noise = noise_of(sensor)}, frame);
+  EXPECT_EQ(frame.radiance.pixels, radiance);
+  EXPECT_EQ(frame.radiance.pixels.data(), at);
+}
+
+TEST(MergeWindow, ReadsCodesOf8And16BitsAndFloatsAlike) {
+  const MadeSensor sensor{.full_well_e = 20000, .read_noise_e = 4, .bits = 8, .pedestal = 4};
+  const Window window = take(sensor, grey(0.4, 70, 9), {1, 0.25, 1.0 / 16}, 3);
+  const MergedFrame wide = merge(window, sensor);
+  std::vector<std::vector<std::uint8_t>> bytes;
+  std::vector<Shot> linear;
+  for (const MadeShot& shot : window.taken) {
+    bytes.emplace_back(shot.codes.begin(), shot.codes.end());
+    linear.push_back({make_image(9, 70), window.exposures_s[linear.size()]});
+    for (std::size_t i = 0; i < shot.codes.size(); ++i) {
+      linear.back().linear.pixels[i] = static_cast<float>((shot.codes[i] - 4) / 251.0);
+    }
+  }
+  std::vector<CodedShot8> narrow;
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    narrow.push_back({bytes[i], window.exposures_s[i]});
+  MergedFrame eight, floats;
+  merge_window(narrow, codes_of(sensor, 70, 9), {.noise = noise_of(sensor)}, eight);
+  merge_window(live_shots(linear), {.noise = noise_of(sensor)}, floats);
+  EXPECT_EQ(eight.radiance.pixels, wide.radiance.pixels);
+  EXPECT_EQ(eight.deviation.pixels, wide.deviation.pixels);
+  for (std::size_t i = 0; i < wide.radiance.pixels.size(); ++i) {
+    ASSERT_NEAR(floats.radiance.pixels[i], wide.radiance.pixels[i], 1e-5);
+  }
+}
+
+TEST(MergeWindow, HasBlackAndWhiteForEachChannel) {
+  const std::vector<std::uint8_t> codes{60, 120, 250};
+  MergedFrame frame;
+  merge_window(std::vector<CodedShot8>{{codes, 0.5}},
+               LinearCodes{1, 1, {10, 20, 0}, {110, 220, 250}}, {}, frame);
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 0, 0), 1);
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 0, 1), 1);
+  EXPECT_FLOAT_EQ(frame.radiance.at(0, 0, 2), 2);
+  EXPECT_EQ(frame.status[0], MergeStatus::lower_bound);
+  EXPECT_TRUE(std::isfinite(frame.deviation.at(0, 0, 1)));
+}
+
+// A person of four shades walks to the right through a room.
+Image room(int x_of_person, double lamp) {
+  Image image = make_image(72, 160);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const double wall = 0.3 + 0.2 * std::sin(0.2 * x) * std::cos(0.3 * y);
+      const bool person = x >= x_of_person && x < x_of_person + 24 && y >= 12;
+      constexpr double shades[] = {0.05, 0.8, 0.12, 0.03};
+      for (int c = 0; c < 3; ++c) {
+        const double seen = person ? shades[y / 18] * (1 - 0.15 * c) : wall * (1 - 0.1 * c);
+        image.at(y, x, c) = static_cast<float>(seen + (x > 120 ? lamp : lamp / 8));
+      }
+    }
+  }
+  return image;
+}
+
+// Root mean square error where light has changed in the window, beyond the deviation that is told.
+struct Ghost {
+  double plain = 0;
+  double ours = 0;
+};
+
+double unexplained(const MergedFrame& frame, std::size_t i, double truth) {
+  const double error = static_cast<double>(frame.radiance.pixels[i]) - truth;
+  const auto deviation = static_cast<double>(frame.deviation.pixels[i]);
+  return error * error - (std::isfinite(deviation) ? deviation * deviation : 0);
+}
+
+// Of a camera that goes through the exposures before a scene that changes from frame to frame.
+template <class SceneOf>
+Ghost ghost_of(const SceneOf& scene_of, const std::vector<double>& exposures_s, int frames) {
+  const MadeSensor sensor = camera();
+  Ghost squares;
+  double count = 0;
+  std::vector<Image> seen;
+  Window window;
+  for (int i = 0; i < frames; ++i) {
+    const double exposure_s = exposures_s[static_cast<std::size_t>(i) % exposures_s.size()];
+    seen.push_back(scene_of(i));
+    window.taken.push_back(expose(sensor, seen.back(), exposure_s, static_cast<std::uint64_t>(i)));
+    window.exposures_s.push_back(exposure_s);
+    if (seen.size() > exposures_s.size()) {
+      seen.erase(seen.begin());
+      window.taken.erase(window.taken.begin());
+      window.exposures_s.erase(window.exposures_s.begin());
+    }
+    if (seen.size() < exposures_s.size()) continue;
+    const MergedFrame plain = merge(window, sensor, 0);
+    const MergedFrame ours = merge(window, sensor);
+    for (std::size_t k = 0; k < plain.radiance.pixels.size(); ++k) {
+      const double truth = static_cast<double>(seen.back().pixels[k]);
+      const bool changed = std::ranges::any_of(
+          seen, [&](const Image& image) { return image.pixels[k] != seen.back().pixels[k]; });
+      if (!changed) continue;
+      squares.plain += unexplained(plain, k, truth);
+      squares.ours += unexplained(ours, k, truth);
+      ++count;
+    }
+  }
+  return {std::sqrt(std::max(0.0, squares.plain) / count),
+          std::sqrt(std::max(0.0, squares.ours) / count)};
+}
+
+TEST(MergeWindow, HasAFifthOfThePlainMergesGhostOfAWalkingPerson) {
+  for (const std::vector<double>& exposures_s :
+       {std::vector<double>{1, 0.25, 1.0 / 16}, {1, 1.0 / 16, 0.5, 1.0 / 8, 0.25}}) {
+    const Ghost ghost = ghost_of([](int i) { return room(10 + 4 * i, 0); }, exposures_s, 20);
+    EXPECT_GT(ghost.plain, 0.02);
+    EXPECT_LT(ghost.ours, ghost.plain / 5) << exposures_s.size();
+  }
+}
+
+TEST(MergeWindow, HasAFifthOfThePlainMergesGhostOfALampSwitchedOn) {
+  for (int phase = 0; phase < 3; ++phase) {
+    const Ghost ghost =
+        ghost_of([&](int i) { return room(40, i > 4 + phase ? 0.4 : 0); }, {1, 0.25, 1.0 / 16}, 12);
+    EXPECT_GT(ghost.plain, 0.01);
+    EXPECT_LT(ghost.ours, ghost.plain / 5) << phase;
+  }
+}
+
+TEST(MergeWindow, RefusesWhatDoesNotFit) {
+  MergedFrame frame;
+  EXPECT_THROW(merge_window(std::span<const LiveShot>(), {}, frame), std::invalid_argument);
+  const std::vector<Shot> sizes{{grey(0, 2, 2), 1}, {grey(0, 2, 3), 1}};
+  EXPECT_THROW(merge_window(live_shots(sizes), {}, frame), std::invalid_argument);
+  const std::vector<Shot> alpha{{make_image(2, 2, 4), 1}};
+  EXPECT_THROW(merge_window(live_shots(alpha), {}, frame), std::invalid_argument);
+  const std::vector<LiveShot> none{{nullptr, 1}};
+  EXPECT_THROW(merge_window(none, {}, frame), std::invalid_argument);
+  const std::vector<Shot> many(17, {grey(0, 1, 1), 1});
+  EXPECT_THROW(merge_window(live_shots(many), {}, frame), std::invalid_argument);
+  for (const double wrong : {0.0, -1.0, 1e-30, std::nan("")}) {
+    const std::vector<Shot> no_time{{grey(0, 1, 1), wrong}};
+    EXPECT_THROW(merge_window(live_shots(no_time), {}, frame), std::invalid_argument);
+  }
+  const std::vector<Shot> one{{grey(0, 1, 1), 1}};
+  EXPECT_THROW(merge_window(live_shots(one), {.noise = {.read = 0}}, frame), std::invalid_argument);
+  EXPECT_THROW(merge_window(live_shots(one), {.noise = {}, .consistency = -1}, frame),
+               std::invalid_argument);
+  const std::vector<std::uint8_t> codes{1, 2, 3};
+  const std::vector<CodedShot8> coded{{codes, 1}};
+  EXPECT_THROW(merge_window(coded, LinearCodes{2, 1}, {}, frame), std::invalid_argument);
+  EXPECT_THROW(merge_window(coded, LinearCodes{1, 1, {9, 9, 9}, {9, 9, 9}}, {}, frame),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace capture
