@@ -3,13 +3,14 @@
 
 #include <vector>
 
+#include "studio/charts/hdr.h"
 #include "studio/charts/lights.h"
 #include "studio/charts/photograph.h"
 
 namespace studio {
 
 std::span<const ChartStage> chart_stages() {
-  static const std::vector<ChartStage> all{lights_chart(), photograph_chart()};
+  static const std::vector<ChartStage> all{hdr_chart(), lights_chart(), photograph_chart()};
   return all;
 }
 

@@ -327,7 +327,7 @@ void draw_stressor(Svg& svg, const Stressor& stressor, double left, double top) 
   }
   if (std::ranges::any_of(stressor.samples, [](const auto& s) { return s.status != "ok"; })) {
     svg.mark(left + 318, key_y - 4, Mark::cross, 5, colours[1]);
-    svg.text(left + 330, key_y, "refused or failed", {11.5});
+    svg.text(left + 330, key_y, "its status is not ok", {11.5});
   }
 }
 

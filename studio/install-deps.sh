@@ -14,7 +14,7 @@ packages=(
   # compositing
   libopencolorio-dev
   # studio
-  fonts-dejavu-core libcli11-dev libfmt-dev librsvg2-dev nlohmann-json3-dev
+  fonts-dejavu-core libcli11-dev libfmt-dev libopencv-photo-dev librsvg2-dev nlohmann-json3-dev
   # tests
   ffmpeg libgmock-dev libgtest-dev openimageio-tools
 )
