@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "render/embree_context.h"
 #include "render/standard.h"
@@ -66,6 +67,30 @@ void CellBaker::bake(const FrameContext& frame,
 }
 
 // Tells what came of the cell's slots, and joins what is many times the same.
+namespace {
+
+std::uint32_t key_of(const CellTransport::LightTerm& l) { return l.slot * 65536U + l.light; }
+std::uint32_t key_of(const CellTransport::SharedTerm& s) {
+  return (s.slot * 65536U + s.centre) * 2U + s.shadow;
+}
+
+// Joins neighbouring terms of the same key, from one vector to another or within one. Returns how
+// many are left.
+template <class Term>
+std::size_t join(const std::vector<Term>& from, std::vector<Term>& to) {
+  std::size_t kept = 0;
+  for (const Term& term : from) {
+    if (kept > 0 && key_of(to[kept - 1]) == key_of(term)) {
+      to[kept - 1].weight += term.weight;
+    } else {
+      to[kept++] = term;
+    }
+  }
+  return kept;
+}
+
+}  // namespace
+
 void CellBaker::pack() {
   CellTransport& t = *transport_;
   std::copy_n(base_.begin(), cell_pixels, t.base.begin());
@@ -83,22 +108,27 @@ void CellBaker::pack() {
           {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(centre), borrowed_[k][i]});
     }
   }
-  const auto join = [](auto& terms, const auto& key) {
-    std::ranges::sort(terms, {}, key);  // in place: nothing is allocated
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < terms.size(); ++i) {
-      if (kept > 0 && key(terms[kept - 1]) == key(terms[i])) {
-        terms[kept - 1].weight += terms[i].weight;
-      } else {
-        terms[kept++] = terms[i];
-      }
-    }
-    terms.resize(kept);
-  };
-  join(t.lights, [](const CellTransport::LightTerm& l) { return l.slot * 65536U + l.light; });
-  join(t.shared, [](const CellTransport::SharedTerm& s) {
-    return (s.slot * 65536U + s.centre) * 2U + s.shadow;
-  });
+  pack_lights();
+  std::ranges::sort(t.shared, {}, [](const CellTransport::SharedTerm& s) {
+    return key_of(s);
+  });  // in place: nothing is allocated
+  t.shared.resize(join(t.shared, t.shared));
+}
+
+// One term for each light of a slot: by slots first, of which there are few.
+void CellBaker::pack_lights() {
+  auto& terms = transport_->lights;
+  std::array<std::uint32_t, 2 * cell_pixels + 1> first{};  // of each slot's terms
+  for (const CellTransport::LightTerm& term : terms) ++first[term.slot + 1U];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  sorted_lights_.resize(terms.size());
+  std::array<std::uint32_t, 2 * cell_pixels + 1> next = first;
+  for (const CellTransport::LightTerm& term : terms) sorted_lights_[next[term.slot]++] = term;
+  for (std::size_t slot = 0; slot < 2 * cell_pixels; ++slot) {
+    std::ranges::sort(std::span(sorted_lights_).subspan(first[slot], first[slot + 1] - first[slot]),
+                      {}, &CellTransport::LightTerm::light);
+  }
+  terms.resize(join(sorted_lights_, terms));
 }
 
 void CellBaker::trace(int count, bool coherent, RayKind kind) {

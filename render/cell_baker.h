@@ -132,6 +132,7 @@ class CellBaker final : public RaySink {
   void collect(const ShadePoint& p);
   void bounce();
   void pack();
+  void pack_lights();
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;
@@ -172,6 +173,7 @@ class CellBaker final : public RaySink {
   std::array<ShadePoint*, stream_rays> group_;
   std::array<std::uint8_t, stream_rays> done_;
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
+  std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<PointLight> tested_;
   std::vector<Lobe> lobes_;
   std::vector<QueuedRay> queue_;         // capacity reserved

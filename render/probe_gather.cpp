@@ -27,7 +27,7 @@ constexpr double pi = std::numbers::pi;
 // Shrunk pixels per texel, along each side, at least.
 constexpr double pixels_per_texel = 2;
 // Directions per shrunk pixel, along each side, that a texel is sampled by.
-constexpr double samples_per_pixel = 2;
+constexpr double samples_per_pixel = 1.5;
 constexpr int most_samples = 8;
 // Pixels with less of a texel than this are left out; balancing makes up for it.
 constexpr float least_part = 0.01F;

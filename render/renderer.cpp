@@ -1,8 +1,10 @@
 // One frame on this machine's threads.
 #include "render/renderer.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
 
 #include <mutex>
 #include <stdexcept>
@@ -60,7 +62,7 @@ void render_frame(const FrameInputs& inputs,
   const int size = job.effort.tile_size;
   const int columns = (width + size - 1) / size, rows = (height + size - 1) / size;
   std::mutex statistics_mutex;
-  tbb::parallel_for(0, columns * rows, [&](int i) {
+  const auto render = [&](int i) {
     Worker& worker = workers().local();
     Rect rect{i % columns * size, i / columns * size, size, size};
     rect.width = std::min(size, width - rect.x);
@@ -72,7 +74,14 @@ void render_frame(const FrameInputs& inputs,
     copy_rows(worker.result.matte, rect, result.matte);
     const std::lock_guard lock(statistics_mutex);
     result.statistics += worker.result.statistics;
-  });
+  };
+  // Tile by tile: a few of them hold nearly all the work, and must not come to one thread together.
+  tbb::parallel_for(
+      tbb::blocked_range<int>(0, columns * rows),
+      [&](const tbb::blocked_range<int>& tiles) {
+        for (int i = tiles.begin(); i != tiles.end(); ++i) render(i);
+      },
+      tbb::simple_partitioner());
 }
 
 }  // namespace render
