@@ -7,16 +7,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "tests/studio/quick_chart.h"
+
 namespace studio {
 namespace {
 
 const Chart& quick_chart() {
-  static const Chart chart = [] {
-    ChartRequest request;
-    request.quick = true;
-    Console console(true, "");
-    return hdr_chart().measure(request, console);
-  }();
+  static const Chart chart = measure_quickly(hdr_chart());
   return chart;
 }
 

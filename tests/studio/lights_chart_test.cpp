@@ -9,16 +9,13 @@
 #include <set>
 #include <string>
 
+#include "tests/studio/quick_chart.h"
+
 namespace studio {
 namespace {
 
 const Chart& quick_chart() {
-  static const Chart chart = [] {
-    ChartRequest request;
-    request.quick = true;
-    Console console(true, "");
-    return lights_chart().measure(request, console);
-  }();
+  static const Chart chart = measure_quickly(lights_chart());
   return chart;
 }
 
