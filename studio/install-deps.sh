@@ -3,7 +3,7 @@
 set -euo pipefail
 packages=(
   # build
-  build-essential clang-format cmake ninja-build pkg-config git ca-certificates
+  build-essential clang-format cmake file ninja-build pkg-config git ca-certificates
   # capture
   libavcodec-dev libavformat-dev libavutil-dev libswresample-dev libswscale-dev
   libeigen3-dev libexif-dev libimath-dev libopenexr-dev
