@@ -207,9 +207,8 @@ class HdrChart {
     time_points();
     const double memory = memory_ms();
     chart.subtitle = fmt::format(
-        "Made scene of {:.0f} stops, {}x{}, {} exposures, 20,000 electrons. Reading and writing "
-        "the "
-        "8-bit window's memory once takes {:.2f} ms. Least possible error: {:.4f} stops at 8 bits.",
+        "Made scene of {:.0f} stops, {}x{}, {} exposures. Its memory once: {:.1f} ms. Least "
+        "possible error: {:.3f} stops.",
         range(), side_, side_, members, memory, bound_stops(coded_, truth_));
     for (Candidate& candidate : candidates_) {
       candidate.point.figures.emplace_back("times_memory", candidate.point.time_ms / memory);
