@@ -10,7 +10,7 @@ kernel_root=${PLATELIGHT_GUEST_KERNEL:-/}
 limit_s=${PLATELIGHT_GUEST_LIMIT_S:-600}
 
 skip() {
-  echo "skipped: $1 (Debian packages: qemu-system-x86 busybox-static kmod cpio linux-image-amd64)"
+  echo "skipped: $1 (Debian packages: qemu-system-x86 busybox-static kmod cpio linux-image-amd64)" >&2
   exit 77
 }
 PATH=$PATH:/usr/sbin:/sbin
