@@ -53,14 +53,6 @@ v4l2_capability query(const V4l2Node& node) {
   return capability;
 }
 
-// The rate of an interval; nothing if it is absurd.
-std::optional<Rational> rate_of(const v4l2_fract& interval) {
-  if (interval.numerator == 0 || interval.denominator == 0) return std::nullopt;
-  const std::int64_t divisor =
-      std::gcd(std::int64_t{interval.numerator}, std::int64_t{interval.denominator});
-  return Rational{interval.denominator / divisor, interval.numerator / divisor};
-}
-
 void read_rates(const V4l2Node& node, V4l2Mode& mode) {
   for (std::uint32_t i = 0; i < max_rates; ++i) {
     v4l2_frmivalenum interval{};
@@ -70,10 +62,10 @@ void read_rates(const V4l2Node& node, V4l2Mode& mode) {
     interval.height = static_cast<std::uint32_t>(mode.max_height);
     if (node.call(VIDIOC_ENUM_FRAMEINTERVALS, &interval) < 0) break;
     const bool discrete = interval.type == V4L2_FRMIVAL_TYPE_DISCRETE;
-    const auto first = rate_of(discrete ? interval.discrete : interval.stepwise.min);
+    const auto first = rate_of_interval(discrete ? interval.discrete : interval.stepwise.min);
     if (first) mode.rates.push_back(*first);
     if (discrete) continue;
-    if (const auto last = rate_of(interval.stepwise.max)) mode.rates.push_back(*last);
+    if (const auto last = rate_of_interval(interval.stepwise.max)) mode.rates.push_back(*last);
     mode.rates_between = mode.rates.size() == 2;
     break;
   }
@@ -253,6 +245,13 @@ std::string reason_of(int error) {
     default:
       return std::generic_category().message(error);
   }
+}
+
+std::optional<Rational> rate_of_interval(const v4l2_fract& interval) {
+  if (interval.numerator == 0 || interval.denominator == 0) return std::nullopt;
+  const std::int64_t divisor =
+      std::gcd(std::int64_t{interval.numerator}, std::int64_t{interval.denominator});
+  return Rational{interval.denominator / divisor, interval.numerator / divisor};
 }
 
 V4l2Device describe_v4l2(const V4l2Node& node, const std::string& path) {

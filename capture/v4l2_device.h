@@ -10,6 +10,8 @@
 #include "capture/frame.h"
 #include "capture/v4l2_io.h"
 
+struct v4l2_fract;
+
 namespace capture {
 
 // Sizes of a format, and their rates. Devices with fixed sizes have one such for each.
@@ -90,6 +92,9 @@ struct V4l2Listing {
 };
 // Every node that captures video.
 V4l2Listing list_v4l2(const std::shared_ptr<V4l2Io>& io);
+
+// The rate of an interval between frames; nothing if it is absurd.
+std::optional<Rational> rate_of_interval(const v4l2_fract& interval);
 
 // "no permission", "it is used by another program": an errno in words, and what to do.
 std::string reason_of(int error);

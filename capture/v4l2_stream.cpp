@@ -5,7 +5,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -140,12 +139,8 @@ void V4l2Stream::set_rate(const V4l2Choice& choice, const V4l2Request& request) 
     interval.denominator = static_cast<std::uint32_t>(choice.rate->num);
   }
   const int error = node_.call(choice.rate ? VIDIOC_S_PARM : VIDIOC_G_PARM, &parameters);
-  const bool told = error >= 0 && interval.numerator > 0 && interval.denominator > 0;
-  if (told) {
-    const std::int64_t divisor =
-        std::gcd(std::int64_t{interval.numerator}, std::int64_t{interval.denominator});
-    rate_ = {interval.denominator / divisor, interval.numerator / divisor};
-  }
+  const auto told = error >= 0 ? rate_of_interval(interval) : std::nullopt;
+  if (told) rate_ = *told;
   if (!request.rate) return;
   const std::string asked = "rate " + words_of(*request.rate) + " was asked for; the device ";
   if (!told) throw std::runtime_error(asked + "has no rate that can be set");

@@ -66,7 +66,6 @@ void CellBaker::bake(const FrameContext& frame,
       statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays - rays_before;
 }
 
-// Tells what came of the cell's slots, and joins what is many times the same.
 namespace {
 
 std::uint32_t key_of(const CellTransport::LightTerm& l) { return l.slot * 65536U + l.light; }
@@ -91,6 +90,7 @@ std::size_t join(const std::vector<Term>& from, std::vector<Term>& to) {
 
 }  // namespace
 
+// Tells what came of the cell's slots, and joins what is many times the same.
 void CellBaker::pack() {
   CellTransport& t = *transport_;
   std::copy_n(base_.begin(), cell_pixels, t.base.begin());

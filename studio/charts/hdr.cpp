@@ -198,7 +198,7 @@ class HdrChart {
     chart.stage = "hdr";
     chart.title = "The HDR merge: error against time";
     chart.time_name = "CPU time of a frame, ms";
-    chart.error_name = "RMS error, stops";
+    chart.error_name = "RMS error, of a stop";
     chart.variant_name = "input";
     add_window(8);
     add_window(12);
@@ -214,8 +214,7 @@ class HdrChart {
       candidate.point.figures.emplace_back("times_memory", candidate.point.time_ms / memory);
       chart.points.push_back(std::move(candidate.point));
     }
-    chart.panels.push_back({"99th percentile of the error, stops", {{"error_p99", ""}}});
-    chart.panels.push_back({"values within one deviation", {{"within_deviation", ""}}});
+    chart.panels.push_back({"99th percentile of the error, of a stop", {{"error_p99", ""}}});
     add_stressors(chart);
     return chart;
   }

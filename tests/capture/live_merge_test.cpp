@@ -339,16 +339,20 @@ Image room(int x_of_person, double lamp) {
   return image;
 }
 
-// Root mean square error where light has changed in the window, beyond the deviation that is told.
+// Root mean square error where light has changed in the window: all of it, and what is beyond the
+// deviation that is told.
 struct Ghost {
-  double plain = 0;
-  double ours = 0;
+  double plain = 0, ours = 0;
+  double plain_beyond = 0, ours_beyond = 0;
 };
 
+double squared_error(const MergedFrame& frame, std::size_t i, double truth) {
+  return std::pow(static_cast<double>(frame.radiance.pixels[i]) - truth, 2);
+}
+
 double unexplained(const MergedFrame& frame, std::size_t i, double truth) {
-  const double error = static_cast<double>(frame.radiance.pixels[i]) - truth;
   const auto deviation = static_cast<double>(frame.deviation.pixels[i]);
-  return error * error - (std::isfinite(deviation) ? deviation * deviation : 0);
+  return squared_error(frame, i, truth) - (std::isfinite(deviation) ? deviation * deviation : 0);
 }
 
 // Of a camera that goes through the exposures before a scene that changes from frame to frame.
@@ -377,13 +381,16 @@ Ghost ghost_of(const SceneOf& scene_of, const std::vector<double>& exposures_s, 
       const bool changed = std::ranges::any_of(
           seen, [&](const Image& image) { return image.pixels[k] != seen.back().pixels[k]; });
       if (!changed) continue;
-      squares.plain += unexplained(plain, k, truth);
-      squares.ours += unexplained(ours, k, truth);
+      squares.plain += squared_error(plain, k, truth);
+      squares.ours += squared_error(ours, k, truth);
+      squares.plain_beyond += unexplained(plain, k, truth);
+      squares.ours_beyond += unexplained(ours, k, truth);
       ++count;
     }
   }
-  return {std::sqrt(std::max(0.0, squares.plain) / count),
-          std::sqrt(std::max(0.0, squares.ours) / count)};
+  const auto root = [&](double sum) { return std::sqrt(std::max(0.0, sum) / count); };
+  return {root(squares.plain), root(squares.ours), root(squares.plain_beyond),
+          root(squares.ours_beyond)};
 }
 
 TEST(MergeWindow, HasAFifthOfThePlainMergesGhostOfAWalkingPerson) {
@@ -395,12 +402,15 @@ TEST(MergeWindow, HasAFifthOfThePlainMergesGhostOfAWalkingPerson) {
   }
 }
 
-TEST(MergeWindow, HasAFifthOfThePlainMergesGhostOfALampSwitchedOn) {
+// All of the error is down to a quarter to an eleventh: a shot that is too short to tell the lamp's
+// faint light leaves the older ones in.
+TEST(MergeWindow, HasAFifthOfThePlainMergesGhostOfALampBeyondTheDeviationThatItTells) {
   for (int phase = 0; phase < 3; ++phase) {
     const Ghost ghost =
         ghost_of([&](int i) { return room(40, i > 4 + phase ? 0.4 : 0); }, {1, 0.25, 1.0 / 16}, 12);
-    EXPECT_GT(ghost.plain, 0.01);
-    EXPECT_LT(ghost.ours, ghost.plain / 5) << phase;
+    EXPECT_GT(ghost.plain_beyond, 0.01);
+    EXPECT_LT(ghost.ours_beyond, ghost.plain_beyond / 5) << phase;
+    EXPECT_LT(ghost.ours, ghost.plain / 3.5) << phase;
   }
 }
 
