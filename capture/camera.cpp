@@ -77,6 +77,12 @@ std::map<std::string, CameraOpener, std::less<>>& openers() {
 
 }  // namespace
 
+double Camera::set_exposure(double exposure_s) {
+  throw std::runtime_error(
+      "an exposure of " + std::to_string(exposure_s) +
+      " s was asked of a source whose exposure cannot be set: " + info().description);
+}
+
 void register_camera(std::string scheme, CameraOpener opener) {
   openers()[std::move(scheme)] = std::move(opener);
 }

@@ -45,7 +45,14 @@ struct CameraOptions {
   bool loop = false;                       // files start again at their end, time going on
   Rational picture_rate{25, 1};            // of sequences, and of stills that loop
   std::string base_dir;                    // relative paths start here
-  std::string response;  // .rsp file of a camera that is not linear; "" = by colour
+  std::string response;     // .rsp file of a camera that is not linear; "" = by colour
+  bool keep_coded = false;  // live cameras' frames keep the bytes that came
+};
+
+// Exposure times that a camera can be set to.
+struct ExposureRange {
+  double shortest_s = 0;
+  double longest_s = 0;
 };
 
 // A source of frames. Not thread-safe: one thread reads it.
@@ -60,6 +67,14 @@ class Camera {
   // to where the next frame would have been. What is not taken within 10 s is dropped.
   virtual std::optional<Sound> take_sound() { return std::nullopt; }
   virtual CameraStatistics statistics() const = 0;
+
+  // Nothing if the exposure cannot be set from frame to frame.
+  virtual std::optional<ExposureRange> exposure_range() const { return std::nullopt; }
+  // Asks for an exposure, which some later frame is the first to have. From the first call on,
+  // Frame::exposure_s is told only where the camera tells it with the frame itself. Returns what
+  // the device took, rounded as it rounds. Throws std::runtime_error naming the device, what was
+  // asked and what is possible, also while it is away.
+  virtual double set_exposure(double exposure_s);
 };
 
 // Opens `file:PATH` (video, a still, a sequence with %0Nd), `replay:DIR`, `v4l2:DEVICE` (see

@@ -10,6 +10,8 @@
 
 namespace capture {
 
+struct CodedPicture;
+
 // Instants on the monotonic clock, or, for files, since the file's first frame.
 using Time = std::chrono::nanoseconds;
 
@@ -38,6 +40,8 @@ struct Frame {
   double exposure_s = 0;               // 0 = unknown
   FrameStatus status = FrameStatus::good;
   std::string note;  // what happened, in words, if not good
+  // What the image was made from; null unless CameraOptions::keep_coded, of live cameras.
+  std::shared_ptr<const CodedPicture> coded;
 };
 
 }  // namespace capture

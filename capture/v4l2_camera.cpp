@@ -10,10 +10,10 @@
 #include <system_error>
 #include <utility>
 
+#include "capture/coded_picture.h"
 #include "capture/crop.h"
 #include "capture/pool.h"
 #include "capture/v4l2_format.h"
-#include "capture/v4l2_picture.h"
 #include "capture/v4l2_stream.h"
 
 namespace capture {
@@ -46,6 +46,8 @@ class V4l2Camera final : public Camera {
   const CameraInfo& info() const override { return info_; }
   std::optional<Frame> next() override;
   CameraStatistics statistics() const override { return statistics_; }
+  std::optional<ExposureRange> exposure_range() const override { return exposures_; }
+  double set_exposure(double exposure_s) override;
 
  private:
   [[noreturn]] void fail(const std::string& why) const;
@@ -68,15 +70,18 @@ class V4l2Camera final : public Camera {
   std::string uri_;
   std::shared_ptr<V4l2Io> io_;
   LightCurves curves_;
+  bool keep_coded_;
   V4l2Request request_;
   V4l2Request settings_;  // the same with what was chosen: for when the device comes back
   V4l2Identity identity_;
   std::unique_ptr<V4l2Stream> stream_;  // null while the device is away
-  std::optional<V4l2PictureReader> reader_;
-  V4l2Layout layout_;
+  std::optional<CodedPictureReader> reader_;
+  CodedLayout layout_;
   Crop crop_;
   CameraInfo info_;
+  std::optional<ExposureRange> exposures_;
   Pool<Image> pool_;
+  Pool<CodedPicture> coded_pool_;
 
   std::deque<Frame> ready_;
   std::shared_ptr<const Image> last_image_;
@@ -93,7 +98,10 @@ V4l2Camera::V4l2Camera(std::string_view rest,
                        const CameraOptions& options,
                        LightCurves curves,
                        std::shared_ptr<V4l2Io> io)
-    : uri_("v4l2:" + std::string(rest)), io_(std::move(io)), curves_(std::move(curves)) {
+    : uri_("v4l2:" + std::string(rest)),
+      io_(std::move(io)),
+      curves_(std::move(curves)),
+      keep_coded_(options.keep_coded) {
   if (options.frame.value_or(0) != 0) fail("a live camera starts at its frame 0 only");
   try {
     request_ = parse_v4l2(rest);
@@ -134,6 +142,7 @@ void V4l2Camera::open(const CameraOptions& options) {
   info_.width = crop_.width;
   info_.height = crop_.height;
   info_.rate = stream_->rate();
+  exposures_ = capture::exposure_range(stream_->device());
 }
 
 void V4l2Camera::wait_for_first() {
@@ -219,6 +228,15 @@ void V4l2Camera::read_next() {
   if (++time_outs_ >= most_time_outs) leave(note);
 }
 
+double V4l2Camera::set_exposure(double exposure_s) {
+  if (!stream_) throw std::runtime_error(uri_ + " is away: " + away_note_);
+  try {
+    return stream_->set_exposure(exposure_s);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(uri_ + ": " + words_of_error(error));
+  }
+}
+
 // Gives the device up until it can be opened again.
 void V4l2Camera::leave(const std::string& note) {
   stream_.reset();
@@ -241,6 +259,12 @@ void V4l2Camera::read_buffer(const V4l2Buffer& buffer) {
 }
 
 void V4l2Camera::read_picture(const V4l2Buffer& buffer, Frame& frame) {
+  if (keep_coded_) {
+    const std::shared_ptr<CodedPicture> coded = coded_pool_.lend();
+    coded->layout = layout_;
+    coded->bytes.assign(buffer.bytes.begin(), buffer.bytes.end());
+    frame.coded = coded;
+  }
   std::shared_ptr<Image> image = pool_.lend();
   std::string wrong = reader_->read(buffer.bytes, crop_, *image);
   if (buffer.marked_faulty && wrong.empty()) wrong = "the driver marked the picture as faulty";

@@ -25,8 +25,6 @@ constexpr std::uint32_t max_sizes = 512;
 constexpr std::uint32_t max_rates = 128;
 constexpr int max_controls = 1024;
 
-constexpr double exposure_unit_s = 1e-4;  // of V4L2_CID_EXPOSURE_ABSOLUTE
-
 template <std::size_t size>
 std::string text_of(const __u8 (&field)[size]) {
   const auto* const begin = reinterpret_cast<const char*>(field);
@@ -286,8 +284,9 @@ std::optional<ExposureRange> exposure_range(const V4l2Device& device) {
   const auto found = std::ranges::find(device.controls, std::uint32_t{V4L2_CID_EXPOSURE_ABSOLUTE},
                                        &V4l2Control::id);
   if (found == device.controls.end() || found->high <= 0) return std::nullopt;
-  return ExposureRange{exposure_unit_s * static_cast<double>(std::max<std::int64_t>(found->low, 1)),
-                       exposure_unit_s * static_cast<double>(found->high)};
+  return ExposureRange{
+      v4l2_exposure_unit_s * static_cast<double>(std::max<std::int64_t>(found->low, 1)),
+      v4l2_exposure_unit_s * static_cast<double>(found->high)};
 }
 
 double fixed_exposure_s(const V4l2Node& node) {
@@ -298,7 +297,7 @@ double fixed_exposure_s(const V4l2Node& node) {
       automatic->value != V4L2_EXPOSURE_SHUTTER_PRIORITY) {
     return 0;
   }
-  return exposure_unit_s * static_cast<double>(time->value);
+  return v4l2_exposure_unit_s * static_cast<double>(time->value);
 }
 
 V4l2Identity identity_of(const std::shared_ptr<V4l2Io>& io, const std::string& path) {

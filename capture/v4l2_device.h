@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/camera.h"
 #include "capture/frame.h"
 #include "capture/v4l2_io.h"
 
@@ -66,11 +67,10 @@ V4l2Device describe_v4l2(const V4l2Node& node, const std::string& path);
 // A control as it is now; nothing if the device has none of this number.
 std::optional<V4l2Control> read_control(const V4l2Node& node, std::uint32_t id);
 
+// Of V4L2_CID_EXPOSURE_ABSOLUTE.
+inline constexpr double v4l2_exposure_unit_s = 1e-4;
+
 // The range of exposure times that can be set, shortest first; nothing if the device tells none.
-struct ExposureRange {
-  double shortest_s = 0;
-  double longest_s = 0;
-};
 std::optional<ExposureRange> exposure_range(const V4l2Device& device);
 
 // The exposure time that is set; 0 if it is automatic, or not told.

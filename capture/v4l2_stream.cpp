@@ -80,7 +80,7 @@ V4l2Stream::V4l2Stream(std::shared_ptr<V4l2Io> io,
   const V4l2Choice choice = choose_mode(device_, request);
   set_format(choice);
   set_rate(choice, request);
-  set_controls(request);
+  for (const auto& [name, value] : request.controls) set_control(name, value);
   exposure_s_ = fixed_exposure_s(node_);
   start();
 }
@@ -149,29 +149,57 @@ void V4l2Stream::set_rate(const V4l2Choice& choice, const V4l2Request& request) 
   }
 }
 
-void V4l2Stream::set_controls(const V4l2Request& request) {
-  for (const auto& [name, value] : request.controls) {
-    // One that was set before may have woken this one.
-    const auto known = std::ranges::find(device_.controls, name, &V4l2Control::name);
-    if (known != device_.controls.end()) {
-      *known = read_control(node_, known->id).value_or(*known);
-    }
-    const V4l2Control& control = control_for(device_, name, value);
-    const std::string asked = name + "=" + std::to_string(value) + " was asked for";
-    v4l2_ext_control one{};
-    one.id = control.id;
-    one.value64 = value;  // the other members share its low bytes
-    v4l2_ext_controls all{};
-    all.which = V4L2_CTRL_WHICH_CUR_VAL;
-    all.count = 1;
-    all.controls = &one;
-    if (const int error = node_.call(VIDIOC_S_EXT_CTRLS, &all); error < 0) fail(asked, -error);
-    const auto now = read_control(node_, control.id);
-    if (now && std::abs(now->value - value) >= std::max<std::int64_t>(control.step, 1)) {
-      throw std::runtime_error(asked + "; the device sets " + std::to_string(now->value) +
-                               " instead");
-    }
+// Returns what the device has after that.
+std::int64_t V4l2Stream::set_control(const std::string& name, std::int64_t value) {
+  // One that was set before may have woken this one.
+  const auto known = std::ranges::find(device_.controls, name, &V4l2Control::name);
+  if (known != device_.controls.end()) {
+    *known = read_control(node_, known->id).value_or(*known);
   }
+  const V4l2Control& control = control_for(device_, name, value);
+  v4l2_ext_control one{};
+  one.id = control.id;
+  one.value64 = value;  // the other members share its low bytes
+  v4l2_ext_controls all{};
+  all.which = V4L2_CTRL_WHICH_CUR_VAL;
+  all.count = 1;
+  all.controls = &one;
+  const std::string asked = name + "=" + std::to_string(value) + " was asked for";
+  if (const int error = node_.call(VIDIOC_S_EXT_CTRLS, &all); error < 0) fail(asked, -error);
+  const auto now = read_control(node_, control.id);
+  if (now && std::abs(now->value - value) >= std::max<std::int64_t>(control.step, 1)) {
+    throw std::runtime_error(asked + "; the device sets " + std::to_string(now->value) +
+                             " instead");
+  }
+  return now ? now->value : value;
+}
+
+// "" = it has none of this number.
+std::string V4l2Stream::name_of_control(std::uint32_t id) const {
+  const auto control = std::ranges::find(device_.controls, id, &V4l2Control::id);
+  return control == device_.controls.end() ? std::string() : control->name;
+}
+
+double V4l2Stream::set_exposure(double exposure_s) {
+  const auto range = capture::exposure_range(device_);
+  if (!range) {
+    throw std::runtime_error("it has no exposure time that can be set (no exposure_time_absolute)");
+  }
+  if (!(exposure_s >= 0.5 * range->shortest_s && exposure_s <= 1.001 * range->longest_s)) {
+    throw std::runtime_error("an exposure of " + std::to_string(exposure_s) +
+                             " s was asked for; possible are " + std::to_string(range->shortest_s) +
+                             " to " + std::to_string(range->longest_s) + " s");
+  }
+  if (!exposure_is_ours_) {
+    // Only a manual exposure takes a time.
+    const std::string automatic = name_of_control(V4L2_CID_EXPOSURE_AUTO);
+    if (!automatic.empty()) set_control(automatic, V4L2_EXPOSURE_MANUAL);
+    exposure_is_ours_ = true;
+  }
+  const auto units = std::max<std::int64_t>(std::llround(exposure_s / v4l2_exposure_unit_s), 1);
+  exposure_s_ = 0;
+  return v4l2_exposure_unit_s *
+         static_cast<double>(set_control(name_of_control(V4L2_CID_EXPOSURE_ABSOLUTE), units));
 }
 
 void V4l2Stream::start() {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "capture/coded_picture.h"
 #include "capture/v4l2_device.h"
-#include "capture/v4l2_picture.h"
 #include "capture/v4l2_request.h"
 
 namespace capture {
@@ -35,10 +35,14 @@ class V4l2Stream {
   V4l2Stream& operator=(const V4l2Stream&) = delete;
 
   const V4l2Device& device() const { return device_; }
-  const V4l2Layout& layout() const { return layout_; }
+  const CodedLayout& layout() const { return layout_; }
   Rational rate() const { return rate_; }  // 0/1 = not told
-  // What it is set to; 0 = automatic, or not told.
+  // What it is set to; 0 = automatic, not told, or changing.
   double exposure_s() const { return exposure_s_; }
+  // Sets another one while pictures come, which some later one is the first to have; from then on
+  // exposure_s() is 0. Returns what the device took. Throws std::runtime_error, without the
+  // device's name.
+  double set_exposure(double exposure_s);
 
   // The next buffer in order; nothing if none came in time. Throws std::runtime_error, without the
   // device's name, when the stream has failed: make another one.
@@ -49,15 +53,17 @@ class V4l2Stream {
 
   void set_format(const V4l2Choice& choice);
   void set_rate(const V4l2Choice& choice, const V4l2Request& request);
-  void set_controls(const V4l2Request& request);
+  std::string name_of_control(std::uint32_t id) const;
+  std::int64_t set_control(const std::string& name, std::int64_t value);
   void start();
   void give_back();
 
   V4l2Node node_;
   V4l2Device device_;
-  V4l2Layout layout_;
+  CodedLayout layout_;
   Rational rate_;
   double exposure_s_ = 0;
+  bool exposure_is_ours_ = false;
   std::vector<std::unique_ptr<Mapping>> mappings_;
   std::optional<std::uint32_t> held_;  // the buffer that was lent last
   bool streaming_ = false;

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "capture/coded_picture.h"
 #include "tests/capture/fake_v4l2.h"
 
 namespace capture {
@@ -70,6 +71,45 @@ TEST_F(V4l2CameraTest, IsFoundByItsBus) {
   EXPECT_THAT(open("usb-0000:00:14.0-2?format=YUYV")->info().description, HasSubstr("Another"));
   EXPECT_THAT(refusal("usb-3"), AllOf(HasSubstr("usb-0000:00:14.0-1 (Made camera)"),
                                       HasSubstr("usb-0000:00:14.0-2 (Another)")));
+}
+
+TEST_F(V4l2CameraTest, SetsExposuresWhilePicturesCome) {
+  const auto camera = open("/dev/video0?format=YUYV");
+  ASSERT_TRUE(camera->exposure_range());
+  EXPECT_DOUBLE_EQ(camera->exposure_range()->shortest_s, 3e-4);
+  EXPECT_DOUBLE_EQ(camera->exposure_range()->longest_s, 0.2047);
+  EXPECT_DOUBLE_EQ(camera->set_exposure(0.00123), 0.0012);
+  EXPECT_EQ(device().controls[1].value, V4L2_EXPOSURE_MANUAL);
+  EXPECT_EQ(device().controls[2].value, 12);
+  EXPECT_EQ(camera->next()->exposure_s, 0) << "which frame has it is not known";
+  EXPECT_DOUBLE_EQ(camera->set_exposure(0.1), 0.1);
+  EXPECT_EQ(device().controls[2].value, 1000);
+}
+
+TEST_F(V4l2CameraTest, RefusesExposuresThatItHasNot) {
+  const auto camera = open("/dev/video0?format=YUYV");
+  for (const double exposure_s : {0.0, -1.0, 1.0, std::nan("")}) {
+    try {
+      camera->set_exposure(exposure_s);
+      ADD_FAILURE() << exposure_s;
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("v4l2:/dev/video0"), HasSubstr("0.2047")));
+    }
+  }
+  device().present = false;
+  EXPECT_THROW(camera->set_exposure(0.01), std::runtime_error);
+}
+
+TEST_F(V4l2CameraTest, KeepsWhatCameIfAsked) {
+  CameraOptions options;
+  options.keep_coded = true;
+  device().picture.resize(std::size_t{64} * 48 * 2, std::byte{77});
+  const auto frame = open("/dev/video0?format=YUYV", options)->next();
+  ASSERT_TRUE(frame->coded);
+  EXPECT_EQ(frame->coded->layout.fourcc, V4L2_PIX_FMT_YUYV);
+  EXPECT_EQ(frame->coded->layout.width, 64);
+  EXPECT_EQ(frame->coded->bytes, device().picture);
+  EXPECT_FALSE(open("/dev/video0?format=YUYV")->next()->coded);
 }
 
 TEST_F(V4l2CameraTest, CountsAndTimesFrames) {

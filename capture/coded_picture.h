@@ -1,4 +1,4 @@
-// Pictures as V4L2 cameras deliver them, to light.
+// Pictures as cameras deliver them, to light.
 #pragma once
 
 #include <cstddef>
@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "capture/crop.h"
 #include "capture/image.h"
@@ -13,8 +14,9 @@
 
 namespace capture {
 
-// How a device lays its pictures out, as it told when the format was set.
-struct V4l2Layout {
+// How a device lays its pictures out, as it told when the format was set. Formats and tags have
+// V4L2's names and numbers, whatever the camera.
+struct CodedLayout {
   std::uint32_t fourcc = 0;  // one of pixel_codings()
   int width = 0;
   int height = 0;
@@ -24,19 +26,26 @@ struct V4l2Layout {
   std::uint32_t ycbcr_encoding = 0;
   std::uint32_t quantization = 0;
   std::uint32_t transfer = 0;
+  friend bool operator==(const CodedLayout&, const CodedLayout&) = default;
+};
+
+// A picture as its camera sent it.
+struct CodedPicture {
+  CodedLayout layout;
+  std::vector<std::byte> bytes;
 };
 
 // Codes of video (also JPEG and 8-bit grey) become light as colour.md says. Those of raw formats
 // are light themselves, 0 = code 0 and 1 = the highest, unless `curves` has the camera's response.
 // Not thread-safe.
-class V4l2PictureReader {
+class CodedPictureReader {
  public:
   // Throws std::runtime_error, without the device's name, if the format is not read or its rows
   // overlap.
-  V4l2PictureReader(const V4l2Layout& layout, const LightCurves& curves);
-  ~V4l2PictureReader();
-  V4l2PictureReader(V4l2PictureReader&&) noexcept;
-  V4l2PictureReader& operator=(V4l2PictureReader&&) noexcept;
+  CodedPictureReader(const CodedLayout& layout, const LightCurves& curves);
+  ~CodedPictureReader();
+  CodedPictureReader(CodedPictureReader&&) noexcept;
+  CodedPictureReader& operator=(CodedPictureReader&&) noexcept;
 
   // Bytes of a whole picture; 0 = they vary (JPEG).
   std::size_t picture_bytes() const;

@@ -1,5 +1,5 @@
-// Light of the pictures of V4L2 cameras.
-#include "capture/v4l2_picture.h"
+// Light of the pictures that cameras deliver.
+#include "capture/coded_picture.h"
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,7 @@ extern "C" {
 
 namespace capture {
 
-struct V4l2PictureReader::Reader {
+struct CodedPictureReader::Reader {
   virtual ~Reader() = default;
   virtual std::size_t picture_bytes() const = 0;
   virtual std::string read(std::span<const std::byte> bytes, const Crop& crop, Image& image) = 0;
@@ -67,7 +67,7 @@ bool is_rgb(std::uint32_t fourcc) {
 
 // What a device leaves to its colour space is what videodev2.h says of that; a device that does
 // not tell its colour space is untagged.
-void tag(AVFrame& frame, const V4l2Layout& layout) {
+void tag(AVFrame& frame, const CodedLayout& layout) {
   frame.color_trc = curve_of(layout.transfer);
   std::uint32_t encoding = layout.ycbcr_encoding;
   std::uint32_t range = layout.quantization;
@@ -92,7 +92,7 @@ struct Plane {
 
 // The planes of a picture of this many bytes per row of the first one; 0 = not padded. They follow
 // each other without a gap.
-std::vector<Plane> planes_of(const V4l2Layout& layout) {
+std::vector<Plane> planes_of(const CodedLayout& layout) {
   const auto width = static_cast<std::size_t>(layout.width);
   const auto height = static_cast<std::size_t>(layout.height);
   const std::size_t half_width = (width + 1) / 2;
@@ -134,9 +134,9 @@ void check_holds(std::span<const std::byte> bytes, std::size_t picture) {
 }
 
 // Uncompressed pictures that libav has a format for: read where they lie.
-class VideoReader final : public V4l2PictureReader::Reader {
+class VideoReader final : public CodedPictureReader::Reader {
  public:
-  VideoReader(const V4l2Layout& layout, int libav_format, const LightCurves& curves)
+  VideoReader(const CodedLayout& layout, int libav_format, const LightCurves& curves)
       : planes_(planes_of(layout)), lineariser_(curves), frame_(libav::make_frame()) {
     frame_->width = layout.width;
     frame_->height = layout.height;
@@ -172,9 +172,9 @@ class VideoReader final : public V4l2PictureReader::Reader {
   libav::FrameHandle frame_;
 };
 
-class JpegReader final : public V4l2PictureReader::Reader {
+class JpegReader final : public CodedPictureReader::Reader {
  public:
-  JpegReader(const V4l2Layout& layout, const LightCurves& curves)
+  JpegReader(const CodedLayout& layout, const LightCurves& curves)
       : width_(layout.width),
         height_(layout.height),
         lineariser_(curves),
@@ -235,9 +235,9 @@ class JpegReader final : public V4l2PictureReader::Reader {
   libav::FrameHandle frame_;
 };
 
-class RawReader final : public V4l2PictureReader::Reader {
+class RawReader final : public CodedPictureReader::Reader {
  public:
-  RawReader(const V4l2Layout& layout, const RawLayout& raw, const LightCurves& curves)
+  RawReader(const CodedLayout& layout, const RawLayout& raw, const LightCurves& curves)
       : raw_(raw), by_response_(curves.response.has_value()) {
     const std::size_t least = packed_row_bytes(raw.packing, layout.width);
     row_bytes_ = layout.row_bytes == 0 ? least : layout.row_bytes;
@@ -325,7 +325,7 @@ class RawReader final : public V4l2PictureReader::Reader {
 
 }  // namespace
 
-V4l2PictureReader::V4l2PictureReader(const V4l2Layout& layout, const LightCurves& curves) {
+CodedPictureReader::CodedPictureReader(const CodedLayout& layout, const LightCurves& curves) {
   libav::check_size(layout.width, layout.height);
   const PixelCoding* coding = coding_of(layout.fourcc);
   if (coding == nullptr) {
@@ -344,18 +344,18 @@ V4l2PictureReader::V4l2PictureReader(const V4l2Layout& layout, const LightCurves
   }
 }
 
-V4l2PictureReader::~V4l2PictureReader() = default;
-V4l2PictureReader::V4l2PictureReader(V4l2PictureReader&&) noexcept = default;
-V4l2PictureReader& V4l2PictureReader::operator=(V4l2PictureReader&&) noexcept = default;
+CodedPictureReader::~CodedPictureReader() = default;
+CodedPictureReader::CodedPictureReader(CodedPictureReader&&) noexcept = default;
+CodedPictureReader& CodedPictureReader::operator=(CodedPictureReader&&) noexcept = default;
 
-std::size_t V4l2PictureReader::picture_bytes() const { return reader_->picture_bytes(); }
+std::size_t CodedPictureReader::picture_bytes() const { return reader_->picture_bytes(); }
 
-std::string V4l2PictureReader::read(std::span<const std::byte> bytes,
-                                    const Crop& crop,
-                                    Image& image) {
+std::string CodedPictureReader::read(std::span<const std::byte> bytes,
+                                     const Crop& crop,
+                                     Image& image) {
   return reader_->read(bytes, crop, image);
 }
 
-std::string V4l2PictureReader::description() const { return reader_->description(); }
+std::string CodedPictureReader::description() const { return reader_->description(); }
 
 }  // namespace capture
