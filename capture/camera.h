@@ -22,6 +22,7 @@ struct CameraInfo {
   std::string description;  // for people: codec, format, colour tags and how they were read
   int sound_channels = 0;   // 0 = silent
   int sound_rate = 0;       // samples per second
+  bool live = false;        // frames come as time goes by, on the monotonic clock
 };
 
 // Sound that goes with a stretch of frames: interleaved floats, -1 to 1.

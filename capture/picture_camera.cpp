@@ -7,12 +7,14 @@
 #include <stdexcept>
 #include <utility>
 
+#include "capture/coded_file.h"
 #include "capture/exif.h"
 #include "capture/exr.h"
 #include "capture/files.h"
 #include "capture/media_file.h"
 #include "capture/pool.h"
 #include "capture/rgbe.h"
+#include "capture/still.h"
 
 namespace capture {
 namespace {
@@ -59,13 +61,34 @@ void cut(Image& image, const Crop& crop) {
   image = std::move(part);
 }
 
+// Reads any picture file as three channels of light: OpenEXR and Radiance pictures, by their
+// endings (.exr, .hdr, .pic), are light already; other stills and recorded pictures become it.
+class PictureReader {
+ public:
+  explicit PictureReader(const LightCurves& curves) : stills_(curves), coded_(curves) {}
+
+  // Into `image` as it is if it has the size. Returns the description. Throws std::runtime_error
+  // with path, reason and what to do.
+  std::string read(const std::string& path, Image& image) {
+    if (is_coded_file(path)) return coded_.read(path, image);
+    if (!is_exr(path) && !is_radiance(path)) return read_still(path, stills_, image);
+    check_is_file(path);
+    image = three_channels(is_exr(path) ? read_exr(path) : read_rgbe(path));
+    return is_exr(path) ? "OpenEXR, linear" : "Radiance, linear";
+  }
+
+ private:
+  Lineariser stills_;
+  CodedFileReader coded_;
+};
+
 class PictureCamera : public Camera {
  public:
   PictureCamera(const std::string& name,
                 std::vector<PictureEntry> entries,
                 Rational rate,
                 const CameraOptions& options,
-                LightCurves curves);
+                const LightCurves& curves);
 
   const CameraInfo& info() const override { return info_; }
   std::optional<Frame> next() override;
@@ -76,7 +99,7 @@ class PictureCamera : public Camera {
   std::shared_ptr<const Image> load(std::size_t entry);
 
   std::vector<PictureEntry> entries_;
-  Lineariser lineariser_;
+  PictureReader reader_;
   bool loop_;
   Pool<Image> pool_;
   int source_width_ = 0;
@@ -98,9 +121,9 @@ PictureCamera::PictureCamera(const std::string& name,
                              std::vector<PictureEntry> entries,
                              Rational rate,
                              const CameraOptions& options,
-                             LightCurves curves)
+                             const LightCurves& curves)
     : entries_(std::move(entries)),
-      lineariser_(std::move(curves)),
+      reader_(curves),
       loop_(options.loop),
       loaded_entry_(entries_.size()) {
   const auto fail = [&](const std::string& why) {
@@ -116,7 +139,7 @@ PictureCamera::PictureCamera(const std::string& name,
   for (std::size_t i = entry_; i < entries_.size() && !last_image_; ++i) {
     try {
       const std::shared_ptr<Image> image = pool_.lend();
-      info_.description = read_picture(entries_[i].path, lineariser_, *image);
+      info_.description = reader_.read(entries_[i].path, *image);
       source_width_ = image->width;
       source_height_ = image->height;
       crop_ = crop_within(options.crop, source_width_, source_height_);
@@ -149,7 +172,7 @@ std::shared_ptr<const Image> PictureCamera::load(std::size_t entry) {
     return last_image_;
   }
   const std::shared_ptr<Image> image = pool_.lend();
-  read_picture(entries_[entry].path, lineariser_, *image);
+  reader_.read(entries_[entry].path, *image);
   if (image->width != source_width_ || image->height != source_height_) {
     throw std::runtime_error(entries_[entry].path + " has another size than the first picture");
   }
@@ -194,28 +217,15 @@ std::optional<Frame> PictureCamera::next() {
 }  // namespace
 
 bool is_picture(const std::string& path) {
-  return is_exr(path) || is_radiance(path) || is_still(path);
+  return is_exr(path) || is_radiance(path) || is_coded_file(path) || is_still(path);
 }
 
 double exposure_in(const std::string& path) {
-  if (is_exr(path) || is_radiance(path)) {
+  if (is_exr(path) || is_radiance(path) || is_coded_file(path)) {
     return 0;
   }
   const double marked_s = shot_settings(read_file(path)).exposure_s;
   return marked_s > 0 ? snapped_exposure_s(marked_s) : 0;
-}
-
-std::string read_picture(const std::string& path, Lineariser& lineariser, Image& image) {
-  if (!is_exr(path) && !is_radiance(path)) {
-    return read_still(path, lineariser, image);
-  }
-  check_is_file(path);
-  if (is_exr(path)) {
-    image = three_channels(read_exr(path));
-    return "OpenEXR, linear";
-  }
-  image = three_channels(read_rgbe(path));
-  return "Radiance, linear";
 }
 
 std::unique_ptr<Camera> make_picture_camera(const std::string& name,

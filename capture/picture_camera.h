@@ -7,7 +7,6 @@
 
 #include "capture/camera.h"
 #include "capture/linearise.h"
-#include "capture/still.h"
 
 namespace capture {
 
@@ -20,13 +19,8 @@ struct PictureEntry {
   std::string note;
 };
 
-// Reads any picture file as three channels of light: OpenEXR and Radiance pictures, by their
-// endings (.exr, .hdr, .pic), are light already; other stills are linearised, into `image` as it
-// is if it has the size. Returns the description of a still (see Still).
-// Throws std::runtime_error with path, reason and what to do.
-std::string read_picture(const std::string& path, Lineariser& lineariser, Image& image);
-
-// Whether read_picture would know the kind of file.
+// Whether the file is one that such a camera shows: OpenEXR, Radiance, a recorded picture
+// (coded_file.h), or another still (still.h).
 bool is_picture(const std::string& path);
 
 // The exposure time that the picture's EXIF data tell, snapped (see exif.h); 0 if they tell none.

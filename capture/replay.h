@@ -9,7 +9,8 @@
 
 namespace capture {
 
-// The folder holds `frames.csv` and pictures of any still kind (OpenEXR and Radiance too):
+// The folder holds `frames.csv` and pictures of any still kind (OpenEXR and Radiance too, and those
+// of recording.h, which give the very images that the camera gave):
 //
 //     file,time_s,exposure_s,status
 //     00000.png,0.000000000,0.004,good

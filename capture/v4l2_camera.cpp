@@ -142,6 +142,7 @@ void V4l2Camera::open(const CameraOptions& options) {
   info_.width = crop_.width;
   info_.height = crop_.height;
   info_.rate = stream_->rate();
+  info_.live = true;
   exposures_ = capture::exposure_range(stream_->device());
 }
 

@@ -35,7 +35,7 @@ int report_usage(const CLI::App& app, const CLI::ParseError& error) {
 
 std::span<const Command> commands() {
   static const std::vector<Command> all{
-      run_command(),  check_command(), still_command(), hdr_command(),
+      run_command(),  check_command(), still_command(), hdr_command(),     capture_command(),
       demo_command(), chart_command(), bench_command(), devices_command(),
   };
   return all;

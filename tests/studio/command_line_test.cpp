@@ -122,6 +122,19 @@ TEST_F(CommandLine, ReturnsOneAndOneLineForAFileThatIsNotThere) {
   EXPECT_THAT(outcome.err, HasSubstr("absent.toml"));
 }
 
+TEST_F(CommandLine, RecordsLiveCamerasOnly) {
+  write_made_set(dir_, "grey:3,25,0");
+  const std::string take = (dir_ / "take").string();
+  const Outcome file = run("capture record " + (dir_ / "sky.exr").string() + " " + take);
+  EXPECT_EQ(file.status, 1);
+  EXPECT_THAT(file.err, HasSubstr("it is no live camera"));
+  EXPECT_FALSE(fs::exists(take));
+  const Outcome none = run("capture record v4l2:/dev/none " + take);
+  EXPECT_EQ(none.status, 1);
+  EXPECT_THAT(none.err, HasSubstr("cannot open v4l2:/dev/none"));
+  EXPECT_EQ(run("capture play v4l2:/dev/none " + take).status, 2);
+}
+
 TEST_F(CommandLine, ReturnsOneWhenTheFiguresCannotBeWritten) {
   const Outcome outcome =
       run("check " + write("a.toml", good_set) + " --json " + (dir_ / "no/such/dir.json").string());

@@ -1,0 +1,88 @@
+// Live cameras read ahead: nobody waits, and nothing piles up.
+#include "capture/live_reader.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+namespace capture {
+namespace {
+
+using namespace std::chrono_literals;
+
+// Gives frames when the test lets it, up to a number.
+class SteppedCamera final : public Camera {
+ public:
+  explicit SteppedCamera(std::atomic<int>& allowed, int frames)
+      : allowed_(allowed), frames_(frames) {
+    info_.live = true;
+  }
+  const CameraInfo& info() const override { return info_; }
+  std::optional<Frame> next() override {
+    if (given_ == frames_) return std::nullopt;
+    while (given_ >= allowed_) std::this_thread::sleep_for(1ms);
+    Frame frame;
+    frame.number = given_++;
+    frame.time = monotonic_now();
+    statistics_.delivered = given_;
+    return frame;
+  }
+  CameraStatistics statistics() const override { return statistics_; }
+
+ private:
+  std::atomic<int>& allowed_;
+  int frames_;
+  int given_ = 0;
+  CameraInfo info_;
+  CameraStatistics statistics_;
+};
+
+constexpr Time long_time = 60s;
+
+TEST(LiveReader, GivesFramesInOrderAsTheyCome) {
+  std::atomic<int> allowed = 0;
+  LiveReader reader(std::make_unique<SteppedCamera>(allowed, 100), 8);
+  EXPECT_TRUE(reader.take().empty());
+  for (int i = 0; i < 5; ++i) {
+    ++allowed;
+    const std::vector<Arrival> came = reader.take(monotonic_now() + long_time);
+    ASSERT_EQ(came.size(), 1U);
+    EXPECT_EQ(came[0].frame.number, i);
+    EXPECT_GE(came[0].arrived, came[0].frame.time);
+    EXPECT_LE(came[0].arrived, monotonic_now());
+  }
+  EXPECT_EQ(reader.statistics().delivered, 5);
+  allowed = 1000;
+}
+
+TEST(LiveReader, KeepsTheNewestOfThoseThatNobodyTakes) {
+  std::atomic<int> allowed = 50;
+  LiveReader reader(std::make_unique<SteppedCamera>(allowed, 50), 3);
+  while (reader.statistics().delivered < 50 || reader.passed_over() < 47) {
+    std::this_thread::sleep_for(1ms);
+  }
+  const std::vector<Arrival> came = reader.take();
+  ASSERT_EQ(came.size(), 3U);
+  EXPECT_EQ(came.front().frame.number, 47);
+  EXPECT_EQ(reader.passed_over(), 47);
+}
+
+TEST(LiveReader, EndsWithItsCameraOnceAllFramesAreTaken) {
+  std::atomic<int> allowed = 2;
+  LiveReader reader(std::make_unique<SteppedCamera>(allowed, 2), 8);
+  std::size_t came = 0;
+  while (!reader.ended()) came += reader.take(monotonic_now() + long_time).size();
+  EXPECT_EQ(came, 2U);
+  EXPECT_TRUE(reader.take(monotonic_now() + long_time).empty()) << "and does not wait any more";
+}
+
+TEST(LiveReader, RefusesToKeepNothing) {
+  std::atomic<int> allowed = 0;
+  EXPECT_THROW(LiveReader(std::make_unique<SteppedCamera>(allowed, 0), 0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace capture
