@@ -23,6 +23,26 @@ Json effort_json(const render::Effort& effort) {
           {"tile_size", effort.tile_size}};
 }
 
+Json probe_json(const ShowStatus& s) {
+  const auto share_of = [&](capture::MergeStatus status) {
+    return s.probe.shares[static_cast<std::size_t>(status)];
+  };
+  return {{"live", s.probe.live},
+          {"age_frames", s.light_age_frames},
+          {"age_frames_p99", s.light_age_frames_p99},
+          {"kept_frames", s.kept_light_frames},
+          {"kept_because", s.probe.kept_because},
+          {"frames", s.probe.frames},
+          {"lost", s.probe.lost},
+          {"rejected", s.probe.rejected},
+          {"shots", s.probe.shots},
+          {"good", share_of(capture::MergeStatus::good)},
+          {"dark", share_of(capture::MergeStatus::dark)},
+          {"inconsistent", share_of(capture::MergeStatus::inconsistent)},
+          {"lower_bound", share_of(capture::MergeStatus::lower_bound)},
+          {"missing", share_of(capture::MergeStatus::missing)}};
+}
+
 Json record_json(const compositing::RecorderStatus& recorder) {
   Json json{{"written", recorder.written},
             {"dropped", recorder.dropped},
@@ -63,6 +83,7 @@ std::string show_figures(const Set& set,
               {"kept", s.statistics.kept_rays}}},
             {"delay_frames", s.delay_frames},
             {"delay_frames_p99", s.delay_frames_p99},
+            {"probe", probe_json(s)},
             {"match", s.match.gain},
             {"match_note", s.match.note},
             {"match_pixels", s.match.pixels},

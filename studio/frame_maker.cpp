@@ -2,6 +2,7 @@
 #include "studio/frame_maker.h"
 
 #include <algorithm>
+#include <cmath>
 #include <future>
 #include <stdexcept>
 #include <utility>
@@ -129,6 +130,10 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
   rate_ = rate.value_or(set_.show.fps.value_or(own));
+  // A live plate shows no more pictures than there are.
+  if (plate_->is_live() && plate_rate.num > 0 && rate_.value() > plate_rate.value()) {
+    rate_ = plate_rate;
+  }
   build_scene();
   light_ = light.get();
 }
@@ -163,9 +168,36 @@ std::shared_ptr<const capture::HalfImage> FrameMaker::half_plate(const capture::
   return last_plate_;
 }
 
-std::optional<PreparedFrame> FrameMaker::make(std::int64_t number) {
+FrameMaker::Due FrameMaker::wait_for_plate() {
+  const capture::Time period = capture::time_of_frame(1, rate_);
+  const capture::Time until = capture::monotonic_now() + 5 * period / 2;
+  if (!first_due_) {
+    first_due_ = plate_->wait_for_newer(until);
+    last_due_ = {0, first_due_->time};
+    return last_due_;
+  }
+  // The camera may be the faster one.
+  const capture::Time soonest = last_due_.time + 3 * period / 4;
+  capture::Frame newest;
+  do {
+    newest = plate_->wait_for_newer(until);
+  } while (newest.time < soonest && capture::monotonic_now() < until);
+  if (newest.time < soonest) {
+    last_due_ = {last_due_.frame + 1, last_due_.time + period};
+    return last_due_;
+  }
+  const capture::Time passed = newest.time - first_due_->time;
+  const std::int64_t by_time =
+      std::llround(static_cast<double>(passed.count()) * 1e-9 * rate_.value());
+  const bool same_rate = rate_ == plate_->info().rate;
+  const std::int64_t number = same_rate ? newest.number - first_due_->number : by_time;
+  last_due_ = {std::max(number, last_due_.frame + 1), newest.time};
+  return last_due_;
+}
+
+std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
+  const auto [number, time] = due;
   PreparedFrame prepared;
-  const capture::Time time = time_of(number);
   prepared.arrived = Clock::now();
 
   std::optional<capture::Frame> frame;
@@ -173,6 +205,10 @@ std::optional<PreparedFrame> FrameMaker::make(std::int64_t number) {
     const StageTimer timer(prepared, Stage::capture);
     frame = plate_->at(time);
     if (!frame) return std::nullopt;
+    if (plate_->is_live()) {
+      prepared.arrived =
+          Clock::time_point(std::chrono::duration_cast<Clock::duration>(plate_->arrived()));
+    }
     prepared.plate = half_plate(*frame);
     prepared.plate_status = frame->status;
     prepared.sound = plate_->take_sound();
@@ -199,6 +235,7 @@ std::optional<PreparedFrame> FrameMaker::make(std::int64_t number) {
     job.lights.lamps.insert(job.lights.lamps.end(), lamps_.begin(), lamps_.end());
     job.match = light.match.gain;
     prepared.match = std::move(light.match);
+    prepared.probe = std::move(light.probe);
     prepared.environment = std::move(light.environment);
     prepared.planned = std::move(light.planned);
     prepared.scene = scene_;

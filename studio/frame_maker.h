@@ -35,6 +35,7 @@ struct PreparedFrame {
   std::vector<capture::Sound> sound;
   std::chrono::steady_clock::time_point arrived;  // of the plate
   render::MatchResult match;
+  ProbeStatus probe;
   capture::FrameStatus plate_status = capture::FrameStatus::good;
   std::array<double, stages> stage_ms{};  // capture, probe and job are set
 
@@ -60,7 +61,19 @@ class FrameMaker {
   // Time of show frame n on the plate's clock.
   capture::Time time_of(std::int64_t frame) const;
   // Frames must ascend. Nothing after the plate's end.
-  std::optional<PreparedFrame> make(std::int64_t frame);
+  std::optional<PreparedFrame> make(std::int64_t frame) { return make_at({frame, time_of(frame)}); }
+
+  // A frame and its time on the plate's clock.
+  struct Due {
+    std::int64_t frame = 0;
+    capture::Time time{};
+  };
+  // Of a live plate: the frame that shows its newest picture. Waits for a picture that has not been
+  // due yet, but not for ever: then the last one is due once more, as a later frame. Numbers count
+  // the show's frames from the first call on, those included whose pictures were passed over.
+  Due wait_for_plate();
+  // As make(), with a time of its own.
+  std::optional<PreparedFrame> make_at(const Due& due);
 
   void set_effort(const render::Effort& effort) { set_.effort = effort; }
   // Throws std::invalid_argument if no object has that name.
@@ -83,6 +96,8 @@ class FrameMaker {
   std::shared_ptr<const calibrate::DirectionTable> directions_;
   std::vector<render::LocalLight> lamps_;
   std::uint64_t scene_version_ = 0;
+  std::optional<capture::Frame> first_due_;  // of a live plate
+  Due last_due_;
   std::shared_ptr<const capture::Image> last_image_;  // that last_plate_ was made from
   std::shared_ptr<const capture::HalfImage> last_plate_;
 };

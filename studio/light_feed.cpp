@@ -177,6 +177,7 @@ Light LightFeed::at(const LightRequest& request) {
     plate_ = even_plate(request);
     update_environment(request);
     light.time = source_->at(request.time).time;
+    light.probe = source_->status();
     if (settings_->albedo_patch && request.plate != nullptr) {
       const auto [x, y, width, height] = *settings_->albedo_patch;
       render::Vec3f unmatched = render::irradiance_of(*environment_, {0, 0, 1});

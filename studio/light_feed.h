@@ -27,6 +27,7 @@ struct Light {
   render::LightTable table;                                // without the set's own lamps
   render::MatchResult match;
   capture::Time time{};  // of the probe's newest shot
+  ProbeStatus probe;
 };
 
 // What a frame tells of itself.

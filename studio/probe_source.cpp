@@ -2,18 +2,22 @@
 #include "studio/probe_source.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
 
-#include "capture/hdr.h"
 #include "capture/make_hdr.h"
 
 namespace studio {
 namespace {
 
-constexpr std::size_t longest_cycle = 16;  // exposures of a bracket
-constexpr double same_exposure = 0.02;     // relative
+constexpr std::size_t longest_cycle = 16;                         // exposures of a bracket
+constexpr double same_exposure = 0.02;                            // relative
+constexpr capture::Time next_patience = std::chrono::seconds(2);  // for a live camera's next frame
+// From these shares of pixels on, the shots tell nothing.
+constexpr double all_saturated = 0.5;
+constexpr double least_told = 1e-4;
 
 bool about_equal(double a, double b) { return std::abs(a - b) <= same_exposure * b; }
 
@@ -23,34 +27,6 @@ bool about_equal(double a, double b) { return std::abs(a - b) <= same_exposure *
 }
 
 }  // namespace
-
-RollingBracket::RollingBracket(std::vector<double> exposures_s) {
-  for (const double exposure_s : exposures_s) slots_.push_back({exposure_s, nullptr});
-}
-
-void RollingBracket::add(std::shared_ptr<const capture::Image> linear, double exposure_s) {
-  if (width_ == 0) {
-    width_ = linear->width;
-    height_ = linear->height;
-  }
-  if (linear->width != width_ || linear->height != height_ || linear->channels != 3) {
-    throw std::invalid_argument("the shots of a bracket must have one size and three channels");
-  }
-  const auto nearest = std::ranges::min_element(slots_, {}, [&](const Slot& slot) {
-    return std::abs(std::log(slot.exposure_s / exposure_s));
-  });
-  *nearest = {exposure_s, std::move(linear)};
-}
-
-std::shared_ptr<const capture::Image> RollingBracket::merge() {
-  std::vector<capture::LiveShot> shots;
-  for (const Slot& slot : slots_) {
-    if (slot.linear != nullptr) shots.push_back({slot.linear.get(), slot.exposure_s});
-  }
-  std::shared_ptr<capture::Image> radiance = pool_.lend();
-  capture::merge_live_shots(shots, {}, *radiance);
-  return radiance;
-}
 
 ProbeSource::ProbeSource(const Set& set) {
   const ProbeSettings& probe = *set.probe;
@@ -87,6 +63,7 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
     camera_.reset();
     return;
   }
+  status_.live = true;
   prime();
 }
 
@@ -95,14 +72,21 @@ double ProbeSource::exposure_s_of(const capture::Frame& frame) const {
   return exposures_s_[static_cast<std::size_t>(frame.number) % exposures_s_.size()];
 }
 
+// The frame after those that were taken; of a live camera, waits for it.
+capture::Frame ProbeSource::wait_for_next() {
+  if (camera_->is_live()) camera_->wait_for_newer(capture::monotonic_now() + next_patience);
+  const std::optional<capture::Time> time = camera_->next_time();
+  if (!time) return {};
+  return camera_->advance(*time).front();
+}
+
 // The first cycle is taken at once, so that no frame is lit by half a bracket.
 void ProbeSource::prime() {
   std::vector<capture::Frame> cycle{camera_->first()};
   std::vector<double> exposures_s{exposure_s_of(cycle.front())};
   while (exposures_s.back() > 0 && cycle.size() < longest_cycle) {
-    const std::optional<capture::Time> time = camera_->next_time();
-    if (!time) break;
-    const capture::Frame frame = camera_->advance(*time).front();
+    const capture::Frame frame = wait_for_next();
+    if (frame.image == nullptr) break;
     const double exposure_s = exposure_s_of(frame);
     cycle.push_back(frame);
     const bool again = std::ranges::any_of(
@@ -110,27 +94,70 @@ void ProbeSource::prime() {
     if (again) break;
     exposures_s.push_back(exposure_s);
   }
-  if (exposures_s.size() > 1) bracket_ = std::make_unique<RollingBracket>(exposures_s);
+  if (exposures_s.size() > 1) bracket_ = std::make_unique<RollingBracket>(exposures_s.size());
   take(cycle);
 }
 
-void ProbeSource::take(const std::vector<capture::Frame>& frames) {
-  bool fresh = false;
-  for (const capture::Frame& frame : frames) {
-    if (frame.status == capture::FrameStatus::lost || frame.image == nullptr) continue;
-    fresh = true;
-    newest_.time = frame.time;
-    if (bracket_) {
-      bracket_->add(frame.image, exposure_s_of(frame));
-    } else {
-      newest_.image = frame.image;
-    }
+// Whether the frame tells new light.
+bool ProbeSource::add(const capture::Frame& frame) {
+  ++status_.frames;
+  if (frame.status == capture::FrameStatus::lost || frame.image == nullptr) {
+    ++status_.lost;
+    return false;
   }
-  if (fresh && bracket_) newest_.image = bracket_->merge();
+  if (!bracket_) {
+    newest_ = {frame.image, frame.time};
+    return true;
+  }
+  const double exposure_s = exposure_s_of(frame);
+  if (!(exposure_s > 0) || frame.status == capture::FrameStatus::damaged) {
+    ++status_.rejected;
+    return false;
+  }
+  bracket_->add(frame.image, exposure_s, frame.number);
+  return true;
+}
+
+void ProbeSource::merge(capture::Time time) {
+  const std::shared_ptr<const capture::MergedFrame> merged = bracket_->merge();
+  status_.shots = bracket_->shots();
+  status_.shares = merged->status_shares();
+  const auto share_of = [&](capture::MergeStatus status) {
+    return status_.shares[static_cast<std::size_t>(status)];
+  };
+  const bool saturated = share_of(capture::MergeStatus::lower_bound) > all_saturated;
+  const double told = share_of(capture::MergeStatus::good) +
+                      share_of(capture::MergeStatus::inconsistent) +
+                      share_of(capture::MergeStatus::lower_bound);
+  const bool first = newest_.image == nullptr;
+  status_.kept_because = first               ? ""
+                         : saturated         ? "the probe's shots are all saturated"
+                         : told < least_told ? "the probe's shots are all black"
+                                             : "";
+  if (!status_.kept_because.empty()) return;
+  newest_ = {{merged, &merged->radiance}, time};
+}
+
+void ProbeSource::take(const std::vector<capture::Frame>& frames) {
+  std::optional<capture::Time> fresh;
+  for (const capture::Frame& frame : frames) {
+    if (add(frame)) fresh = frame.time;
+  }
+  if (fresh && bracket_) {
+    merge(*fresh);
+  } else if (fresh) {
+    status_.kept_because.clear();
+  } else if (!frames.empty()) {
+    const std::string& why = frames.back().note;
+    status_.kept_because = "the probe's last shot told nothing" + (why.empty() ? "" : ": " + why);
+  }
 }
 
 ProbeSource::Radiance ProbeSource::at(capture::Time time) {
-  if (camera_) take(camera_->advance(time - offset_));
+  if (camera_) {
+    take(camera_->advance(time - offset_));
+    status_.age = time - offset_ - newest_.time;
+  }
   return newest_;
 }
 

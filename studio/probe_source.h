@@ -1,40 +1,32 @@
 // Radiance as the lightprobe measures it: a picture that stays, or a camera that brackets.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "capture/image.h"
-#include "capture/pool.h"
+#include "capture/live_merge.h"
+#include "studio/rolling_bracket.h"
 #include "studio/set.h"
 #include "studio/source.h"
 
 namespace studio {
 
-// Merges a camera that cycles through exposures: every new shot takes the place of the one before
-// of about the same exposure, so that each shot gives a new radiance picture, at the camera's full
-// rate.
-class RollingBracket {
- public:
-  // `exposures_s`: one for each place of the cycle, each > 0.
-  explicit RollingBracket(std::vector<double> exposures_s);
-
-  // A shot, linear, 1 = saturated: (height, width, 3), all of one size. Throws
-  // std::invalid_argument for another size.
-  void add(std::shared_ptr<const capture::Image> linear, double exposure_s);
-  // Radiance in sensor units per second, of the shots that were seen; at least one must have been.
-  std::shared_ptr<const capture::Image> merge();
-
- private:
-  struct Slot {
-    double exposure_s;
-    std::shared_ptr<const capture::Image> linear;  // null = not seen yet
-  };
-
-  int height_ = 0, width_ = 0;
-  std::vector<Slot> slots_;
-  capture::Pool<capture::Image> pool_;
+// How the probe's light stands.
+struct ProbeStatus {
+  bool live = false;      // a camera's, which goes on; else a picture that stays
+  capture::Time age{};    // of the newest shot in the light, at the time that was asked for
+  std::size_t shots = 0;  // that the newest radiance was merged from
+  // Of its pixels, by capture::MergeStatus.
+  std::array<double, capture::merge_status_count> shares{};
+  std::int64_t frames = 0;    // of the camera, up to now; the following are among them
+  std::int64_t lost = 0;      // did not come
+  std::int64_t rejected = 0;  // were damaged, or their exposure was not known for certain
+  std::string kept_because;   // why the last good light stays on air; "" = the light is new
 };
 
 // One thread uses it.
@@ -45,16 +37,21 @@ class ProbeSource {
 
   struct Radiance {
     std::shared_ptr<const capture::Image> image;  // (height, width, 3)
-    capture::Time time{};
+    capture::Time time{};                         // of the newest shot in it
   };
   // The newest at a time of the show, which must not fall. The same pointer as before if there is
-  // nothing newer; when the camera has ended, its last.
+  // nothing newer; when the camera has ended, its last. Where the newest shots tell nothing, since
+  // all is saturated or all is black, the last good one stays.
   Radiance at(capture::Time time);
+  const ProbeStatus& status() const { return status_; }
 
  private:
   void open_camera(const Set& set, const ProbeSettings& probe);
   void prime();
+  capture::Frame wait_for_next();
   void take(const std::vector<capture::Frame>& frames);
+  bool add(const capture::Frame& frame);
+  void merge(capture::Time time);
   double exposure_s_of(const capture::Frame& frame) const;
 
   std::vector<double> exposures_s_;
@@ -62,6 +59,7 @@ class ProbeSource {
   std::unique_ptr<Source> camera_;  // null = the radiance stays
   std::unique_ptr<RollingBracket> bracket_;
   Radiance newest_;
+  ProbeStatus status_;
 };
 
 }  // namespace studio

@@ -75,12 +75,13 @@ class Show::Stages {
   Stages(Set set, const ShowOptions& options)
       : options_(options), maker_(std::move(set), options.rate), recording_(form_of(maker_)) {
     const Set& s = maker_.set();
-    if (options.live) tally_.set_period_ms(1000 / maker_.rate().value());
+    if (maker_.plate().is_live()) options_.live = true;
+    if (options_.live) tally_.set_period_ms(1000 / maker_.rate().value());
     display_ = at_place(s, s.display.place, [&] {
       return std::make_unique<compositing::Display>(display_settings(s));
     });
     frames_ = options.frames ? options.frames : s.show.frames;
-    if (!frames_ && !options.live && maker_.is_endless()) frames_ = 1;
+    if (!frames_ && !options_.live && maker_.is_endless()) frames_ = 1;
     planned_frames_ = frames_ ? frames_ : frames_of_plate();
     if (options.record && !(s.record.file.empty() && s.record.exr.empty())) {
       at_place(s, s.record.place, [&] { recording_.start(s.record); });
@@ -137,9 +138,11 @@ class Show::Stages {
     for (std::int64_t number = 0; !frames_ || made < *frames_; ++number, ++made) {
       Work work;
       if (!apply_commands(work)) return;
-      if (options_.live) dropped += wait_until_due(number, start + paused_for_);
+      const FrameMaker::Due due = next_due(number, start + paused_for_);
+      dropped += due.frame - number;
+      number = due.frame;
       const Clock::time_point begin = Clock::now();
-      std::optional<PreparedFrame> frame = maker_.make(number);
+      std::optional<PreparedFrame> frame = maker_.make_at(due);
       if (!frame) return;
       const Clock::duration making = Clock::now() - begin;
       work.frame = std::move(*frame);
@@ -161,16 +164,23 @@ class Show::Stages {
     return Clock::now() + Clock::duration(rendering_.load()) - early;
   }
 
-  // Waits for a live frame's time. A frame whose successor is due as well is left out: moves
-  // `number` on and returns by how many.
-  std::int64_t wait_until_due(std::int64_t& number, Clock::time_point start) const {
+  // The frame that is to be made in the place of `number`: in a live show a later one where that
+  // is late. Waits for its time, or for the picture of a live plate.
+  FrameMaker::Due next_due(std::int64_t number, Clock::time_point start) {
+    if (maker_.plate().is_live()) return maker_.wait_for_plate();
+    if (options_.live) number = wait_until_due(number, start);
+    return {number, maker_.time_of(number)};
+  }
+
+  // Waits for a live frame's time. A frame whose successor is due as well is left out: returns the
+  // one that is to be made.
+  std::int64_t wait_until_due(std::int64_t number, Clock::time_point start) const {
     const auto due = [&](std::int64_t n) {
       return start + capture::time_of_frame(n, maker_.rate());
     };
-    const std::int64_t wanted = number;
     while (Clock::now() >= due(number + 1)) ++number;
     std::this_thread::sleep_until(due(number));
-    return number - wanted;
+    return number;
   }
 
   // Takes what was posted. Waits while paused. False on Quit.
@@ -231,12 +241,23 @@ class Show::Stages {
     const Clock::time_point displayed = Clock::now();
 
     timed(shown, Stage::record, [&] { recording_.record(shown, !options_.live); });
+    note_probe(shown.prepared);
     tally_.add(shown, displayed);
     tally_.status().dropped = work.dropped;
     tally_.status().lost_plate_frames = work.plate.lost;
     tally_.status().damaged_plate_frames = work.plate.damaged;
     publish(false);
     if (on_frame) on_frame(shown);
+  }
+
+  // Once whenever the light ceases to be renewed.
+  void note_probe(const PreparedFrame& frame) {
+    const std::string& why = frame.probe.kept_because;
+    if (!why.empty() && light_kept_because_.empty()) {
+      note("from frame " + std::to_string(frame.job.frame) +
+           " on the last good light stays: " + why);
+    }
+    light_kept_because_ = why;
   }
 
   template <class Act>
@@ -290,7 +311,7 @@ class Show::Stages {
     if (notes_.size() > most_notes) notes_.erase(notes_.begin());
   }
 
-  const ShowOptions options_;
+  ShowOptions options_;  // live wherever the plate is
   std::optional<std::int64_t> frames_;
   std::optional<std::int64_t> planned_frames_;
 
@@ -298,6 +319,7 @@ class Show::Stages {
   Tally tally_;
   std::unique_ptr<compositing::Display> display_;
   render::KeptTransport kept_;
+  std::string light_kept_because_;
   capture::Pool<render::FrameResult> results_;
   capture::Pool<std::vector<std::uint8_t>> pictures_;
 

@@ -53,6 +53,10 @@ struct ShowStatus {
   double delay_frames_p99 = 0;
   render::RenderStatistics statistics;  // sums over all frames
   render::MatchResult match;
+  ProbeStatus probe;
+  double light_age_frames = 0;  // of the newest shot in the light when it is used: median
+  double light_age_frames_p99 = 0;
+  std::int64_t kept_light_frames = 0;  // shown with a light that was kept since the probe failed
   float unseen_share = 0;
   float light_error_estimate = 0;
   std::size_t lights = 0;
@@ -75,7 +79,9 @@ struct ShownFrame {
 };
 
 struct ShowOptions {
-  bool live = false;  // paced by the clock, late frames left out; else every frame is made
+  // Paced by the clock, or by a live plate, late frames left out; else every frame is made. A live
+  // plate makes the show so.
+  bool live = false;
   std::optional<std::int64_t> frames;     // show at most so many; nothing = as the set says
   std::optional<capture::Rational> rate;  // in place of the set's
   bool record = true;                     // as the set says, from the first frame on

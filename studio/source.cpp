@@ -2,46 +2,85 @@
 #include "studio/source.h"
 
 #include <algorithm>
+#include <chrono>
 #include <stdexcept>
 #include <utility>
 
 namespace studio {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr capture::Time first_patience = 5s;  // for a live camera's first frame
+constexpr std::size_t most_waiting = 16;      // live frames that nobody has asked for
+
+}  // namespace
 
 Source::Source(std::unique_ptr<capture::Camera> camera) : camera_(std::move(camera)) {
-  read_ahead();
-  if (!next_) throw std::runtime_error("the source ends before its first frame: is it empty?");
-  first_ = current_ = *next_;
-  const capture::Rational rate = info().rate;
+  const capture::Rational rate = camera_->info().rate;
   if (rate.num > 0) period_ = capture::time_of_frame(1, rate);
+  if (camera_->info().live) {
+    live_ = std::make_unique<capture::LiveReader>(std::move(camera_), most_waiting);
+    fetch(capture::monotonic_now() + first_patience);
+  } else {
+    read_ahead();
+  }
+  if (next_.empty()) {
+    throw std::runtime_error(live_ ? "no frame came within 5 s"
+                                   : "the source ends before its first frame: is it empty?");
+  }
+  current_ = std::move(next_.front());
+  next_.pop_front();
+  first_ = current_.frame;
+  if (live_) return;
   read_ahead();
-  still_ = !next_;
+  still_ = next_.empty();
+}
+
+const capture::CameraInfo& Source::info() const { return live_ ? live_->info() : camera_->info(); }
+
+capture::CameraStatistics Source::statistics() const {
+  return live_ ? live_->statistics() : camera_->statistics();
 }
 
 void Source::read_ahead() {
-  next_ = camera_->next();
+  if (auto frame = camera_->next()) next_.push_back({std::move(*frame), {}});
   if (auto sound = camera_->take_sound()) sound_.push_back(std::move(*sound));
 }
 
+// Takes over what has come of a live camera.
+void Source::fetch(capture::Time until) {
+  for (capture::Arrival& arrival : live_->take(until)) next_.push_back(std::move(arrival));
+  while (next_.size() > most_waiting) next_.pop_front();
+}
+
 std::vector<capture::Frame> Source::advance(capture::Time time) {
+  if (live_) fetch({});
   std::vector<capture::Frame> passed;
-  while (next_ && next_->time <= time) {
-    period_ = std::max(next_->time - current_.time, capture::Time{1});
-    current_ = std::move(*next_);
-    passed.push_back(current_);
-    read_ahead();
+  while (!next_.empty() && next_.front().frame.time <= time) {
+    period_ = std::max(next_.front().frame.time - current_.frame.time, capture::Time{1});
+    current_ = std::move(next_.front());
+    next_.pop_front();
+    passed.push_back(current_.frame);
+    if (!live_) read_ahead();
   }
   return passed;
 }
 
 std::optional<capture::Frame> Source::at(capture::Time time) {
   static_cast<void>(advance(time));
-  const bool ended = !next_ && !still_;
-  if (ended && time >= current_.time + period_) return std::nullopt;
-  return current_;
+  const bool ended = live_ ? live_->ended() && next_.empty() : next_.empty() && !still_;
+  if (ended && time >= current_.frame.time + period_) return std::nullopt;
+  return current_.frame;
 }
 
 std::optional<capture::Time> Source::next_time() const {
-  return next_ ? std::optional(next_->time) : std::nullopt;
+  return next_.empty() ? std::nullopt : std::optional(next_.front().frame.time);
+}
+
+const capture::Frame& Source::wait_for_newer(capture::Time until) {
+  fetch(next_.empty() ? until : capture::Time{});
+  return next_.empty() ? current_.frame : next_.back().frame;
 }
 
 std::vector<capture::Sound> Source::take_sound() { return std::exchange(sound_, {}); }

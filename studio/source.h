@@ -1,26 +1,30 @@
 // A camera read by the show's clock.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "capture/camera.h"
+#include "capture/live_reader.h"
 
 namespace studio {
 
 // Gives the newest frame whose time is not after a time asked for; frames in between are passed
 // over. So two sources of different rates stay together, and one that stalls shows its last frame.
+// A live camera is read on a thread of its own: only what has come counts, and nobody waits.
 class Source {
  public:
   // Reads the first frame. Throws std::runtime_error if there is none.
   explicit Source(std::unique_ptr<capture::Camera> camera);
 
-  const capture::CameraInfo& info() const { return camera_->info(); }
-  capture::CameraStatistics statistics() const { return camera_->statistics(); }
+  const capture::CameraInfo& info() const;
+  capture::CameraStatistics statistics() const;
   const capture::Frame& first() const { return first_; }
   // A single picture, which is there for ever.
   bool is_still() const { return still_; }
+  bool is_live() const { return live_ != nullptr; }
 
   // Times asked for must not fall. Before the first frame's time: the first frame. Nothing once the
   // camera has ended and its last frame was due for longer than a frame lasts. One frame is read
@@ -29,20 +33,28 @@ class Source {
 
   // Every frame since the last call, or the last at(), up to and including those of this time.
   std::vector<capture::Frame> advance(capture::Time time);
-  // Of the frame that comes next; nothing at the end.
+  // Of the frame that comes next; nothing at the end, and before a live one has come.
   std::optional<capture::Time> next_time() const;
+
+  // Of a live camera: the newest frame that has come. Waits, until `until` on the monotonic clock,
+  // for one that at() and advance() have not given.
+  const capture::Frame& wait_for_newer(capture::Time until);
+  // Of a live camera: when the frame that at() gave last was there, on the monotonic clock.
+  capture::Time arrived() const { return current_.arrived; }
 
   // Sound up to the frames that at() has read so far, in order.
   std::vector<capture::Sound> take_sound();
 
  private:
   void read_ahead();
+  void fetch(capture::Time until);
 
-  std::unique_ptr<capture::Camera> camera_;
+  std::unique_ptr<capture::Camera> camera_;    // null = a live one
+  std::unique_ptr<capture::LiveReader> live_;  // null = a file's
   capture::Frame first_;
-  capture::Frame current_;
-  std::optional<capture::Frame> next_;
-  capture::Time period_{};  // between the last two frames
+  capture::Arrival current_;
+  std::deque<capture::Arrival> next_;  // a file's next frame; all that have come of a live one
+  capture::Time period_{};             // between the last two frames
   bool still_ = false;
   std::vector<capture::Sound> sound_;
 };

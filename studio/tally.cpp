@@ -27,10 +27,17 @@ void Tally::add(const ShownFrame& shown, Clock::time_point displayed) {
   s.fps = elapsed_s > 0 ? static_cast<double>(s.frames - 1) / elapsed_s : 0;
   s.frame_ms_p50 = interval_ms_.at(0.5);
   s.frame_ms_p99 = interval_ms_.at(0.99);
+  if (frame.probe.live) {
+    light_age_ms_.add(std::chrono::duration<double, std::milli>(frame.probe.age).count());
+  }
+  s.kept_light_frames += frame.probe.kept_because.empty() ? 0 : 1;
+  s.probe = frame.probe;
   const double period_ms = period_ms_ > 0 ? period_ms_ : interval_ms_.mean();
   if (period_ms > 0) {
     s.delay_frames = delay_ms_.at(0.5) / period_ms;
     s.delay_frames_p99 = delay_ms_.at(0.99) / period_ms;
+    s.light_age_frames = light_age_ms_.at(0.5) / period_ms;
+    s.light_age_frames_p99 = light_age_ms_.at(0.99) / period_ms;
   }
   for (std::size_t i = 0; i < stages; ++i) {
     stage_sum_ms_[i] += frame.stage_ms[i];

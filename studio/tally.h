@@ -32,6 +32,7 @@ class Tally {
   Clock::time_point last_shown_;
   Quantiles interval_ms_;
   Quantiles delay_ms_;
+  Quantiles light_age_ms_;
   std::array<double, stages> stage_sum_ms_{};
   ShowStatus status_;
 };

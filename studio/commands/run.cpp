@@ -80,6 +80,13 @@ void report_end(const ShowStatus& status, const Set& set, Console& console) {
   console.say(fmt::format("match {:.4g} {:.4g} {:.4g}, {} lights, {:.1f} % of the light unseen",
                           status.match.gain[0], status.match.gain[1], status.match.gain[2],
                           status.lights, status.unseen_share * 100));
+  if (status.probe.live) {
+    console.say(fmt::format(
+        "light {:.1f} frames old (p99 {:.1f}) of {} shots a bracket; of {} probe frames {} lost, "
+        "{} rejected; {} frames with light that was kept",
+        status.light_age_frames, status.light_age_frames_p99, status.probe.shots,
+        status.probe.frames, status.probe.lost, status.probe.rejected, status.kept_light_frames));
+  }
   if (!status.match.note.empty()) console.say(status.match.note);
   if (!set.record.file.empty()) {
     console.say(fmt::format("recorded {} frames to {}", status.recorder.written, set.record.file));

@@ -7,9 +7,11 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "capture/camera.h"
 #include "capture/exr.h"
+#include "capture/live_reader.h"
 #include "studio/set.h"
 #include "studio/start.h"
 
@@ -48,19 +50,45 @@ class GreyCamera : public capture::Camera {
     return frame;
   }
 
- private:
+ protected:
   capture::CameraInfo info_;
+
+ private:
   capture::CameraStatistics statistics_;
   std::int64_t frames_, lost_every_, number_ = 0;
   std::shared_ptr<const capture::Image> last_;
 };
 
-// Opens "grey:FRAMES,FPS,LOST_EVERY".
+// The same frames as time goes by: each comes when the monotonic clock says so.
+class LiveGreyCamera final : public GreyCamera {
+ public:
+  LiveGreyCamera(std::int64_t frames, capture::Rational rate, std::int64_t lost_every)
+      : GreyCamera(frames, rate, lost_every), begin_(capture::monotonic_now()) {
+    info_.live = true;
+  }
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (!frame) return frame;
+    frame->time += begin_;
+    std::this_thread::sleep_for(frame->time - capture::monotonic_now());
+    return frame;
+  }
+
+ private:
+  capture::Time begin_;
+};
+
+// Opens "grey:FRAMES,FPS,LOST_EVERY" and "live_grey:FRAMES,FPS".
 inline void register_grey_camera() {
   capture::register_camera("grey", [](std::string_view rest, const capture::CameraOptions&) {
     long frames = 0, fps = 0, lost_every = 0;
     EXPECT_EQ(std::sscanf(std::string(rest).c_str(), "%ld,%ld,%ld", &frames, &fps, &lost_every), 3);
     return std::make_unique<GreyCamera>(frames, capture::Rational{fps, 1}, lost_every);
+  });
+  capture::register_camera("live_grey", [](std::string_view rest, const capture::CameraOptions&) {
+    long frames = 0, fps = 0;
+    EXPECT_EQ(std::sscanf(std::string(rest).c_str(), "%ld,%ld", &frames, &fps), 2);
+    return std::make_unique<LiveGreyCamera>(frames, capture::Rational{fps, 1}, 0);
   });
 }
 

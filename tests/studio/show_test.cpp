@@ -99,6 +99,39 @@ TEST_F(ShowTest, DropsLateFramesWhenLiveAndKeepsToTheClock) {
   EXPECT_EQ(show.status()->frames + show.status()->dropped, numbers.back() + 1);
 }
 
+TEST_F(ShowTest, FollowsALivePlate) {
+  Show show(made_set("live_grey:40,50"));
+  std::vector<std::int64_t> numbers;
+  show.run([&](const ShownFrame& shown) {
+    numbers.push_back(shown.prepared.job.frame);
+    const capture::Time shown_picture = shown.prepared.job.textures[0].time;
+    EXPECT_EQ(shown_picture, shown.prepared.job.time) << "each frame is of its picture's time";
+  });
+  const ShowStatus status = *show.status();
+  EXPECT_EQ(numbers.front(), 0);
+  EXPECT_TRUE(std::ranges::is_sorted(numbers));
+  EXPECT_EQ(status.frames + status.dropped, numbers.back() + 1);
+  EXPECT_LE(numbers.back(), 40);
+  EXPECT_GT(status.delay_frames, 0);
+}
+
+TEST_F(ShowTest, PassesOverPicturesOfALivePlateThatIsFaster) {
+  ShowOptions options;
+  options.rate = capture::Rational{20, 1};
+  Show show(made_set("live_grey:60,100"), options);
+  std::vector<capture::Time> times;
+  show.run([&](const ShownFrame& shown) { times.push_back(shown.prepared.job.time); });
+  for (std::size_t i = 1; i < times.size(); ++i) EXPECT_GE(times[i] - times[i - 1], 37ms);
+  EXPECT_LE(times.size(), 20U);
+}
+
+TEST_F(ShowTest, DropsPicturesOfALivePlateThatItIsTooSlowFor) {
+  Show show(made_set("live_grey:60,50"));
+  show.run([](const ShownFrame&) { std::this_thread::sleep_for(90ms); });
+  EXPECT_GT(show.status()->dropped, 10);
+  EXPECT_LT(show.status()->frames, 40);
+}
+
 TEST_F(ShowTest, DelaysPicturesByTwoFramesAtMost) {
   Show show(made_set("grey:40,25,0"));
   show.run([](const ShownFrame&) { std::this_thread::sleep_for(4ms); });

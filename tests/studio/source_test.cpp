@@ -4,15 +4,20 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <random>
+#include <thread>
 
 #include "studio/probe_source.h"
 #include "studio/quantiles.h"
+#include "studio/rolling_bracket.h"
 #include "tests/studio/made_show.h"
 
 namespace studio {
 namespace {
+
+using namespace std::chrono_literals;
 
 Source grey_source(std::int64_t frames, std::int64_t fps) {
   return Source(std::make_unique<GreyCamera>(frames, capture::Rational{fps, 1}, 0));
@@ -45,6 +50,34 @@ TEST(Source, ShowsASinglePictureForEver) {
   EXPECT_TRUE(source.at(std::chrono::hours(100)));
 }
 
+TEST(Source, GivesWhatHasComeOfALiveCameraWithoutWaiting) {
+  Source source(std::make_unique<LiveGreyCamera>(1000, capture::Rational{100, 1}, 0));
+  ASSERT_TRUE(source.is_live());
+  EXPECT_FALSE(source.is_still());
+  std::int64_t last = -1;
+  for (int i = 0; i < 20; ++i) {
+    const capture::Frame newest = source.wait_for_newer(capture::monotonic_now() + 60s);
+    EXPECT_GT(newest.number, last);
+    const auto frame = source.at(newest.time);
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->number, newest.number);
+    EXPECT_GE(source.arrived(), frame->time);
+    EXPECT_EQ(source.at(newest.time)->number, newest.number) << "until another one is due";
+    last = newest.number;
+  }
+}
+
+TEST(Source, KeepsTheNewestLiveFramesWhileNobodyAsks) {
+  Source source(std::make_unique<LiveGreyCamera>(60, capture::Rational{1000, 1}, 0));
+  std::vector<capture::Frame> came;
+  while (came.empty() || came.back().number < 59) {
+    std::this_thread::sleep_for(100ms);
+    for (capture::Frame& frame : source.advance(capture::Time::max())) came.push_back(frame);
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(came, {}, &capture::Frame::number));
+  EXPECT_FALSE(source.at(capture::Time::max())) << "it has ended";
+}
+
 TEST(Source, RefusesACameraWithoutFrames) { EXPECT_THROW(grey_source(0, 25), std::runtime_error); }
 
 TEST(Quantiles, AreRightToOnePercent) {
@@ -73,20 +106,31 @@ std::shared_ptr<const capture::Image> shot_of(double radiance, double exposure_s
 
 TEST(RollingBracket, MergesRadianceFromTheNewestShotOfEachExposure) {
   const std::vector<double> exposures_s{0.001, 0.01, 0.1};
-  RollingBracket bracket(exposures_s);
+  RollingBracket bracket(exposures_s.size());
+  std::int64_t number = 0;
   for (const double radiance : {0.05, 3.0, 60.0, 700.0}) {
     for (const double exposure_s : exposures_s) {
-      bracket.add(shot_of(radiance, exposure_s), exposure_s);
+      bracket.add(shot_of(radiance, exposure_s), exposure_s, number++);
     }
-    for (const float v : bracket.merge()->pixels) EXPECT_NEAR(v / radiance, 1, 0.01) << radiance;
+    for (const float v : bracket.merge()->radiance.pixels)
+      EXPECT_NEAR(v / radiance, 1, 0.01) << radiance;
+  }
+}
+
+TEST(RollingBracket, LeavesOutWhatDoesNotComeAgain) {
+  RollingBracket bracket(2);
+  for (std::int64_t n = 0; n < 10; ++n) {
+    const double exposure_s = n == 0 ? 0.5 : n % 2 == 0 ? 0.001 : 0.01;
+    bracket.add(shot_of(3, exposure_s), exposure_s, n);
+    EXPECT_EQ(bracket.shots(), n == 0 ? 1U : n == 1 ? 2U : n < 7 ? 3U : 2U) << n;
   }
 }
 
 TEST(RollingBracket, RefusesShotsOfTwoSizes) {
-  RollingBracket bracket({0.01, 0.1});
-  bracket.add(std::make_shared<capture::Image>(capture::make_image(4, 6)), 0.01);
+  RollingBracket bracket(2);
+  bracket.add(std::make_shared<capture::Image>(capture::make_image(4, 6)), 0.01, 0);
   const auto turned = std::make_shared<capture::Image>(capture::make_image(6, 4));
-  EXPECT_THROW(bracket.add(turned, 0.1), std::invalid_argument);
+  EXPECT_THROW(bracket.add(turned, 0.1, 1), std::invalid_argument);
 }
 
 }  // namespace

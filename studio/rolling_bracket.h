@@ -1,0 +1,44 @@
+// The window of shots that a lightprobe's radiance is merged from.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "capture/image.h"
+#include "capture/live_merge.h"
+#include "capture/pool.h"
+
+namespace studio {
+
+// Merges a camera that cycles through exposures: every new shot takes the place of the one before
+// of about the same exposure, so that each shot gives a new radiance picture, at the camera's full
+// rate. A shot whose exposure does not come again stays for three cycles.
+class RollingBracket {
+ public:
+  // `cycle` is how many shots the camera takes until its exposures repeat, 1 to 16.
+  explicit RollingBracket(std::size_t cycle, capture::WindowMergeSettings settings = {});
+
+  // Shot number `number` of the camera, rising; linear, 1 = saturated: (height, width, 3), all of
+  // one size. Throws std::invalid_argument for another size, or an exposure that is not > 0.
+  void add(std::shared_ptr<const capture::Image> linear, double exposure_s, std::int64_t number);
+  std::size_t shots() const { return shots_.size(); }
+  // Of the shots that were added; at least one must have been.
+  std::shared_ptr<const capture::MergedFrame> merge();
+
+ private:
+  struct Member {
+    std::shared_ptr<const capture::Image> linear;
+    double exposure_s;
+    std::int64_t number;
+  };
+
+  capture::WindowMergeSettings settings_;
+  std::int64_t longest_stay_;  // in shots
+  std::vector<Member> shots_;  // the newest last
+  capture::Pool<capture::MergedFrame> pool_;
+};
+
+}  // namespace studio
