@@ -25,33 +25,19 @@ using namespace window_merge;
 
 constexpr std::size_t stretches_per_task = 128;
 
-// The worst status of each pixel's channels.
-void store_status(const Flags& status, std::size_t pixels, MergeStatus* to) {
-  std::int32_t any = 0;
-  for (const std::int32_t one : status.v) any |= one;
-  if (any == 0) {
-    std::fill_n(to, pixels, MergeStatus::good);
-    return;
-  }
-  for (std::size_t i = 0; i < pixels; ++i) {
-    const std::int32_t* of = &status.v[channels * i];
-    to[i] = static_cast<MergeStatus>(std::max(of[0], std::max(of[1], of[2])));
-  }
-}
-
-void store(const Merged& merged, std::size_t begin, std::size_t count, MergedFrame& frame) {
-  std::copy_n(merged.radiance.v.begin(), count,
-              frame.radiance.pixels.begin() + static_cast<std::ptrdiff_t>(begin));
-  std::copy_n(merged.deviation.v.begin(), count,
-              frame.deviation.pixels.begin() + static_cast<std::ptrdiff_t>(begin));
-  store_status(merged.status, count / channels, &frame.status[begin / channels]);
+template <class Code>
+void merge_stretch(const Plan<Code>& plan, std::size_t begin, const Merged& merged) {
+  if (!average_all(plan, begin, merged)) return;
+  Flags contradicted = find_contradictions(plan, begin);
+  join_pixels(contradicted);
+  average_newest(plan, begin, contradicted, merged);
 }
 
 // The last stretch of a picture, if it is a short one: filled up with its last pixel.
 template <class Code>
 void merge_rest(const Plan<Code>& plan, std::size_t begin, std::size_t count, MergedFrame& frame) {
   Plan<Code> rest = plan;
-  std::array<std::array<Code, lanes>, most_shots> values;
+  std::array<std::array<Code, lanes>, most_window_shots> values;
   for (std::size_t i = 0; i < plan.count; ++i) {
     const Code* from = plan.shots[i].values + begin;
     for (std::size_t k = 0; k < lanes; ++k) {
@@ -59,9 +45,13 @@ void merge_rest(const Plan<Code>& plan, std::size_t begin, std::size_t count, Me
     }
     rest.shots[i].values = values[i].data();
   }
-  Merged merged;
-  merge_stretch(rest, 0, merged);
-  store(merged, begin, count, frame);
+  Lanes radiance;
+  std::array<std::uint16_t, lanes> counted;
+  std::array<MergeStatus, stretch_pixels> status;
+  merge_stretch(rest, 0, {radiance.v.data(), counted.data(), status.data()});
+  std::copy_n(radiance.v.data(), count, &frame.radiance.pixels[begin]);
+  std::copy_n(counted.data(), count, &frame.counted[begin]);
+  std::copy_n(status.data(), count / channels, &frame.status[begin / channels]);
 }
 
 void require_exposure(double exposure_s) {
@@ -93,18 +83,18 @@ void resize(Image& image, int width, int height) {
 template <class Code>
 void merge_all(const Plan<Code>& plan, int width, int height, MergedFrame& frame) {
   resize(frame.radiance, width, height);
-  resize(frame.deviation, width, height);
   const std::size_t samples = frame.radiance.pixels.size();
+  frame.counted.resize(samples);
   frame.status.resize(samples / channels);
+  const auto merge = [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      merge_stretch(plan, i * lanes,
+                    {&frame.radiance.pixels[i * lanes], &frame.counted[i * lanes],
+                     &frame.status[i * stretch_pixels]});
+    }
+  };
   const std::size_t stretches = samples / lanes;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, stretches, stretches_per_task),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      Merged merged;
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                        merge_stretch(plan, i * lanes, merged);
-                        store(merged, i * lanes, lanes, frame);
-                      }
-                    });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, stretches, stretches_per_task), merge);
   if (samples % lanes != 0) merge_rest(plan, stretches * lanes, samples % lanes, frame);
 }
 
@@ -124,9 +114,27 @@ struct WindowShot {
 };
 template <class Code>
 struct Shots {
-  std::array<WindowShot<Code>, most_shots> of;  // the newest last
+  std::array<WindowShot<Code>, most_window_shots> of;  // the newest last
   std::size_t count = 0;
 };
+
+// The radiance below which an average of this variance is within two deviations of black.
+float dark_below(float read, float shot, float relative_squared) {
+  const float rest = 1 - 4 * relative_squared;
+  if (rest <= 0) return std::numeric_limits<float>::max();
+  return 2 * (shot + std::sqrt(shot * shot + rest * read)) / rest;
+}
+
+// Radiance from values, in every lane.
+template <class Code>
+void plan_scale(const LinearCodes& codes, double exposure_s, PlannedShot<Code>& shot) {
+  for (std::size_t k = 0; k < lanes; ++k) {
+    const double black = codes.black[k % channels];
+    const double scale = 1 / ((codes.white[k % channels] - black) * exposure_s);
+    shot.scale.v[k] = static_cast<float>(scale);
+    shot.offset.v[k] = static_cast<float>(-black * scale);
+  }
+}
 
 // The terms of every shot, and how it is added to the shorter ones.
 template <class Code>
@@ -134,7 +142,7 @@ void plan_steps(const Shots<Code>& shots,
                 const LinearCodes& codes,
                 const NoiseModel& noise,
                 Plan<Code>& plan) {
-  std::array<std::size_t, most_shots> order{};  // from the shortest, and of equal ones the oldest
+  std::array<std::size_t, most_window_shots> order{};  // from the shortest, then from the oldest
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto end = order.begin() + static_cast<std::ptrdiff_t>(shots.count);
   std::sort(order.begin(), end, [&](std::size_t a, std::size_t b) {
@@ -143,7 +151,7 @@ void plan_steps(const Shots<Code>& shots,
   const double longest_s = shots.of[*(end - 1)].exposure_s;
   plan.read = static_cast<float>(noise.read / (longest_s * longest_s));
   plan.shot = static_cast<float>(noise.shot / longest_s);
-  float weight = 0, first = 0, second = 0;
+  float weight = 0, first = 0, second = 0, mean_read = 0, mean_shot = 0;
   Step step;
   for (std::size_t i = 0; i < shots.count; ++i) {
     const WindowShot<Code>& from = shots.of[order[i]];
@@ -151,25 +159,25 @@ void plan_steps(const Shots<Code>& shots,
     plan.newest_first[shots.count - 1 - order[i]] = i;
     const double t = from.exposure_s / longest_s;
     shot.values = from.values;
+    shot.bit = static_cast<std::uint16_t>(1U << order[i]);
     shot.terms = {static_cast<float>(noise.read / (from.exposure_s * from.exposure_s)),
                   static_cast<float>(noise.shot / from.exposure_s),
                   static_cast<float>(t * std::sqrt(t)), static_cast<float>(t),
                   static_cast<float>(t * t)};
-    step.read = step.mean_read + shot.terms.read;
-    step.shot = step.mean_shot + shot.terms.shot;
+    if (i > 0 && plan.doubt < infinite) {
+      step.allowed = {plan.doubt * (mean_read + shot.terms.read),
+                      plan.doubt * (mean_shot + shot.terms.shot), plan.doubt * plan.slack};
+    }
     weight += shot.terms.weight;
     first += shot.terms.first;
     second += shot.terms.second;
+    mean_read = plan.read * first / (weight * weight);
+    mean_shot = plan.shot * second / (weight * weight);
     step.gain = shot.terms.weight / weight;
-    step.mean_read = plan.read * first / (weight * weight);
-    step.mean_shot = plan.shot * second / (weight * weight);
+    step.dark = dark_below(mean_read, mean_shot, plan.relative_squared);
+    step.counted |= shot.bit;
     shot.step = step;
-    for (std::size_t k = 0; k < lanes; ++k) {
-      const double black = codes.black[k % channels];
-      const double scale = 1 / ((codes.white[k % channels] - black) * from.exposure_s);
-      shot.scale.v[k] = static_cast<float>(scale);
-      shot.offset.v[k] = static_cast<float>(black * scale);
-    }
+    plan_scale(codes, from.exposure_s, shot);
   }
 }
 
@@ -181,7 +189,6 @@ void merge_shots_of(const Shots<Code>& shots,
   const NoiseModel& noise = settings.noise;
   Plan<Code> plan;
   plan.count = shots.count;
-  plan_steps(shots, codes, noise, plan);
   const double slack =
       noise.relative * noise.relative + settings.exposure_error * settings.exposure_error;
   plan.slack = static_cast<float>(2 * slack);
@@ -190,18 +197,42 @@ void merge_shots_of(const Shots<Code>& shots,
                    : static_cast<float>(settings.consistency * settings.consistency);
   plan.relative_squared = static_cast<float>(noise.relative * noise.relative);
   for (std::size_t k = 0; k < lanes; ++k) {
-    const double black = codes.black[k % channels];
-    const double white = codes.white[k % channels];
-    plan.saturation[k] = saturated_code<Code>(black, white, noise.saturation);
+    plan.saturation[k] = saturated_code<Code>(codes.black[k % channels], codes.white[k % channels],
+                                              noise.saturation);
     plan.saturated_value.v[k] = static_cast<float>(plan.saturation[k]);
   }
+  plan_steps(shots, codes, noise, plan);
+  frame.noise = noise;
+  for (std::size_t i = 0; i < shots.count; ++i) frame.exposures_s[i] = shots.of[i].exposure_s;
   merge_all(plan, codes.width, codes.height, frame);
+}
+
+// Of an average of radiance L: read + L * (shot + L * relative_squared).
+struct Variance {
+  float read = infinite, shot = 0, relative_squared = 0;
+};
+
+Variance variance_of(const MergedFrame& frame, std::uint16_t counted) {
+  if (counted == 0) return {};
+  double weight = 0, first = 0, second = 0;
+  for (std::size_t i = 0; i < most_window_shots; ++i) {
+    if ((counted >> i & 1) == 0) continue;
+    const double t = frame.exposures_s[i];
+    weight += t * std::sqrt(t);
+    first += t;
+    second += t * t;
+  }
+  const NoiseModel& noise = frame.noise;
+  return {static_cast<float>(noise.read * first / (weight * weight)),
+          static_cast<float>(noise.shot * second / (weight * weight)),
+          static_cast<float>(noise.relative * noise.relative)};
 }
 
 void require_count(std::size_t count) {
   if (count == 0) throw std::invalid_argument("there are no shots to merge");
-  if (count > most_shots) {
-    throw std::invalid_argument("a window holds up to " + std::to_string(most_shots) + " shots");
+  if (count > most_window_shots) {
+    throw std::invalid_argument("a window holds up to " + std::to_string(most_window_shots) +
+                                " shots");
   }
 }
 
@@ -240,6 +271,24 @@ void merge_coded(std::span<const Coded> shots,
 }
 
 }  // namespace
+
+void MergedFrame::fill_deviation(Image& deviation) const {
+  resize(deviation, radiance.width, radiance.height);
+  std::uint16_t shots = 0;  // of the sample before: as a rule the same
+  Variance variance = variance_of(*this, shots);
+  for (std::size_t i = 0; i < counted.size(); ++i) {
+    if (counted[i] != shots) variance = variance_of(*this, shots = counted[i]);
+    const float light = std::max(radiance.pixels[i], 0.0F);
+    deviation.pixels[i] =
+        std::sqrt(variance.read + light * (variance.shot + light * variance.relative_squared));
+  }
+}
+
+Image MergedFrame::deviation() const {
+  Image deviation;
+  fill_deviation(deviation);
+  return deviation;
+}
 
 std::array<double, merge_status_count> MergedFrame::status_shares() const {
   std::array<double, merge_status_count> shares{};

@@ -49,11 +49,20 @@ struct LinearCodes {
   std::array<double, 3> white{255, 255, 255};
 };
 
+inline constexpr std::size_t most_window_shots = 16;
+
 // One merged frame, and what it was merged from. Reused from frame to frame, it costs no memory.
 struct MergedFrame {
-  Image radiance;                   // (height, width, 3), sensor units per second
-  Image deviation;                  // its standard deviation by the noise model
-  std::vector<MergeStatus> status;  // (height, width)
+  Image radiance;                      // (height, width, 3), sensor units per second
+  std::vector<MergeStatus> status;     // (height, width)
+  std::vector<std::uint16_t> counted;  // (height, width, 3): bit i = the window's shot i counts
+  NoiseModel noise;
+  std::array<double, most_window_shots> exposures_s{};  // of the window's shots
+
+  // Fills (height, width, 3): the standard deviation of the radiance by the noise model, infinite
+  // where no shot counts. It follows from what counts, so that a merge need not write it.
+  void fill_deviation(Image& deviation) const;
+  Image deviation() const;
 
   // The share of pixels with each status. Takes time: for statistics.
   std::array<double, merge_status_count> status_shares() const;

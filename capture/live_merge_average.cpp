@@ -1,17 +1,18 @@
-// The average of a stretch: of all shots, from the shortest to the longest, by constant gains;
-// where they contradict each other, of the newest ones.
+// The average of a stretch of all shots, from the shortest to the longest, by constant gains. What
+// is saturated in one shot is saturated in all longer ones, so that the shots that count in a lane
+// are always the first ones, and gains and tolerances are the window's, not the lane's.
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <type_traits>
 
-#include "capture/live_merge.h"
 #include "capture/live_merge_plan.h"
 
 namespace capture::window_merge {
 namespace {
 
 // The functions on lanes are functions of their own, with pointers that do not overlap, so that the
-// compiler vectorises them.
+// compiler vectorises them. A float's sign bit is its flag: a union of them costs one instruction.
+std::int32_t sign_of(float value) { return std::bit_cast<std::int32_t>(value); }
 
 template <class Code>
 std::size_t count_usable(const Code* __restrict values, const Code* __restrict saturation) {
@@ -28,406 +29,277 @@ std::size_t count_usable(const Code* __restrict values, const Code* __restrict s
   return count;
 }
 
-// The average of a stretch while shots are added, from the shortest to the longest: what is
-// saturated in one shot is saturated in all longer ones, so that the shots that count in a lane are
-// always the first ones, and gains and variances are the window's, not the lane's.
-struct Average {
+enum class Values { usable, saturated, mixed };
+
+template <class Code>
+Values kind_of(const Code* values, const Code* saturation) {
+  const std::size_t usable = count_usable(values, saturation);
+  if (usable == lanes) return Values::usable;
+  return usable == 0 && std::integral<Code> ? Values::saturated : Values::mixed;
+}
+
+template <class Code>
+[[gnu::noinline]] void start(const Code* __restrict values,
+                             const float* __restrict scale,
+                             const float* __restrict offset,
+                             float* __restrict mean) {
+  for (std::size_t i = 0; i < lanes; ++i) {
+    mean[i] = mul_add(static_cast<float>(values[i]), scale[i], offset[i]);
+  }
+}
+
+// Adds a shot that counts in all lanes. Whether it contradicts the average somewhere.
+template <class Code>
+[[gnu::noinline]] bool add_to_all(const Code* __restrict values,
+                                  const float* __restrict scale,
+                                  const float* __restrict offset,
+                                  Step step,
+                                  float* __restrict mean) {
+  std::int32_t contradicted = 0;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const float radiance = mul_add(static_cast<float>(values[i]), scale[i], offset[i]);
+    const float difference = radiance - mean[i];
+    const float light = mul_add(step.gain, difference, mean[i]);
+    mean[i] = light;
+    contradicted |= sign_of(mul_add(-difference, difference, step.allowed.at(light)));
+  }
+  return contradicted < 0;
+}
+
+// Whether saturated values tell more light than the average somewhere.
+template <class Code>
+[[gnu::noinline]] bool exceeds(const Code* __restrict values,
+                               const float* __restrict scale,
+                               const float* __restrict offset,
+                               Tolerance allowed,
+                               const float* __restrict mean) {
+  std::int32_t contradicted = 0;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const float bound = mul_add(static_cast<float>(values[i]), scale[i], offset[i]);
+    const float excess = std::max(bound - mean[i], 0.0F);
+    contradicted |= sign_of(mul_add(-excess, excess, allowed.at(mean[i])));
+  }
+  return contradicted < 0;
+}
+
+template <class Code>
+bool add_usable(const PlannedShot<Code>& shot, bool first, std::size_t begin, float* mean) {
+  const Code* values = shot.values + begin;
+  const float* scale = shot.scale.v.data();
+  const float* offset = shot.offset.v.data();
+  if (!first) return add_to_all(values, scale, offset, shot.step, mean);
+  start(values, scale, offset, mean);
+  return false;
+}
+
+template <class Code>
+bool add_bound(const PlannedShot<Code>& shot, bool first, std::size_t begin, float* mean) {
+  const Code* values = shot.values + begin;
+  const float* scale = shot.scale.v.data();
+  const float* offset = shot.offset.v.data();
+  if (!first) return exceeds(values, scale, offset, shot.step.allowed, mean);
+  start(values, scale, offset, mean);
+  return false;
+}
+
+// An average whose lanes count different shots: as many of the shortest as lie below saturation.
+struct MixedAverage {
   Lanes mean;
-  Flags disagrees;  // shots of this lane contradict each other
-  bool any_disagrees = false;
-  bool uniform = true;    // all lanes have counted the same shots,
-  bool open = true;       // and none was saturated yet
-  float read = infinite;  // then the variance is read + shot * L;
-  float shot = 0;
-  Lanes lane_read, lane_shot;  // else that of each lane
-  Flags alive;                 // 0 = saturated in a shot before
+  Lanes dark;            // the average is dark below; infinite where no shot counts
+  Flags counted;         // the shots that count
+  Flags open;            // -1 while no shot was saturated, then 0
+  Flags contradictions;  // below 0 where there are some
+};
+
+float keep_if(std::int32_t mask, float value) {
+  return std::bit_cast<float>(mask & std::bit_cast<std::int32_t>(value));
+}
+
+// A value as the merge reads it: masks of -1 or 0.
+struct Reading {
+  float value;
+  std::int32_t usable, lacking;  // neither: saturated
 };
 
 template <class Code>
-void start_mean(const Code* __restrict values,
-                const float* __restrict scale,
-                const float* __restrict offset,
-                float* __restrict mean) {
+Reading read_value(Code code, float saturation) {
+  const float value = static_cast<float>(code);
+  const std::int32_t below = value < saturation ? -1 : 0;
+  if constexpr (std::integral<Code>) return {value, below, 0};
+  const std::int32_t saturated = value >= saturation ? -1 : 0;
+  const std::int32_t usable = below & (value > least_value ? -1 : 0);
+  return {value <= largest_value ? value : saturation, usable, ~(usable | saturated)};
+}
+
+// The shortest shot.
+template <class Code>
+[[gnu::noinline]] void start_some(const Code* __restrict values,
+                                  const PlannedShot<Code>& __restrict shot,
+                                  const float* __restrict saturation,
+                                  MixedAverage& __restrict average) {
+  const float dark = shot.step.dark;
+  const std::int32_t counted = shot.step.counted;
   for (std::size_t i = 0; i < lanes; ++i) {
-    mean[i] = static_cast<float>(values[i]) * scale[i] - offset[i];
+    const auto [value, usable, lacking] = read_value(values[i], saturation[i]);
+    average.mean.v[i] = mul_add(value, shot.scale.v[i], shot.offset.v[i]);
+    average.dark.v[i] = usable != 0 ? dark : infinite;
+    average.counted.v[i] = usable & counted;
+    average.open.v[i] = usable;
+    average.contradictions.v[i] = lacking;
   }
 }
 
-// Adds a shot that counts in all lanes; whether it contradicts the average somewhere.
-template <class Code>
-bool add_to_all(const Code* __restrict values,
-                const float* __restrict scale,
-                const float* __restrict offset,
-                Tolerance allowed,
-                float gain,
-                float* __restrict mean,
-                std::int32_t* __restrict disagrees) {
-  std::int32_t far = 0;
+// Goes on from an average whose lanes all count the same shots, the last of which came with `step`.
+[[gnu::noinline]] void start_mixed(const Step& step, const Lanes& mean, MixedAverage& average) {
+  const float dark = step.dark;
+  const std::int32_t counted = step.counted;
   for (std::size_t i = 0; i < lanes; ++i) {
-    const float radiance = static_cast<float>(values[i]) * scale[i] - offset[i];
-    const float difference = radiance - mean[i];
-    const float light = std::max(std::max(mean[i], radiance), 0.0F);
-    const float tolerance = allowed.read + light * (allowed.shot + light * allowed.slack);
-    const std::int32_t disagree = difference * difference > tolerance ? 1 : 0;
-    mean[i] = mean[i] + gain * difference;
-    disagrees[i] |= disagree;
-    far |= disagree;
+    average.mean.v[i] = mean.v[i];
+    average.dark.v[i] = dark;
+    average.counted.v[i] = counted;
+    average.open.v[i] = -1;
+    average.contradictions.v[i] = 0;
   }
-  return far != 0;
 }
 
-// Looks at codes that are all saturated: whether that says more light than the average somewhere.
 template <class Code>
-bool compare_saturated(const Code* __restrict values,
-                       const float* __restrict scale,
-                       const float* __restrict offset,
-                       Tolerance allowed,
-                       const float* __restrict mean,
-                       std::int32_t* __restrict disagrees) {
-  std::int32_t far = 0;
+[[gnu::noinline]] void add_to_some(const Code* __restrict values,
+                                   const PlannedShot<Code>& __restrict shot,
+                                   const float* __restrict saturation,
+                                   MixedAverage& __restrict average) {
+  const Step step = shot.step;
+  const std::int32_t bit = shot.bit;
   for (std::size_t i = 0; i < lanes; ++i) {
-    const float radiance = static_cast<float>(values[i]) * scale[i] - offset[i];
-    const float excess = std::max(radiance - mean[i], 0.0F);
-    const float light = std::max(std::max(mean[i], radiance), 0.0F);
-    const float tolerance = allowed.read + light * (allowed.shot + light * allowed.slack);
-    const std::int32_t disagree = excess * excess > tolerance ? 1 : 0;
-    disagrees[i] |= disagree;
-    far |= disagree;
+    const auto [value, usable, lacking] = read_value(values[i], saturation[i]);
+    const std::int32_t open = average.open.v[i];
+    const std::int32_t takes = usable & open;
+    const float radiance = mul_add(value, shot.scale.v[i], shot.offset.v[i]);
+    const float difference = radiance - average.mean.v[i];
+    const float light = mul_add(step.gain, keep_if(takes, difference), average.mean.v[i]);
+    // A bound contradicts only what is below it.
+    const float apart = std::max(difference, keep_if(usable, -infinite));
+    const std::int32_t too_far = sign_of(mul_add(-apart, apart, step.allowed.at(light)));
+    average.mean.v[i] = light;
+    average.dark.v[i] = takes != 0 ? step.dark : average.dark.v[i];
+    average.counted.v[i] |= takes & bit;
+    average.open.v[i] = takes;
+    average.contradictions.v[i] |= (too_far & open) | (usable & ~open) | lacking;
   }
-  return far != 0;
 }
 
-// Adds a shot that counts in some lanes.
+// All shots from `first` on; shorter ones count in all lanes, and have the average `mean`.
 template <class Code>
-bool add_to_some(const Code* __restrict values,
-                 const float* __restrict scale,
-                 const float* __restrict offset,
-                 const float* __restrict saturation,
-                 Tolerance allowed,
-                 const Step& step,
-                 float* __restrict mean,
-                 std::int32_t* __restrict disagrees,
-                 float* __restrict read,
-                 float* __restrict shot,
-                 std::int32_t* __restrict alive) {
-  const float gain = step.gain, mean_read = step.mean_read, mean_shot = step.mean_shot;
-  std::int32_t far = 0;
-  for (std::size_t i = 0; i < lanes; ++i) {
-    float value = static_cast<float>(values[i]);
-    std::int32_t usable = value < saturation[i] ? 1 : 0;
-    std::int32_t lacking = 0;
-    if constexpr (std::floating_point<Code>) {
-      const std::int32_t saturated = value >= saturation[i] ? 1 : 0;
-      usable &= value > least_value ? 1 : 0;
-      lacking = 1 - (usable | saturated);
-      value = value <= largest_value ? value : saturation[i];
+void average_rest(const Plan<Code>& plan,
+                  std::size_t first,
+                  const Lanes& mean,
+                  std::size_t begin,
+                  MixedAverage& average) {
+  const float* saturation = plan.saturated_value.v.data();
+  if (first > 0) start_mixed(plan.shots[first - 1].step, mean, average);
+  for (std::size_t i = first; i < plan.count; ++i) {
+    const PlannedShot<Code>& shot = plan.shots[i];
+    if (i == 0) {
+      start_some(shot.values + begin, shot, saturation, average);
+    } else {
+      add_to_some(shot.values + begin, shot, saturation, average);
     }
-    const float radiance = value * scale[i] - offset[i];
-    const float difference = radiance - mean[i];
-    const float excess = std::max(difference, 0.0F);
-    const float contradiction = usable != 0 ? difference : excess;
-    const float light = std::max(std::max(mean[i], radiance), 0.0F);
-    const float tolerance = allowed.read + light * (allowed.shot + light * allowed.slack);
-    const std::int32_t too_far = contradiction * contradiction > tolerance ? 1 : 0;
-    const std::int32_t takes = usable & alive[i];
-    const std::int32_t disagree = too_far | (usable ^ takes) | lacking;
-    const float change = gain * difference;
-    mean[i] = mean[i] + (takes != 0 ? change : 0.0F);
-    read[i] = takes != 0 ? mean_read : read[i];
-    shot[i] = takes != 0 ? mean_shot : shot[i];
-    alive[i] = takes;
-    disagrees[i] |= disagree;
-    far |= disagree;
   }
-  return far != 0;
 }
 
-// The shortest shot, which has nothing to contradict.
-template <class Code>
-bool start_with_some(const Code* __restrict values,
-                     const float* __restrict scale,
-                     const float* __restrict offset,
-                     const float* __restrict saturation,
-                     const Step& step,
-                     float* __restrict mean,
-                     std::int32_t* __restrict disagrees,
-                     float* __restrict read,
-                     float* __restrict shot,
-                     std::int32_t* __restrict alive) {
-  const float mean_read = step.mean_read, mean_shot = step.mean_shot;
-  std::int32_t far = 0;
+std::int32_t union_of(const Flags& flags) {
+  std::int32_t all = 0;
+  for (const std::int32_t flag : flags.v) all |= flag;
+  return all;
+}
+
+bool is_dark_somewhere(const float* mean, float dark) {
+  std::int32_t below = 0;
+  for (std::size_t i = 0; i < lanes; ++i) below |= sign_of(mean[i] - dark);
+  return below < 0;
+}
+
+// The worst status of each pixel's channels. An average is dark below `dark`; infinite = no shot
+// counts.
+[[gnu::noinline]] void tell_status(const float* __restrict mean,
+                                   const float* __restrict dark,
+                                   MergeStatus* __restrict status) {
+  static_assert(MergeStatus::dark == MergeStatus{1} && MergeStatus::lower_bound == MergeStatus{3});
+  std::array<std::uint8_t, lanes> of_lane;
   for (std::size_t i = 0; i < lanes; ++i) {
-    float value = static_cast<float>(values[i]);
-    std::int32_t usable = value < saturation[i] ? 1 : 0;
-    std::int32_t lacking = 0;
-    if constexpr (std::floating_point<Code>) {
-      const std::int32_t saturated = value >= saturation[i] ? 1 : 0;
-      usable &= value > least_value ? 1 : 0;
-      lacking = 1 - (usable | saturated);
-      value = value <= largest_value ? value : saturation[i];
-    }
-    mean[i] = value * scale[i] - offset[i];
-    read[i] = usable != 0 ? mean_read : infinite;
-    shot[i] = usable != 0 ? mean_shot : 0.0F;
-    alive[i] = usable;
-    disagrees[i] = lacking;
-    far |= lacking;
+    const std::int32_t below = mean[i] < dark[i] ? 1 : 0;
+    of_lane[i] = static_cast<std::uint8_t>(dark[i] < infinite ? below : 3);
   }
-  return far != 0;
+  for (std::size_t i = 0; i < stretch_pixels; ++i) {
+    const std::uint8_t* of = &of_lane[channels * i];
+    status[i] = static_cast<MergeStatus>(std::max(of[0], std::max(of[1], of[2])));
+  }
 }
 
-template <class Code>
-void start_average(const Plan<Code>& plan, std::size_t begin, Average& average) {
-  const PlannedShot<Code>& shot = plan.shots[0];
-  const Code* values = shot.values + begin;
-  const float* scale = shot.scale.v.data();
-  const float* offset = shot.offset.v.data();
-  const std::size_t usable = count_usable(values, plan.saturation.data());
-  average.open = usable == lanes;
-  average.uniform = average.open || (usable == 0 && std::integral<Code>);
-  average.read = average.open ? shot.step.mean_read : infinite;
-  average.shot = average.open ? shot.step.mean_shot : 0;
-  average.any_disagrees = false;
-  if (average.uniform) {
-    start_mean(values, scale, offset, average.mean.v.data());
-    average.disagrees.v.fill(0);
+// An average of the same shots in all lanes, which came with `step`; null = of none.
+void store_uniform(const Step* step, const Lanes& mean, const Merged& merged) {
+  for (std::size_t i = 0; i < lanes; ++i) merged.radiance[i] = mean.v[i];
+  const std::uint16_t counted = step != nullptr ? step->counted : std::uint16_t{0};
+  for (std::size_t i = 0; i < lanes; ++i) merged.counted[i] = counted;
+  if (step != nullptr && is_dark_somewhere(mean.v.data(), step->dark)) {
+    Lanes dark;
+    dark.v.fill(step->dark);
+    tell_status(mean.v.data(), dark.v.data(), merged.status);
     return;
   }
-  average.any_disagrees =
-      start_with_some(values, scale, offset, plan.saturated_value.v.data(), shot.step,
-                      average.mean.v.data(), average.disagrees.v.data(), average.lane_read.v.data(),
-                      average.lane_shot.v.data(), average.alive.v.data());
+  const MergeStatus status = step != nullptr ? MergeStatus::good : MergeStatus::lower_bound;
+  for (std::size_t i = 0; i < stretch_pixels; ++i) merged.status[i] = status;
 }
 
-template <class Code>
-void add_shot(const Plan<Code>& plan,
-              const PlannedShot<Code>& shot,
-              std::size_t begin,
-              Average& average) {
-  const Code* values = shot.values + begin;
-  const float* scale = shot.scale.v.data();
-  const float* offset = shot.offset.v.data();
-  float* mean = average.mean.v.data();
-  std::int32_t* disagrees = average.disagrees.v.data();
-  const Tolerance allowed = tolerance_of(plan, shot.step);
-  const std::size_t usable = count_usable(values, plan.saturation.data());
-  if (usable == lanes && average.open) {
-    average.any_disagrees |=
-        add_to_all(values, scale, offset, allowed, shot.step.gain, mean, disagrees);
-    average.read = shot.step.mean_read;
-    average.shot = shot.step.mean_shot;
-    return;
-  }
-  if (average.uniform && (usable > 0 || std::floating_point<Code>)) {
-    average.lane_read.v.fill(average.read);
-    average.lane_shot.v.fill(average.shot);
-    average.alive.v.fill(average.open ? 1 : 0);
-    average.uniform = false;
-  }
-  average.open = false;
-  if (usable == 0 && std::integral<Code>) {
-    average.any_disagrees |= compare_saturated(values, scale, offset, allowed, mean, disagrees);
-    if (!average.uniform) average.alive.v.fill(0);
-    return;
-  }
-  average.any_disagrees |= add_to_some(
-      values, scale, offset, plan.saturated_value.v.data(), allowed, shot.step, mean, disagrees,
-      average.lane_read.v.data(), average.lane_shot.v.data(), average.alive.v.data());
-}
-
-std::int32_t code_of(MergeStatus status) { return static_cast<std::int32_t>(status); }
-
-void finish_uniform(const float* __restrict mean,
-                    float read,
-                    float shot,
-                    float relative_squared,
-                    float* __restrict deviation,
-                    std::int32_t* __restrict status) {
+void store_mixed(const MixedAverage& average, const Merged& merged) {
+  for (std::size_t i = 0; i < lanes; ++i) merged.radiance[i] = average.mean.v[i];
   for (std::size_t i = 0; i < lanes; ++i) {
-    const float light = std::max(mean[i], 0.0F);
-    const float sigma = std::sqrt(read + light * (shot + light * relative_squared));
-    deviation[i] = sigma;
-    status[i] = mean[i] < 2 * sigma ? 1 : 0;
+    merged.counted[i] = static_cast<std::uint16_t>(average.counted.v[i]);
   }
-}
-
-void finish_lanes(const float* __restrict mean,
-                  const float* __restrict read,
-                  const float* __restrict shot,
-                  float relative_squared,
-                  float* __restrict deviation,
-                  std::int32_t* __restrict status) {
-  for (std::size_t i = 0; i < lanes; ++i) {
-    const float light = std::max(mean[i], 0.0F);
-    const float sigma = std::sqrt(read[i] + light * (shot[i] + light * relative_squared));
-    deviation[i] = sigma;
-    const std::int32_t dark = mean[i] < 2 * sigma ? 1 : 0;
-    status[i] = sigma < infinite ? dark : 3;
-  }
-}
-static_assert(MergeStatus::dark == MergeStatus{1} && MergeStatus::lower_bound == MergeStatus{3});
-
-// Averages all shots of a stretch, if they agree.
-template <class Code>
-void average_all(const Plan<Code>& plan, std::size_t begin, Average& average, Merged& merged) {
-  start_average(plan, begin, average);
-  for (std::size_t i = 1; i < plan.count; ++i) add_shot(plan, plan.shots[i], begin, average);
-  merged.radiance = average.mean;
-  if (!average.uniform) {
-    finish_lanes(average.mean.v.data(), average.lane_read.v.data(), average.lane_shot.v.data(),
-                 plan.relative_squared, merged.deviation.v.data(), merged.status.v.data());
-  } else if (average.read < infinite) {
-    finish_uniform(average.mean.v.data(), average.read, average.shot, plan.relative_squared,
-                   merged.deviation.v.data(), merged.status.v.data());
-  } else {
-    merged.deviation.v.fill(infinite);
-    merged.status.v.fill(code_of(MergeStatus::lower_bound));
-  }
-}
-
-// What newer shots say of a stretch. `weight` is 0 where none counts, `bound` minus infinity where
-// none is saturated.
-struct Stretch {
-  Lanes mean, weight, first, second, bound;
-  Flags inconsistent;
-};
-
-// A shot, looked at against what newer ones say.
-struct Look {
-  Lanes radiance;  // 0 where nothing counts
-  Flags usable, saturated, disagrees;
-};
-
-template <class Code>
-void look_at(const Plan<Code>& plan,
-             const PlannedShot<Code>& shot,
-             const Code* __restrict values,
-             const Stretch& __restrict s,
-             Look& __restrict look) {
-  for (std::size_t i = 0; i < lanes; ++i) {
-    const float value = static_cast<float>(values[i]);
-    const float saturation = plan.saturated_value.v[i];
-    const std::int32_t saturated = value >= saturation ? 1 : 0;
-    const std::int32_t below = value < saturation ? 1 : 0;
-    const std::int32_t light = value > least_value ? 1 : 0;
-    const std::int32_t usable = below & light;
-    const float sane = value <= static_cast<float>(largest<Code>()) ? value : saturation;
-    const float radiance = sane * shot.scale.v[i] - shot.offset.v[i];
-    look.usable.v[i] = usable;
-    look.saturated.v[i] = saturated;
-    look.radiance.v[i] = (usable | saturated) != 0 ? radiance : 0.0F;
-  }
-  const ShotTerms terms = shot.terms;
-  const Tolerance alone{plan.doubt * terms.read, plan.doubt * terms.shot, plan.doubt * plan.slack};
-  for (std::size_t i = 0; i < lanes; ++i) {
-    const float radiance = look.radiance.v[i];
-    const float weight = s.weight.v[i] > 0 ? s.weight.v[i] : 1.0F;
-    const float inverse = 1 / (weight * weight);
-    const float read = alone.read + plan.doubt * (plan.read * s.first.v[i] * inverse);
-    const float shot_noise = alone.shot + plan.doubt * (plan.shot * s.second.v[i] * inverse);
-    const float apart = radiance - s.mean.v[i];
-    const float difference = s.weight.v[i] > 0 ? apart : 0.0F;
-    const float light = std::max(std::max(s.mean.v[i], radiance), 0.0F);
-    const float tolerance = read + light * (shot_noise + light * alone.slack);
-    const float gap = std::max(s.bound.v[i] - radiance, 0.0F);
-    const float least = std::max(s.bound.v[i], 0.0F);
-    const float bound_tolerance = alone.read + least * (alone.shot + least * alone.slack);
-    const std::int32_t differs = difference * difference > tolerance ? 1 : 0;
-    const std::int32_t below = gap * gap > bound_tolerance ? 1 : 0;
-    look.disagrees.v[i] = (differs | below) & look.usable.v[i];
-  }
-}
-
-// A pixel is left out whole: colours of two things do not mix.
-void join_pixels(Flags& flags) {
-  std::int32_t any = 0;
-  for (const std::int32_t flag : flags.v) any |= flag;
-  if (any == 0) return;
-  for (std::size_t i = 0; i < lanes; i += channels) {
-    const std::int32_t joined = flags.v[i] | flags.v[i + 1] | flags.v[i + 2];
-    flags.v[i] = flags.v[i + 1] = flags.v[i + 2] = joined;
-  }
-}
-
-void take_look(const ShotTerms& terms, const Look& __restrict look, Stretch& __restrict s) {
-  const auto [read, shot, shot_weight, first, second] = terms;
-  for (std::size_t i = 0; i < lanes; ++i) {
-    const std::int32_t counts = look.usable.v[i] & (1 - look.disagrees.v[i]);
-    const float weight = s.weight.v[i] + (counts != 0 ? shot_weight : 0.0F);
-    const float gain = counts != 0 ? shot_weight / weight : 0.0F;
-    const float change = gain * (look.radiance.v[i] - s.mean.v[i]);
-    const float raised = std::max(s.bound.v[i], look.radiance.v[i]);
-    const std::int32_t unseen = s.weight.v[i] > 0 ? 0 : 1;
-    const std::int32_t bounds = look.saturated.v[i] & unseen;
-    s.bound.v[i] = bounds != 0 ? raised : s.bound.v[i];
-    s.mean.v[i] = s.mean.v[i] + change;
-    s.weight.v[i] = weight;
-    s.first.v[i] = s.first.v[i] + (counts != 0 ? first : 0.0F);
-    s.second.v[i] = s.second.v[i] + (counts != 0 ? second : 0.0F);
-    s.inconsistent.v[i] |= look.disagrees.v[i];
-  }
-}
-
-template <class Code>
-void finish_newest(const Plan<Code>& plan, const Stretch& __restrict s, Merged& __restrict merged) {
-  for (std::size_t i = 0; i < lanes; ++i) {
-    const bool seen = s.weight.v[i] > 0;
-    const bool bounded = s.bound.v[i] > -infinite;
-    const float weight = seen ? s.weight.v[i] : 1.0F;
-    const float inverse = 1 / (weight * weight);
-    const float read = plan.read * s.first.v[i] * inverse;
-    const float shot = plan.shot * s.second.v[i] * inverse;
-    const float light = std::max(s.mean.v[i], 0.0F);
-    const float sigma = std::sqrt(read + light * (shot + light * plan.relative_squared));
-    const float unseen = bounded ? s.bound.v[i] : 0.0F;
-    const std::int32_t dark = s.mean.v[i] < 2 * sigma ? 1 : 0;
-    const std::int32_t status = s.inconsistent.v[i] != 0 ? 2 : dark;
-    const std::int32_t none = bounded ? 3 : 4;
-    merged.radiance.v[i] = seen ? s.mean.v[i] : unseen;
-    merged.deviation.v[i] = seen ? sigma : infinite;
-    merged.status.v[i] = seen ? status : none;
-  }
-}
-static_assert(MergeStatus::inconsistent == MergeStatus{2} &&
-              MergeStatus::missing == MergeStatus{4});
-
-// Averages shots from the newest on, without older ones that contradict them.
-template <class Code>
-void average_newest(const Plan<Code>& plan, std::size_t begin, Merged& merged) {
-  Stretch s;
-  for (Lanes* zero : {&s.mean, &s.weight, &s.first, &s.second}) zero->v.fill(0);
-  s.bound.v.fill(-infinite);
-  s.inconsistent.v.fill(0);
-  Look look;
-  for (std::size_t i = 0; i < plan.count; ++i) {
-    const PlannedShot<Code>& shot = plan.shots[plan.newest_first[i]];
-    look_at(plan, shot, shot.values + begin, s, look);
-    join_pixels(look.disagrees);
-    take_look(shot.terms, look, s);
-  }
-  finish_newest(plan, s, merged);
+  tell_status(average.mean.v.data(), average.dark.v.data(), merged.status);
 }
 
 }  // namespace
 
 template <class Code>
-void merge_stretch(const Plan<Code>& plan, std::size_t begin, Merged& merged) {
-  Average average;
-  average_all(plan, begin, average, merged);
-  if (!average.any_disagrees) return;
-  join_pixels(average.disagrees);
-  Merged newest;
-  average_newest(plan, begin, newest);
-  for (std::size_t i = 0; i < lanes; ++i) {
-    if (average.disagrees.v[i] == 0) continue;
-    merged.radiance.v[i] = newest.radiance.v[i];
-    merged.deviation.v[i] = newest.deviation.v[i];
-    merged.status.v[i] = newest.status.v[i];
+bool average_all(const Plan<Code>& plan, std::size_t begin, const Merged& merged) {
+  const auto kind = [&](std::size_t i) {
+    return kind_of(plan.shots[i].values + begin, plan.saturation.data());
+  };
+  Lanes mean;
+  bool contradicted = false;
+  std::size_t usable = 0;
+  for (; usable < plan.count && kind(usable) == Values::usable; ++usable) {
+    contradicted |= add_usable(plan.shots[usable], usable == 0, begin, mean.v.data());
   }
+  std::size_t rest = usable;
+  while (rest < plan.count && kind(rest) == Values::saturated) ++rest;
+  if (rest < plan.count) {
+    MixedAverage average;
+    average_rest(plan, usable, mean, begin, average);
+    store_mixed(average, merged);
+    return contradicted || union_of(average.contradictions) < 0;
+  }
+  // Of the saturated shots the shortest has the highest bound.
+  if (usable < rest) {
+    contradicted |= add_bound(plan.shots[usable], usable == 0, begin, mean.v.data());
+  }
+  store_uniform(usable > 0 ? &plan.shots[usable - 1].step : nullptr, mean, merged);
+  return contradicted;
 }
 
-template void merge_stretch(const Plan<std::uint8_t>& plan, std::size_t begin, Merged& merged);
-template void merge_stretch(const Plan<std::uint16_t>& plan, std::size_t begin, Merged& merged);
-template void merge_stretch(const Plan<float>& plan, std::size_t begin, Merged& merged);
+template <class Code>
+Flags find_contradictions(const Plan<Code>& plan, std::size_t begin) {
+  MixedAverage average;
+  average_rest(plan, 0, {}, begin, average);
+  for (std::int32_t& flag : average.contradictions.v) flag >>= 31;
+  return average.contradictions;
+}
+
+template bool average_all(const Plan<std::uint8_t>&, std::size_t, const Merged&);
+template bool average_all(const Plan<std::uint16_t>&, std::size_t, const Merged&);
+template bool average_all(const Plan<float>&, std::size_t, const Merged&);
+template Flags find_contradictions(const Plan<std::uint8_t>&, std::size_t);
+template Flags find_contradictions(const Plan<std::uint16_t>&, std::size_t);
+template Flags find_contradictions(const Plan<float>&, std::size_t);
 
 }  // namespace capture::window_merge

@@ -3,21 +3,32 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 
+#include "capture/live_merge.h"
+
 namespace capture::window_merge {
 
-inline constexpr std::size_t most_shots = 16;
 inline constexpr std::size_t channels = 3;
-inline constexpr std::size_t stretch_pixels = 32;
+inline constexpr std::size_t stretch_pixels = 64;
 inline constexpr std::size_t lanes = stretch_pixels * channels;  // samples that are merged together
 inline constexpr float infinite = std::numeric_limits<float>::infinity();
 // Linear values outside these are not taken for values.
 inline constexpr float least_value = -1;
 inline constexpr float largest_value = 1e6F;
+
+// a * b + c, rounded once where the instruction set can.
+inline float mul_add(float a, float b, float c) {
+#ifdef __FMA__
+  return std::fma(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
 
 struct Lanes {
   alignas(64) std::array<float, lanes> v;
@@ -33,11 +44,20 @@ struct ShotTerms {
   float first, second;  // t, t^2: sums of them tell the average's variance
 };
 
+// Squared difference that is allowed between two tellings of a radiance L: read + L * (shot + L *
+// slack).
+struct Tolerance {
+  float read = infinite, shot = 0, slack = 0;
+
+  float at(float light) const { return mul_add(light, mul_add(light, slack, shot), read); }
+};
+
 // How a shot enters the average of all shorter ones.
 struct Step {
   float gain = 1;
-  float read = 0, shot = 0;            // variance of its difference from that average
-  float mean_read = 0, mean_shot = 0;  // variance of the average with it
+  Tolerance allowed;          // of its difference from that average
+  float dark = 0;             // an average with it is dark below this
+  std::uint16_t counted = 0;  // the shots of the average with it
 };
 
 // Values above are not light, and count as just saturated.
@@ -53,15 +73,16 @@ constexpr Code largest() {
 template <class Code>
 struct PlannedShot {
   const Code* values = nullptr;
+  std::uint16_t bit = 0;  // of it, in MergedFrame::counted
   ShotTerms terms{};
   Step step;
-  Lanes scale, offset;  // radiance = scale * value - offset
+  Lanes scale, offset;  // radiance = scale * value + offset
 };
 
 template <class Code>
 struct Plan {
-  std::array<PlannedShot<Code>, most_shots> shots;     // the shortest first
-  std::array<std::size_t, most_shots> newest_first{};  // places among them
+  std::array<PlannedShot<Code>, most_window_shots> shots;     // the shortest first
+  std::array<std::size_t, most_window_shots> newest_first{};  // places among them
   std::size_t count = 0;
   alignas(64) std::array<Code, lanes> saturation;
   Lanes saturated_value;       // the same as floats
@@ -71,27 +92,31 @@ struct Plan {
   float slack = 0;             // squared relative difference of two exposures
 };
 
-// A merged stretch.
+// Where a merged stretch goes.
 struct Merged {
-  Lanes radiance, deviation;
-  Flags status;
+  float* radiance;         // of `lanes` samples
+  std::uint16_t* counted;  // of `lanes` samples
+  MergeStatus* status;     // of `stretch_pixels` pixels
 };
 
-// Squared difference that is allowed between radiances of which the larger is L: read + L * (shot +
-// L * slack). At the smaller one, noise that makes it too small would make the tolerance so as
-// well.
-struct Tolerance {
-  float read, shot, slack;
-};
-
+// Averages all shots of the stretch of `lanes` samples from `begin` on. Returns whether some of
+// them contradict each other.
 template <class Code>
-Tolerance tolerance_of(const Plan<Code>& plan, const Step& step) {
-  return {plan.doubt * step.read, plan.doubt * step.shot, plan.doubt * plan.slack};
-}
+bool average_all(const Plan<Code>& plan, std::size_t begin, const Merged& merged);
 
-// Merges the stretch of `lanes` samples from `begin` on: all shots averaged, or, in pixels whose
-// shots contradict each other, the newest ones.
+// The lanes where the average above is contradicted, as -1.
 template <class Code>
-void merge_stretch(const Plan<Code>& plan, std::size_t begin, Merged& merged);
+Flags find_contradictions(const Plan<Code>& plan, std::size_t begin);
+
+// Averages the shots of the pixels that `contradicted` names from the newest on, without older ones
+// that contradict them.
+template <class Code>
+void average_newest(const Plan<Code>& plan,
+                    std::size_t begin,
+                    const Flags& contradicted,
+                    const Merged& merged);
+
+// A pixel is judged as one: colours of two things do not mix.
+void join_pixels(Flags& flags);
 
 }  // namespace capture::window_merge

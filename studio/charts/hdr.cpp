@@ -149,11 +149,12 @@ Error error_stops(const Image& radiance, const Image& truth) {
 
 // Of values with a finite deviation.
 double share_within_one_deviation(const MergedFrame& frame, const Image& truth) {
+  const Image deviation = frame.deviation();
   double within = 0, count = 0;
   for (std::size_t i = 0; i < truth.pixels.size(); ++i) {
-    if (!std::isfinite(frame.deviation.pixels[i])) continue;
+    if (!std::isfinite(deviation.pixels[i])) continue;
     ++count;
-    if (std::abs(frame.radiance.pixels[i] - truth.pixels[i]) <= frame.deviation.pixels[i]) ++within;
+    if (std::abs(frame.radiance.pixels[i] - truth.pixels[i]) <= deviation.pixels[i]) ++within;
   }
   return count > 0 ? within / count : 0;
 }
@@ -334,10 +335,11 @@ class HdrChart {
     }
   }
 
-  // To read five shots of bytes, and to write radiance, deviation and status.
+  // To read five shots of bytes, and to write radiance, status and what counts.
   double memory_ms() {
     const std::size_t samples = truth_.pixels.size();
-    std::vector<std::uint8_t> written(samples * 2 * sizeof(float) + samples / 3);
+    std::vector<std::uint8_t> written(samples * (sizeof(float) + sizeof(std::uint16_t)) +
+                                      samples / 3);
     double best_ms = std::numeric_limits<double>::infinity();
     for (int round = 0; round < (quick_ ? 3 : 15); ++round) {
       const double begin_ms = cpu_ms();
@@ -358,13 +360,14 @@ class HdrChart {
   // Relative error of what a window shows of the newest light, and the relative deviation that it
   // tells, as root mean squares over all channels with a deviation.
   static StressorSample judge(double value, const MergedFrame& frame, const Image& truth) {
+    const Image told = frame.deviation();
     double squares = 0, reported = 0, count = 0;
     for (std::size_t i = 0; i < truth.pixels.size(); ++i) {
       const auto light = static_cast<double>(truth.pixels[i]);
       const double error = static_cast<double>(frame.radiance.pixels[i]) / light - 1;
       squares += error * error;
-      if (!std::isfinite(frame.deviation.pixels[i])) continue;
-      const double deviation = static_cast<double>(frame.deviation.pixels[i]) / light;
+      if (!std::isfinite(told.pixels[i])) continue;
+      const double deviation = static_cast<double>(told.pixels[i]) / light;
       reported += deviation * deviation;
       ++count;
     }
