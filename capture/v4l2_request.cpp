@@ -2,21 +2,17 @@
 #include "capture/v4l2_request.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <stdexcept>
 #include <tuple>
 
-#include "capture/libav.h"
 #include "capture/v4l2_format.h"
 
 namespace capture {
 namespace {
 
-constexpr V4l2Size largest_unasked{1920, 1080};
+constexpr PictureSize largest_unasked{1920, 1080};
 constexpr double slowest_unasked = 24;  // frames a second; a little less is let pass
 constexpr double rate_tolerance = 0.005;
 
@@ -24,41 +20,6 @@ constexpr double rate_tolerance = 0.005;
   throw std::runtime_error(why +
                            "; write v4l2:/dev/video0?format=YUYV&size=640x480&rate=30 and, after "
                            "more &, controls by name (platelight devices lists all that there is)");
-}
-
-template <class Number>
-std::optional<Number> number(std::string_view text) {
-  Number value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
-V4l2Size size_of(std::string_view text) {
-  const std::size_t by = text.find('x');
-  const auto width = number<int>(text.substr(0, by));
-  const auto height = by == text.npos ? std::nullopt : number<int>(text.substr(by + 1));
-  if (!width || !height || *width < 1 || *height < 1 || *width > libav::max_side ||
-      *height > libav::max_side) {
-    refuse("size=" + std::string(text) + " is no size");
-  }
-  return {*width, *height};
-}
-
-Rational rate_of(std::string_view text) {
-  constexpr std::int64_t most = 1'000'000;
-  const std::size_t slash = text.find('/');
-  const auto over = slash == text.npos ? std::optional<std::int64_t>(1)
-                                       : number<std::int64_t>(text.substr(slash + 1));
-  if (const auto whole = number<std::int64_t>(text.substr(0, slash));
-      whole && over && *whole > 0 && *whole <= most && *over > 0 && *over <= most) {
-    return {*whole, *over};
-  }
-  const auto decimal = number<double>(text);
-  if (!decimal || !(*decimal >= 0.001 && *decimal <= 1000)) {
-    refuse("rate=" + std::string(text) + " is no rate in frames a second");
-  }
-  return {std::llround(1000 * *decimal), 1000};
 }
 
 bool agree(Rational a, Rational b) { return std::abs(a.value() / b.value() - 1) <= rate_tolerance; }
@@ -79,11 +40,12 @@ std::string list(const Range& range, const Words& words) {
 // A mode at one size, and the best rate for the request.
 struct Candidate {
   const PixelCoding* coding = nullptr;
-  V4l2Size size;
+  PictureSize size;
   std::optional<Rational> rate;
 };
 
-std::optional<V4l2Size> size_in(const V4l2Mode& mode, const std::optional<V4l2Size>& wanted) {
+std::optional<PictureSize> size_of_mode(const V4l2Mode& mode,
+                                        const std::optional<PictureSize>& wanted) {
   if (wanted) {
     return mode.has_size(wanted->width, wanted->height) ? wanted : std::nullopt;
   }
@@ -91,14 +53,14 @@ std::optional<V4l2Size> size_in(const V4l2Mode& mode, const std::optional<V4l2Si
     if (high <= most) return high;
     return low > most ? low : low + (most - low) / step * step;
   };
-  return V4l2Size{
+  return PictureSize{
       largest(mode.min_width, mode.max_width, mode.width_step, largest_unasked.width),
       largest(mode.min_height, mode.max_height, mode.height_step, largest_unasked.height)};
 }
 
 // Nothing: the mode has not that rate. A rate that is not told is the device's to refuse.
-std::optional<std::optional<Rational>> rate_in(const V4l2Mode& mode,
-                                               const std::optional<Rational>& wanted) {
+std::optional<std::optional<Rational>> rate_of_mode(const V4l2Mode& mode,
+                                                    const std::optional<Rational>& wanted) {
   if (mode.rates.empty()) return wanted;
   if (!wanted) return mode.rates.front();
   for (const Rational rate : mode.rates) {
@@ -113,7 +75,7 @@ std::optional<std::optional<Rational>> rate_in(const V4l2Mode& mode,
 
 // Greater is better.
 auto merit(const Candidate& candidate) {
-  const V4l2Size size = candidate.size;
+  const PictureSize size = candidate.size;
   const double rate = candidate.rate ? candidate.rate->value() : slowest_unasked;
   const bool fits = size.width <= largest_unasked.width && size.height <= largest_unasked.height;
   const bool fast = rate >= slowest_unasked * (1 - rate_tolerance);
@@ -146,33 +108,29 @@ std::string name_in(const V4l2Mode& mode) { return name_of_fourcc(mode.fourcc); 
 }  // namespace
 
 V4l2Request parse_v4l2(std::string_view rest) {
+  CameraSettings parsed;
+  try {
+    parsed = parse_settings(rest);
+  } catch (const std::runtime_error& error) {
+    refuse(error.what());
+  }
   V4l2Request request;
-  const std::size_t mark = rest.find('?');
-  request.device = rest.substr(0, mark);
+  request.device = parsed.device;
   if (request.device.empty()) refuse("no device is named");
-  std::string_view settings = mark == rest.npos ? "" : rest.substr(mark + 1);
-  while (!settings.empty()) {
-    const std::size_t end = std::min(settings.find('&'), settings.size());
-    const std::string_view setting = settings.substr(0, end);
-    settings.remove_prefix(std::min(end + 1, settings.size()));
-    const std::size_t equals = setting.find('=');
-    if (equals == setting.npos || equals == 0) {
-      refuse("\"" + std::string(setting) + "\" is no setting");
-    }
-    const std::string_view key = setting.substr(0, equals);
-    const std::string_view value = setting.substr(equals + 1);
+  for (const auto& [key, value] : parsed.settings) {
     if (key == "format") {
       request.fourcc = fourcc_of_name(value);
-      if (!request.fourcc) refuse("format=" + std::string(value) + " is no format");
+      if (!request.fourcc) refuse("format=" + value + " is no format");
     } else if (key == "size") {
-      request.size = size_of(value);
+      request.size = size_in(value);
+      if (!request.size) refuse("size=" + value + " is no size");
     } else if (key == "rate") {
-      request.rate = rate_of(value);
-    } else if (const auto whole = number<std::int64_t>(value)) {
+      request.rate = rate_in(value);
+      if (!request.rate) refuse("rate=" + value + " is no rate in frames a second");
+    } else if (const auto whole = number_in<std::int64_t>(value)) {
       request.controls.emplace_back(key, *whole);
     } else {
-      refuse("the control " + std::string(key) + " takes a whole number, not \"" +
-             std::string(value) + "\"");
+      refuse("the control " + key + " takes a whole number, not \"" + value + "\"");
     }
   }
   return request;
@@ -188,10 +146,10 @@ V4l2Choice choose_mode(const V4l2Device& device, const V4l2Request& request) {
   std::vector<const V4l2Mode*> of_size;
   std::vector<Candidate> candidates;
   for (const V4l2Mode* mode : of_format) {
-    const auto size = size_in(*mode, request.size);
+    const auto size = size_of_mode(*mode, request.size);
     if (!size) continue;
     of_size.push_back(mode);
-    if (const auto rate = rate_in(*mode, request.rate)) {
+    if (const auto rate = rate_of_mode(*mode, request.rate)) {
       candidates.push_back({coding_of(mode->fourcc), *size, *rate});
     }
   }
@@ -234,19 +192,9 @@ const V4l2Control& control_for(const V4l2Device& device,
   return *control;
 }
 
-std::string words_of(V4l2Size size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
-std::string words_of(Rational rate) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.5g", rate.value());
-  return text.data();
-}
-
 std::string sizes_of(const V4l2Mode& mode) {
-  const std::string largest = words_of(V4l2Size{mode.max_width, mode.max_height});
-  const std::string smallest = words_of(V4l2Size{mode.min_width, mode.min_height});
+  const std::string largest = words_of(PictureSize{mode.max_width, mode.max_height});
+  const std::string smallest = words_of(PictureSize{mode.min_width, mode.min_height});
   return smallest == largest ? largest : smallest + " to " + largest;
 }
 

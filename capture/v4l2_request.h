@@ -8,19 +8,15 @@
 #include <utility>
 #include <vector>
 
+#include "capture/camera_settings.h"
 #include "capture/v4l2_device.h"
 
 namespace capture {
 
-struct V4l2Size {
-  int width = 0;
-  int height = 0;
-};
-
 struct V4l2Request {
   std::string device;  // "/dev/video0", or a bus: "usb-0000:00:14.0-1"
   std::optional<std::uint32_t> fourcc;
-  std::optional<V4l2Size> size;
+  std::optional<PictureSize> size;
   std::optional<Rational> rate;
   std::vector<std::pair<std::string, std::int64_t>> controls;  // set in this order
 };
@@ -36,7 +32,7 @@ V4l2Request parse_v4l2(std::string_view rest);
 
 struct V4l2Choice {
   std::uint32_t fourcc = 0;
-  V4l2Size size;
+  PictureSize size;
   std::optional<Rational> rate;  // nothing: the device does not tell its rates
 };
 
@@ -52,9 +48,6 @@ const V4l2Control& control_for(const V4l2Device& device,
                                const std::string& name,
                                std::int64_t value);
 
-// "640x480", "30", "29.97": for people.
-std::string words_of(V4l2Size size);
-std::string words_of(Rational rate);
 // All sizes of a mode: "640x480", "2x2 to 1920x1080".
 std::string sizes_of(const V4l2Mode& mode);
 // All rates: "30, 15/s", "1 to 60/s".
