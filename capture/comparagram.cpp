@@ -103,6 +103,7 @@ void append_matches(const Histogram& histogram, CodeMatch pair, std::vector<Code
       pair.sigma_a = systematic;
       pair.code_b = of_b.mean;
       pair.sigma_b = of_b.sigma;
+      pair.pixels = static_cast<double>(of_b.count);
       matches.push_back(pair);
     }
     const Mode of_a = mode_of(all.subspan(static_cast<std::size_t>(z)), codes);
@@ -111,8 +112,38 @@ void append_matches(const Histogram& histogram, CodeMatch pair, std::vector<Code
       pair.sigma_a = of_a.sigma;
       pair.code_b = z;
       pair.sigma_b = systematic;
+      pair.pixels = static_cast<double>(of_a.count);
       matches.push_back(pair);
     }
+  }
+}
+
+// The deepest fall of the longer shot's codes while the shorter one's rise: beyond what the means'
+// errors and one code of rounding make.
+void find_fall(const Histogram& histogram, int channel, std::vector<CodeFall>& falls) {
+  constexpr double least_fall = 1.5;
+  constexpr double surely = 5;
+  const std::span<const std::uint32_t> all(histogram);
+  Mode top;
+  CodeFall fall{channel, 0, 0};
+  for (int z = lowest; z <= highest; ++z) {
+    const Mode mode = mode_of(all.subspan(static_cast<std::size_t>(z)), codes);
+    if (mode.count == 0 || mode.mean > highest) continue;
+    if (top.count > 0 &&
+        top.mean - mode.mean > least_fall + surely * std::hypot(top.sigma, mode.sigma) &&
+        top.mean - mode.mean > fall.from - fall.to) {
+      fall.from = top.mean;
+      fall.to = mode.mean;
+    }
+    if (top.count == 0 || mode.mean > top.mean) top = mode;
+  }
+  if (fall.from == 0) return;
+  const auto known = std::find_if(falls.begin(), falls.end(),
+                                  [&](const CodeFall& other) { return other.channel == channel; });
+  if (known == falls.end()) {
+    falls.push_back(fall);
+  } else if (fall.from - fall.to > known->from - known->to) {
+    *known = fall;
   }
 }
 
@@ -138,7 +169,7 @@ void count_codes(const Still8& a,
 
 }  // namespace
 
-std::vector<CodeMatch> match_codes(std::span<const CodedShot> shots) {
+CodeComparison match_codes(std::span<const CodedShot> shots) {
   Grid grid{shots[0].still.width, shots[0].still.height, 1};
   while (std::int64_t{grid.width / grid.step} * (grid.height / grid.step) > enough_pixels) {
     ++grid.step;
@@ -152,9 +183,10 @@ std::vector<CodeMatch> match_codes(std::span<const CodedShot> shots) {
     return shots[i].exposure_s > shots[j].exposure_s;
   });
 
-  std::vector<CodeMatch> matches;
+  CodeComparison comparison;
   std::array<Histogram, 3> histograms;
   constexpr std::size_t reach = 2;
+  constexpr double different = 1.3;
   for (std::size_t i = 0; i < shots.size(); ++i) {
     for (std::size_t j = i + 1; j < std::min(i + 1 + reach, shots.size()); ++j) {
       const std::size_t a = by_exposure[i];
@@ -168,12 +200,16 @@ std::vector<CodeMatch> match_codes(std::span<const CodedShot> shots) {
                         .code_a = 0,
                         .code_b = 0,
                         .sigma_a = 0,
-                        .sigma_b = 0},
-                       matches);
+                        .sigma_b = 0,
+                        .pixels = 0},
+                       comparison.matches);
+        if (shots[a].exposure_s > different * shots[b].exposure_s) {
+          find_fall(histograms[c], static_cast<int>(c), comparison.falls);
+        }
       }
     }
   }
-  return matches;
+  return comparison;
 }
 
 }  // namespace capture

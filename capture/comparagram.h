@@ -17,6 +17,19 @@ struct CodeMatch {
   double code_b = 0;
   double sigma_a = 0;
   double sigma_b = 0;
+  double pixels = 0;  // behind it
+};
+
+// Codes of a channel that fall although light grows, so that they stand for two lights.
+struct CodeFall {
+  int channel = 0;
+  double from = 0;  // the higher code
+  double to = 0;    // the lower code, which has more light
+};
+
+struct CodeComparison {
+  std::vector<CodeMatch> matches;
+  std::vector<CodeFall> falls;  // the deepest of each channel; none if codes rise with light
 };
 
 // The matches between each shot and the next two shorter ones. Codes near both ends, which clipping
@@ -25,6 +38,6 @@ struct CodeMatch {
 // Mann, "Comparametric Equations with Practical Applications in Quantigraphic Image Processing",
 // IEEE Transactions on Image Processing 9(8), 2000: the joint histogram holds all that a pair of
 // shots says about the response.
-std::vector<CodeMatch> match_codes(std::span<const CodedShot> shots);
+CodeComparison match_codes(std::span<const CodedShot> shots);
 
 }  // namespace capture

@@ -29,7 +29,45 @@ std::vector<double> expanded(int degree, const double* p) {
   return {lowest_first.rbegin(), lowest_first.rend()};
 }
 
+// Uniform cubic B-splines over 0..1, as many as the free curve has.
+using Basis = std::array<double, CurveFamily::free_parameters>;
+
+Basis spline_basis(double u) {
+  constexpr int pieces = CurveFamily::free_parameters - 3;
+  const double place = std::clamp(u, 0.0, 1.0) * pieces;
+  const int piece = std::min(static_cast<int>(place), pieces - 1);
+  const double t = place - piece;
+  Basis basis{};
+  const auto first = static_cast<std::size_t>(piece);
+  basis[first] = (1 - t) * (1 - t) * (1 - t) / 6;
+  basis[first + 1] = (3 * t * t * t - 6 * t * t + 4) / 6;
+  basis[first + 2] = (-3 * t * t * t + 3 * t * t + 3 * t + 1) / 6;
+  basis[first + 3] = t * t * t / 6;
+  return basis;
+}
+
+// The spline less its value at white, so that white has light 1.
+Basis free_basis(double z) {
+  static const Basis at_white = spline_basis(1);
+  Basis basis = spline_basis(CurveFamily::free_place(z));
+  for (std::size_t i = 0; i < basis.size(); ++i) basis[i] -= at_white[i];
+  return basis;
+}
+
+double free_log_light(const double* p, double z) {
+  constexpr double least_code = 1e-3;
+  const Basis basis = free_basis(z);
+  double log_light = 2 * std::log(std::max(least_code, z));
+  for (std::size_t i = 0; i < basis.size(); ++i) log_light += p[i] * basis[i];
+  return log_light;
+}
+
 }  // namespace
+
+double CurveFamily::free_place(double z) {
+  constexpr double black = 0.05;  // codes far below it share a place
+  return std::log1p(std::max(0.0, z) / black) / std::log1p(1 / black);
+}
 
 int CurveFamily::parameters() const {
   switch (kind) {
@@ -39,6 +77,8 @@ int CurveFamily::parameters() const {
       return 1;
     case Kind::polynomial:
       return degree - 1;
+    case Kind::free:
+      return free_parameters;
   }
   return 0;
 }
@@ -51,6 +91,8 @@ std::string CurveFamily::name() const {
       return "gamma";
     case Kind::polynomial:
       return "polynomial of degree " + std::to_string(degree);
+    case Kind::free:
+      return "free curve";
   }
   return "";
 }
@@ -66,11 +108,19 @@ double CurveFamily::light(int channel, const double* p, double z) const {
       for (int i = parameters() - 1; i >= 0; --i) inner = inner * z + p[i];
       return z + z * (1 - z) * inner;
     }
+    case Kind::free:
+      return z > 0 ? std::exp(free_log_light(p, z)) : 0;
   }
   return 0;
 }
 
 LogLight CurveFamily::log_light(int channel, const double* p, double z) const {
+  if (kind == Kind::free) {
+    LogLight result{free_log_light(p, z), {}};
+    const Basis basis = free_basis(z);
+    std::copy(basis.begin(), basis.end(), result.gradient.begin());
+    return result;
+  }
   constexpr double least_light = 1e-6;  // below it a logarithm says nothing
   const double value = std::max(least_light, light(channel, p, z));
   LogLight result{std::log(value), {}};

@@ -42,37 +42,44 @@ struct CodedShot {
 struct ResponseCandidate {
   std::string name;
   int parameters = 0;
-  double heldout_error = 0;  // relative RMS of light, codes 25 to 235
+  double heldout_error = 0;  // relative RMS of light, codes 25 to 235, every code alike
+  double pixel_error = 0;    // every pixel alike, without what changed between the shots
 };
 
 struct ResponseFit {
   Response response;
   std::vector<double> exposures_s;  // solved, in the shots' order; their geometric mean is kept
   double heldout_error = 0;         // of the chosen curve
+  double pixel_error = 0;
+  double changed = 0;  // the share of pixels that differ by over 5 robust deviations
   std::vector<ResponseCandidate> candidates;
+  std::vector<std::string> warnings;  // what to know before it is used
 };
 
 // Recovers the response and the true exposures from three or more shots of one size of a scene that
 // stands still for the most part, in any order.
 //
-// Candidates are the sRGB curve, a power per channel, and polynomials of degree 2 to 6 through
-// (0, 0) and (1, 1), kept rising, per channel; the simplest one is taken whose error on held-out
-// shots is within a tenth of the best. Shutter times may be off by several percent: they are solved
-// too, held near the claimed ones.
+// Candidates are a straight line, the sRGB curve, a power per channel, polynomials of degree 2 to 6
+// through (0, 0) and (1, 1), kept rising, per channel, and a smooth rising curve of no form; the
+// simplest one is taken whose error on held-out shots is within a tenth of the best, the last one
+// if it is better by a fourth: it has far more parameters, and no .rsp file holds it. Shutter times
+// may be off by several percent: they are solved too, held near the claimed ones. A camera whose
+// codes fall somewhere as light grows has no such curve: a warning tells the codes.
 //
 // Mitsunaga and Nayar, "Radiometric Self Calibration", CVPR 1999, section 3. We fit logarithms of
 // light, so that dark codes count by their relative error, to robust means of the codes that flat
 // places have in two shots, so that what moved drops out; and we solve all ratios at once.
 //
 // Throws std::invalid_argument for fewer than three shots, sizes that differ, or an exposure that
-// is not above 0; std::runtime_error if the shots share too little (nothing flat, all clipped, or
-// equal exposures).
+// is not above 0; std::runtime_error with what to do if the shots share too little (nothing flat,
+// all saturated or black, or equal exposures).
 ResponseFit recover_response(std::span<const CodedShot> shots);
 
 // How well a response foretells the shots: the relative RMS of light, codes 25 to 235, of each shot
 // from its neighbours, with exposure ratios solved for this response.
 struct ResponseCheck {
-  double error = 0;
+  double error = 0;        // every code alike
+  double pixel_error = 0;  // every pixel alike, without what changed between the shots
   std::vector<double> exposures_s;
 };
 ResponseCheck check_response(const Response& response, std::span<const CodedShot> shots);

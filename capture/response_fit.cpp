@@ -1,17 +1,14 @@
 // Responses and exposure ratios from matched codes: robust Gauss-Newton with damping.
+#include "capture/response_fit.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <future>
 #include <limits>
 #include <optional>
-#include <stdexcept>
+#include <utility>
 
 #include <Eigen/Dense>
-
-#include "capture/comparagram.h"
-#include "capture/curve_family.h"
-#include "capture/response.h"
 
 namespace capture {
 namespace {
@@ -20,6 +17,8 @@ constexpr double white = Response::codes - 1;
 constexpr double exposure_prior = 0.05;  // shutters are off by several percent
 constexpr double judged_from = 25;       // codes by which curves are judged
 constexpr double judged_to = 235;
+constexpr double sigma_by_median = 1.4826;
+constexpr double changed_from = 5;  // deviations; what is beyond them is no error of a curve
 constexpr int channels = CurveFamily::channels;
 
 using Parameters = Eigen::VectorXd;  // of all channels, then a logarithm per exposure
@@ -84,7 +83,6 @@ double median(std::vector<double> values) {
 // How much wider than their standard deviations the residuals spread: at least 1, more for curves
 // that do not fit, all of whose matches would otherwise count as outliers.
 double spread_of(const Problem& problem, const Parameters& p) {
-  constexpr double sigma_by_median = 1.4826;
   std::vector<double> sizes;
   for (const CodeMatch& match : problem.matches) {
     sizes.push_back(std::abs(residual_of(problem, p, match).value));
@@ -177,7 +175,6 @@ void add_claims(const Problem& problem, const Parameters& p, NormalEquations& eq
 
 // Pushes polynomials up where they would fall.
 void add_rising(const Problem& problem, const Parameters& p, NormalEquations& equations) {
-  if (problem.family.kind != CurveFamily::Kind::polynomial) return;
   constexpr int grid = 64;
   constexpr double least_slope = 0.01;
   constexpr double stiffness = 1e3;
@@ -202,11 +199,53 @@ void add_rising(const Problem& problem, const Parameters& p, NormalEquations& eq
   }
 }
 
+// The same for free curves, which are also held smooth, and near z^2 where nothing is known.
+void add_smooth(const Problem& problem, const Parameters& p, NormalEquations& equations) {
+  constexpr int count = CurveFamily::free_parameters;
+  constexpr double bend_sigma = 0.1;  // of second differences, in logarithms of light
+  constexpr double far_sigma = 3;
+  std::vector<std::pair<Eigen::Index, double>> row;
+  const auto add = [&](double residual) {
+    equations.add(row, residual, 1);
+    equations.cost += residual * residual;
+  };
+  for (int c = 0; c < channels; ++c) {
+    const Eigen::Index first = c * count;
+    for (Eigen::Index i = first; i < first + count; ++i) {
+      row = {{i, 1 / far_sigma}};
+      add(p[i] / far_sigma);
+    }
+    for (Eigen::Index i = first; i + 2 < first + count; ++i) {
+      row = {{i, 1 / bend_sigma}, {i + 1, -2 / bend_sigma}, {i + 2, 1 / bend_sigma}};
+      add((p[i] - 2 * p[i + 1] + p[i + 2]) / bend_sigma);
+    }
+    constexpr int grid = 64;
+    constexpr double least_rise = 1e-3;
+    constexpr double stiffness = 1e3;
+    LogLight below = problem.family.log_light(c, p.data() + first, 1.0 / grid);
+    for (int g = 2; g <= grid; ++g) {
+      const LogLight above =
+          problem.family.log_light(c, p.data() + first, static_cast<double>(g) / grid);
+      const double lacking = least_rise - (above.value - below.value);
+      if (lacking > 0) {
+        row.clear();
+        for (int i = 0; i < count; ++i) {
+          const auto k = static_cast<std::size_t>(i);
+          row.emplace_back(first + i, -(above.gradient[k] - below.gradient[k]) * stiffness);
+        }
+        add(lacking * stiffness);
+      }
+      below = above;
+    }
+  }
+}
+
 NormalEquations equations_at(const Problem& problem, const Parameters& p, double spread) {
   NormalEquations equations(problem.size());
   add_matches(problem, p, spread, equations);
   add_claims(problem, p, equations);
-  add_rising(problem, p, equations);
+  if (problem.family.kind == CurveFamily::Kind::polynomial) add_rising(problem, p, equations);
+  if (problem.family.kind == CurveFamily::Kind::free) add_smooth(problem, p, equations);
   return equations;
 }
 
@@ -253,23 +292,58 @@ Parameters solve(const Problem& problem, Parameters p, int most_steps) {
   return p;
 }
 
+// Errors with their weights.
 struct Judgement {
-  double squares = 0;
-  std::size_t count = 0;
-  double error() const {
-    return count == 0 ? std::numeric_limits<double>::infinity()
-                      : std::sqrt(squares / static_cast<double>(count));
+  std::vector<std::pair<double, double>> errors;
+  void add(double error, double weight) { errors.emplace_back(error, weight); }
+  double largest() const {
+    std::vector<double> sizes;
+    for (const auto& [error, weight] : errors) sizes.push_back(std::abs(error));
+    return sizes.empty() ? 0 : changed_from * sigma_by_median * median(std::move(sizes));
+  }
+  double root_mean_square(double limit = std::numeric_limits<double>::infinity()) const {
+    double squares = 0;
+    double sum = 0;
+    for (const auto& [error, weight] : errors) {
+      if (std::abs(error) > limit) continue;
+      squares += weight * error * error;
+      sum += weight;
+    }
+    return sum > 0 ? std::sqrt(squares / sum) : std::numeric_limits<double>::infinity();
+  }
+  double share_above(double limit) const {
+    double above = 0;
+    double sum = 0;
+    for (const auto& [error, weight] : errors) {
+      if (std::abs(error) > limit) above += weight;
+      sum += weight;
+    }
+    return sum > 0 ? above / sum : 0;
   }
 };
 
-// Each shot in turn is left out of the fit. What is then free is its exposure, taken from its
-// matches' median; the disagreement that stays is the curve's.
-double heldout_error(const CurveFamily& family,
-                     std::span<const CodeMatch> matches,
-                     const std::vector<double>& claimed) {
+std::vector<double> exposures_of(const Problem& problem, const Parameters& p) {
+  double drift = 0;
+  const auto count = static_cast<double>(problem.claimed.size());
+  for (std::size_t i = 0; i < problem.claimed.size(); ++i) {
+    drift += (p[problem.exposure_index(static_cast<int>(i))] - problem.claimed[i]) / count;
+  }
+  std::vector<double> exposures;
+  for (std::size_t i = 0; i < problem.claimed.size(); ++i) {
+    exposures.push_back(std::exp(p[problem.exposure_index(static_cast<int>(i))] - drift));
+  }
+  return exposures;
+}
+
+}  // namespace
+
+HeldoutError heldout_error(const CurveFamily& family,
+                           std::span<const CodeMatch> matches,
+                           const std::vector<double>& claimed) {
   const Problem problem_of_all{family, matches, claimed};
   const Parameters all = solve(problem_of_all, problem_of_all.start(), steps_from_afar);
-  Judgement judgement;
+  Judgement by_code;
+  Judgement by_pixel;
   const auto judged = [](double code) { return code >= judged_from && code <= judged_to; };
   for (int held = 0; held < static_cast<int>(claimed.size()); ++held) {
     std::vector<CodeMatch> others;
@@ -292,112 +366,22 @@ double heldout_error(const CurveFamily& family,
       offsets.push_back(match.a == held ? r.value / r.scale : -r.value / r.scale);
     }
     const double centre = median(offsets);
-    for (const double offset : offsets) judgement.squares += (offset - centre) * (offset - centre);
-    judgement.count += offsets.size();
-  }
-  return judgement.error();
-}
-
-std::vector<double> exposures_of(const Problem& problem, const Parameters& p) {
-  double drift = 0;
-  const auto count = static_cast<double>(problem.claimed.size());
-  for (std::size_t i = 0; i < problem.claimed.size(); ++i) {
-    drift += (p[problem.exposure_index(static_cast<int>(i))] - problem.claimed[i]) / count;
-  }
-  std::vector<double> exposures;
-  for (std::size_t i = 0; i < problem.claimed.size(); ++i) {
-    exposures.push_back(std::exp(p[problem.exposure_index(static_cast<int>(i))] - drift));
-  }
-  return exposures;
-}
-
-std::vector<double> claimed_exposures(std::span<const CodedShot> shots) {
-  if (shots.size() < 3) throw std::invalid_argument("a response needs three shots or more");
-  std::vector<double> claimed;
-  for (const CodedShot& shot : shots) {
-    if (!(shot.exposure_s > 0) || !std::isfinite(shot.exposure_s)) {
-      throw std::invalid_argument("an exposure time is above 0");
+    for (std::size_t i = 0; i < offsets.size(); ++i) {
+      by_code.add(offsets[i] - centre, 1);
+      by_pixel.add(offsets[i] - centre, about_held[i].pixels);
     }
-    if (shot.still.width != shots[0].still.width || shot.still.height != shots[0].still.height ||
-        shot.still.channels < 3) {
-      throw std::invalid_argument("the shots of a bracket need one size");
-    }
-    claimed.push_back(std::log(shot.exposure_s));
   }
-  return claimed;
+  const double limit = by_pixel.largest();
+  return {by_code.root_mean_square(), by_pixel.root_mean_square(limit),
+          by_pixel.share_above(limit)};
 }
 
-std::runtime_error too_little_shared() {
-  return std::runtime_error(
-      "the shots share too few flat, unclipped places at different exposures to tell the response; "
-      "state it instead (a .rsp file, or sRGB)");
-}
-
-std::vector<CodeMatch> enough_matches(std::span<const CodedShot> shots,
-                                      const std::vector<double>& claimed) {
-  std::vector<CodeMatch> matches = match_codes(shots);
-  // Two shots of one exposure tell nothing about the curve.
-  constexpr double different = 0.3;
-  const auto useful = std::count_if(matches.begin(), matches.end(), [&](const CodeMatch& match) {
-    return claimed[static_cast<std::size_t>(match.a)] - claimed[static_cast<std::size_t>(match.b)] >
-           different;
-  });
-  constexpr std::ptrdiff_t least = 100;
-  if (useful < least) throw too_little_shared();
-  return matches;
-}
-
-std::vector<CurveFamily> candidate_families() {
-  std::vector<CurveFamily> families;
-  families.push_back({CurveFamily::Kind::fixed, 0, srgb_response()});
-  families.push_back({CurveFamily::Kind::power, 0, {}});
-  for (int degree = 2; degree <= 6; ++degree) {
-    families.push_back({CurveFamily::Kind::polynomial, degree, {}});
-  }
-  return families;
-}
-
-}  // namespace
-
-ResponseFit recover_response(std::span<const CodedShot> shots) {
-  const std::vector<double> claimed = claimed_exposures(shots);
-  const std::vector<CodeMatch> matches = enough_matches(shots, claimed);
-  const std::vector<CurveFamily> families = candidate_families();
-  std::vector<std::future<double>> errors;
-  for (const CurveFamily& family : families) {
-    errors.push_back(std::async(std::launch::async, [&family, &matches, &claimed] {
-      return heldout_error(family, matches, claimed);
-    }));
-  }
-  ResponseFit fit;
-  double best = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < families.size(); ++i) {
-    const double error = errors[i].get();
-    fit.candidates.push_back({families[i].name(), channels * families[i].parameters(), error});
-    best = std::min(best, error);
-  }
-  if (!std::isfinite(best)) throw too_little_shared();
-  constexpr double as_good = 1.1;
-  const auto chosen = std::find_if(fit.candidates.begin(), fit.candidates.end(),
-                                   [&](const ResponseCandidate& candidate) {
-                                     return candidate.heldout_error <= as_good * best;
-                                   });
-  const CurveFamily& family = families[static_cast<std::size_t>(chosen - fit.candidates.begin())];
+CurveFit fit_curve(const CurveFamily& family,
+                   std::span<const CodeMatch> matches,
+                   const std::vector<double>& claimed) {
   const Problem problem{family, matches, claimed};
   const Parameters p = solve(problem, problem.start(), steps_from_afar);
-  fit.response = family.response(p.data());
-  fit.exposures_s = exposures_of(problem, p);
-  fit.heldout_error = chosen->heldout_error;
-  return fit;
-}
-
-ResponseCheck check_response(const Response& response, std::span<const CodedShot> shots) {
-  const std::vector<double> claimed = claimed_exposures(shots);
-  const std::vector<CodeMatch> matches = enough_matches(shots, claimed);
-  const CurveFamily family{CurveFamily::Kind::fixed, 0, response};
-  const Problem problem{family, matches, claimed};
-  return {heldout_error(family, matches, claimed),
-          exposures_of(problem, solve(problem, problem.start(), steps_from_afar))};
+  return {{p.data(), p.data() + channels * family.parameters()}, exposures_of(problem, p)};
 }
 
 }  // namespace capture

@@ -81,6 +81,60 @@ TEST(RecoverResponse, PrefersTheSimplestCurveThatSuffices) {
             "gamma");
 }
 
+// A curve that no power or polynomial of few terms comes near: a camera's gamma with a bend where
+// its highlights begin, and another one in its shadows.
+double bent_curve(double z) {
+  const double shadow = 0.4 * std::tanh((std::log(z) + 1.8) / 0.4);
+  const double highlight = 0.3 * std::tanh((z - 0.7) / 0.1);
+  const double at_white = 0.4 * std::tanh(1.8 / 0.4) + 0.3 * std::tanh(0.3 / 0.1);
+  return std::pow(z, 2.4) * std::exp(shadow + highlight - at_white);
+}
+
+TEST(RecoverResponse, TakesAFreeCurveOnlyWhereItEarnsIt) {
+  const ResponseFit bent = recover_response(made_bracket(bent_curve, 0, 11).shots);
+  EXPECT_EQ(bent.response.name, "free curve");
+  EXPECT_LT(worst_error(bent.response, bent_curve), 0.12);
+  EXPECT_TRUE(bent.warnings.empty());
+  for (const ResponseCandidate& candidate : bent.candidates) {
+    if (candidate.name != "free curve") {
+      EXPECT_GT(candidate.heldout_error, 1.1 * bent.heldout_error);
+    }
+  }
+  for (const MadeCamera& camera : made_cameras()) {
+    EXPECT_NE(recover_response(made_bracket(camera.light_of_code, 0, 12).shots).response.name,
+              "free curve")
+        << camera.name;
+  }
+}
+
+TEST(RecoverResponse, KnowsALinearCamera) {
+  const ResponseFit fit = recover_response(made_bracket([](double z) { return z; }, 0, 13).shots);
+  EXPECT_EQ(fit.response.name, "linear");
+  EXPECT_EQ(fit.response.coefficients, linear_response().coefficients);
+}
+
+// Shots of a camera whose codes fall by `depth` where light passes 1/4 of white.
+std::vector<CodedShot> falling_shots(double depth) {
+  std::vector<CodedShot> shots = made_bracket([](double z) { return z * z; }, 0, 14).shots;
+  for (CodedShot& shot : shots) {
+    for (std::uint8_t& code : shot.still.texels) {
+      const double fall = depth / (1 + std::exp(-(code - 127.0) / 1.5));  // of codes from 127 on
+      const double recovery = depth / (1 + std::exp(-(code - 175.0) / 4.0));
+      code = static_cast<std::uint8_t>(std::lround(code - fall + recovery));
+    }
+  }
+  return shots;
+}
+
+TEST(RecoverResponse, SaysWhereCodesFallAsLightGrows) {
+  EXPECT_TRUE(recover_response(falling_shots(0)).warnings.empty());
+  const std::vector<std::string> warnings = recover_response(falling_shots(16)).warnings;
+  ASSERT_GE(warnings.size(), 3U);
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_NE(warnings[c].find("not monotone"), std::string::npos) << warnings[c];
+  }
+}
+
 TEST(RecoverResponse, SolvesShuttersThatAreOffBySeveralPercent) {
   const Curve curve = made_cameras()[2].light_of_code;
   for (const unsigned seed : {3U, 4U, 5U}) {
@@ -144,11 +198,57 @@ TEST(RecoverResponse, RefusesShotsThatSayNothing) {
   std::vector<CodedShot> no_time = bracket.shots;
   no_time[2].exposure_s = 0;
   EXPECT_THROW(recover_response(no_time), std::invalid_argument);
-  std::vector<CodedShot> black = bracket.shots;
-  for (CodedShot& shot : black) std::fill(shot.still.texels.begin(), shot.still.texels.end(), 0);
-  EXPECT_THROW(recover_response(black), std::runtime_error);
-  std::vector<CodedShot> equal(3, bracket.shots[4]);
-  EXPECT_THROW(recover_response(equal), std::runtime_error);
+}
+
+std::string refusal_of(const std::vector<CodedShot>& shots) {
+  try {
+    recover_response(shots);
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(RecoverResponse, SaysWhyShotsTellNothing) {
+  const MadeBracket bracket = made_bracket(made_cameras()[0].light_of_code, 0, 9);
+  const auto filled = [&](std::uint8_t code) {
+    std::vector<CodedShot> shots = bracket.shots;
+    for (CodedShot& shot : shots) {
+      std::fill(shot.still.texels.begin(), shot.still.texels.end(), code);
+    }
+    return refusal_of(shots);
+  };
+  EXPECT_NE(filled(0).find("is black"), std::string::npos);
+  EXPECT_NE(filled(255).find("is saturated"), std::string::npos);
+  EXPECT_NE(refusal_of(std::vector<CodedShot>(3, bracket.shots[4])).find("one exposure"),
+            std::string::npos);
+  std::vector<CodedShot> apart{bracket.shots.front(), bracket.shots.back(), bracket.shots.back()};
+  std::mt19937 random(9);
+  for (CodedShot& shot : apart) {
+    for (std::uint8_t& code : shot.still.texels) code = static_cast<std::uint8_t>(random());
+  }
+  EXPECT_NE(refusal_of(apart).find("share too few flat"), std::string::npos);
+}
+
+void report(const char* name, const ResponseFit& fit) {
+  std::printf("%s: %s, held-out error %.4f by code, %.4f by pixel but %.3f of them\n", name,
+              fit.response.name.c_str(), fit.heldout_error, fit.pixel_error, fit.changed);
+  for (const ResponseCandidate& c : fit.candidates) {
+    std::printf("  %-24s %2d  %.4f  %.4f\n", c.name.c_str(), c.parameters, c.heldout_error,
+                c.pixel_error);
+  }
+}
+
+// The largest relative difference of light, codes 25 to 235, of two curves that agree at code 128.
+double worst_difference(const Response& a, const Response& b) {
+  double worst = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double scale = b.light[c][128] / a.light[c][128];
+    for (std::size_t z = 25; z <= 235; ++z) {
+      worst = std::max(worst, std::abs(a.light[c][z] * scale / b.light[c][z] - 1));
+    }
+  }
+  return worst;
 }
 
 TEST(RecoverResponse, ForetellsHeldOutRealShotsWithin3PercentAndBetterThanTheirRspFile) {
@@ -160,9 +260,16 @@ TEST(RecoverResponse, ForetellsHeldOutRealShotsWithin3PercentAndBetterThanTheirR
     shots.push_back({decode_still8(read_file(path), path), exposure_s_of(path)});
   }
   const ResponseFit fit = recover_response(shots);
+  const Response supplied = read_rsp(directory / "Response_function.rsp");
+  const ResponseCheck check = check_response(supplied, shots);
+  report("fish-eye", fit);
+  std::printf("  supplied .rsp: %.4f by code, %.4f by pixel; at most %.3f from ours\n", check.error,
+              check.pixel_error, worst_difference(supplied, fit.response));
   EXPECT_LT(fit.heldout_error, 0.03);
-  EXPECT_LT(fit.heldout_error,
-            check_response(read_rsp(directory / "Response_function.rsp"), shots).error);
+  EXPECT_LT(fit.pixel_error, 0.03);
+  EXPECT_LT(fit.heldout_error, check.error);
+  EXPECT_LT(fit.pixel_error, check.pixel_error);
+  EXPECT_TRUE(fit.warnings.empty());
   for (std::size_t i = 0; i < shots.size(); ++i) {
     EXPECT_NEAR(fit.exposures_s[i] / shots[i].exposure_s, 1, 0.1);
   }
@@ -176,7 +283,11 @@ TEST(RecoverResponse, CopesWithARealBracketOfUnevenStepsAndAFlickeringScreen) {
     const std::string path = directory / ("stack_room_exp_" + std::to_string(number) + ".jpg");
     shots.push_back({decode_still8(read_file(path), path), exposure_s_of(path)});
   }
-  EXPECT_LT(recover_response(shots).heldout_error, 0.06);
+  const ResponseFit fit = recover_response(shots);
+  report("room", fit);
+  EXPECT_LT(fit.pixel_error, 0.03);
+  EXPECT_LT(fit.changed, 0.05);
+  EXPECT_LT(fit.heldout_error, 0.045);  // by code: the screen's few pixels count as much as others
 }
 
 TEST(ReadRsp, GivesTheCurveThatWasWritten) {
