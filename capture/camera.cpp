@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "capture/aravis_camera.h"
 #include "capture/linearise.h"
 #include "capture/picture_camera.h"
 #include "capture/replay.h"
@@ -69,9 +70,15 @@ std::unique_ptr<Camera> open_v4l2_uri(std::string_view rest, const CameraOptions
   return open_v4l2(rest, options, curves_of(options));
 }
 
+std::unique_ptr<Camera> open_aravis_uri(std::string_view rest, const CameraOptions& options) {
+  return open_aravis(rest, options, curves_of(options));
+}
+
 std::map<std::string, CameraOpener, std::less<>>& openers() {
-  static std::map<std::string, CameraOpener, std::less<>> by_scheme{
-      {"file", open_file}, {"replay", open_replay_uri}, {"v4l2", open_v4l2_uri}};
+  static std::map<std::string, CameraOpener, std::less<>> by_scheme{{"aravis", open_aravis_uri},
+                                                                    {"file", open_file},
+                                                                    {"replay", open_replay_uri},
+                                                                    {"v4l2", open_v4l2_uri}};
   return by_scheme;
 }
 

@@ -78,9 +78,9 @@ class Camera {
   virtual double set_exposure(double exposure_s);
 };
 
-// Opens `file:PATH` (video, a still, a sequence with %0Nd), `replay:DIR`, `v4l2:DEVICE` (see
-// cameras.md), or a scheme that a later folder registered (`made:`). A bare path counts as `file:`.
-// Throws std::runtime_error naming the URI, the reason, and what to do.
+// Opens `file:PATH` (video, a still, a sequence with %0Nd), `replay:DIR`, `v4l2:DEVICE` or
+// `aravis:NAME` (see cameras.md), or a scheme that a later folder registered (`made:`). A bare path
+// counts as `file:`. Throws std::runtime_error naming the URI, the reason, and what to do.
 std::unique_ptr<Camera> open_camera(std::string_view uri, const CameraOptions& options = {});
 
 using CameraOpener =

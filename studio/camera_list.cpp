@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/camera_settings.h"
+#include "capture/genicam_format.h"
 #include "capture/v4l2_format.h"
 #include "capture/v4l2_request.h"
 
@@ -74,14 +76,81 @@ Json device_json(const capture::V4l2Device& device) {
           {"exposure_s", exposure},       {"controls", controls}};
 }
 
+bool is_read(const std::string& format) { return capture::genicam_format_of(format) != nullptr; }
+
+void add_lines(const capture::AravisListing::Entry& entry, std::vector<std::string>& lines) {
+  const capture::AravisDevice& device = entry.device;
+  const capture::AravisAbilities& abilities = entry.abilities;
+  lines.push_back(fmt::format("aravis:{}  {} {} ({}), serial {}, also aravis:{}", device.id,
+                              device.vendor, device.model, device.protocol, device.serial,
+                              device.address));
+  if (!entry.fault.empty()) {
+    lines.push_back("  " + entry.fault);
+    return;
+  }
+  std::string formats;
+  for (const std::string& format : abilities.formats) {
+    formats += (formats.empty() ? "" : ", ") + format + (is_read(format) ? "" : " (not read)");
+  }
+  lines.push_back("  " + (formats.empty() ? "it lists no formats" : formats));
+  if (abilities.smallest && abilities.largest) {
+    lines.push_back("  " + capture::words_of(*abilities.smallest) + " to " +
+                    capture::words_of(*abilities.largest));
+  }
+  if (abilities.highest_rate > 0) {
+    lines.push_back(
+        fmt::format("  {:.5g} to {:.5g}/s", abilities.lowest_rate, abilities.highest_rate));
+  }
+  if (abilities.exposures) {
+    lines.push_back(fmt::format("  exposure {:.4g} to {:.4g} s", abilities.exposures->shortest_s,
+                                abilities.exposures->longest_s));
+  } else {
+    lines.emplace_back("  exposure: it has none that can be set");
+  }
+}
+
+Json network_json(const capture::AravisListing::Entry& entry) {
+  const capture::AravisDevice& device = entry.device;
+  const capture::AravisAbilities& abilities = entry.abilities;
+  Json formats = Json::array();
+  for (const std::string& format : abilities.formats) {
+    formats.push_back({{"format", format}, {"read", is_read(format)}});
+  }
+  const auto size = [](const std::optional<capture::PictureSize>& told) -> Json {
+    return told ? Json(std::array{told->width, told->height}) : Json(nullptr);
+  };
+  Json rates = nullptr;
+  if (abilities.highest_rate > 0) rates = std::array{abilities.lowest_rate, abilities.highest_rate};
+  Json exposure = nullptr;
+  if (abilities.exposures) {
+    exposure = std::array{abilities.exposures->shortest_s, abilities.exposures->longest_s};
+  }
+  return {{"uri", "aravis:" + device.id},
+          {"id", device.id},
+          {"vendor", device.vendor},
+          {"model", device.model},
+          {"serial", device.serial},
+          {"address", device.address},
+          {"protocol", device.protocol},
+          {"formats", formats},
+          {"min_size", size(abilities.smallest)},
+          {"max_size", size(abilities.largest)},
+          {"rates", rates},
+          {"exposure_s", exposure},
+          {"fault", entry.fault}};
+}
+
 }  // namespace
 
-std::vector<std::string> camera_lines(const capture::V4l2Listing& listing) {
+std::vector<std::string> camera_lines(const capture::V4l2Listing& listing,
+                                      const capture::AravisListing& network) {
   std::vector<std::string> lines;
   for (const capture::V4l2Device& device : listing.devices) add_lines(device, lines);
-  if (listing.devices.empty()) {
+  for (const capture::AravisListing::Entry& entry : network.cameras) add_lines(entry, lines);
+  if (lines.empty()) {
     lines.emplace_back(listing.closed.empty()
-                           ? "no camera: there is no /dev/video device that captures"
+                           ? "no camera: there is no /dev/video device that captures, and no GigE "
+                             "Vision or USB3 Vision camera answers"
                            : "no camera that can be opened");
   }
   for (const capture::V4l2Listing::Closed& closed : listing.closed) {
@@ -90,9 +159,13 @@ std::vector<std::string> camera_lines(const capture::V4l2Listing& listing) {
   return lines;
 }
 
-std::string cameras_json(const capture::V4l2Listing& listing) {
+std::string cameras_json(const capture::V4l2Listing& listing,
+                         const capture::AravisListing& network) {
   Json cameras = Json::array();
   for (const capture::V4l2Device& device : listing.devices) cameras.push_back(device_json(device));
+  for (const capture::AravisListing::Entry& entry : network.cameras) {
+    cameras.push_back(network_json(entry));
+  }
   Json closed = Json::array();
   for (const capture::V4l2Listing::Closed& one : listing.closed) {
     closed.push_back({{"path", one.path}, {"reason", one.reason}});

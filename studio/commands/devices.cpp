@@ -12,8 +12,9 @@ Command devices_command() {
           [](Arguments&) -> std::function<void(Console&)> {
             return [](Console& console) {
               const capture::V4l2Listing listing = capture::list_v4l2(capture::system_v4l2_io());
-              console.figures(cameras_json(listing));
-              for (const std::string& line : camera_lines(listing)) console.say(line);
+              const capture::AravisListing network = capture::list_aravis();
+              console.figures(cameras_json(listing, network));
+              for (const std::string& line : camera_lines(listing, network)) console.say(line);
             };
           }};
 }

@@ -64,5 +64,33 @@ TEST(CamerasJson, HoldsTheSame) {
   EXPECT_TRUE(json.at("closed").empty());
 }
 
+capture::AravisListing one_network_camera() {
+  capture::AravisListing listing;
+  listing.cameras.push_back({{"Made-M1-7", "Made", "M1", "7", "10.0.0.7", "GigEVision"},
+                             {{"Mono8", "Coord3D_A8"}, {{4, 4}}, {{64, 48}}, 1, 60, {{1e-5, 2}}},
+                             ""});
+  return listing;
+}
+
+TEST(CameraLines, TellWhatANetworkCameraCan) {
+  auto network = one_network_camera();
+  EXPECT_THAT(camera_lines({}, network),
+              ElementsAre("aravis:Made-M1-7  Made M1 (GigEVision), serial 7, also aravis:10.0.0.7",
+                          "  Mono8, Coord3D_A8 (not read)", "  4x4 to 64x48", "  1 to 60/s",
+                          "  exposure 1e-05 to 2 s"));
+  network.cameras[0].fault = "another program controls the camera";
+  EXPECT_THAT(camera_lines({}, network),
+              ElementsAre(HasSubstr("M1"), HasSubstr("another program")));
+}
+
+TEST(CamerasJson, HoldsNetworkCameras) {
+  const auto json = nlohmann::json::parse(cameras_json({}, one_network_camera()));
+  const auto& camera = json.at("cameras").at(0);
+  EXPECT_EQ(camera.at("uri"), "aravis:Made-M1-7");
+  EXPECT_EQ(camera.at("max_size"), nlohmann::json({64, 48}));
+  EXPECT_EQ(camera.at("rates"), nlohmann::json({1.0, 60.0}));
+  EXPECT_EQ(camera.at("formats").at(1).at("read"), false);
+}
+
 }  // namespace
 }  // namespace studio
