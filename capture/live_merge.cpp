@@ -23,11 +23,13 @@ namespace {
 
 using namespace window_merge;
 
-constexpr std::size_t stretches_per_task = 128;
+constexpr std::size_t stretches_per_task = 64;
+constexpr double passed_over = 6.4;  // exposure errors between two shots that no pixel tells
 
 template <class Code>
 void merge_stretch(const Plan<Code>& plan, std::size_t begin, const Merged& merged) {
-  if (!average_all(plan, begin, merged)) return;
+  const Doubts doubts = average_all(plan, begin, merged);
+  if (!doubts.contradicted && !doubts.shifted) return;
   Flags contradicted = find_contradictions(plan, begin);
   join_pixels(contradicted);
   average_newest(plan, begin, contradicted, merged);
@@ -52,6 +54,10 @@ void merge_rest(const Plan<Code>& plan, std::size_t begin, std::size_t count, Me
   std::copy_n(radiance.v.data(), count, &frame.radiance.pixels[begin]);
   std::copy_n(counted.data(), count, &frame.counted[begin]);
   std::copy_n(status.data(), count / channels, &frame.status[begin / channels]);
+}
+
+std::size_t samples_of(const LinearCodes& codes) {
+  return static_cast<std::size_t>(codes.width) * static_cast<std::size_t>(codes.height) * channels;
 }
 
 void require_exposure(double exposure_s) {
@@ -159,6 +165,7 @@ void plan_steps(const Shots<Code>& shots,
     plan.newest_first[shots.count - 1 - order[i]] = i;
     const double t = from.exposure_s / longest_s;
     shot.values = from.values;
+    shot.place = order[i];
     shot.bit = static_cast<std::uint16_t>(1U << order[i]);
     shot.terms = {static_cast<float>(noise.read / (from.exposure_s * from.exposure_s)),
                   static_cast<float>(noise.shot / from.exposure_s),
@@ -182,7 +189,7 @@ void plan_steps(const Shots<Code>& shots,
 }
 
 template <class Code>
-void merge_shots_of(const Shots<Code>& shots,
+void merge_shots_of(Shots<Code> shots,
                     const LinearCodes& codes,
                     const WindowMergeSettings& settings,
                     MergedFrame& frame) {
@@ -202,7 +209,15 @@ void merge_shots_of(const Shots<Code>& shots,
     plan.saturated_value.v[k] = static_cast<float>(plan.saturation[k]);
   }
   plan_steps(shots, codes, noise, plan);
+  frame.gains = compare_shots(plan, samples_of(codes));
+  frame.levelled = settings.level_flicker;
+  if (settings.level_flicker) {
+    for (std::size_t i = 0; i < shots.count; ++i) shots.of[i].exposure_s *= frame.gains[i];
+    plan_steps(shots, codes, noise, plan);
+  }
   frame.noise = noise;
+  frame.shots = shots.count;
+  frame.exposure_error = settings.exposure_error;
   for (std::size_t i = 0; i < shots.count; ++i) frame.exposures_s[i] = shots.of[i].exposure_s;
   merge_all(plan, codes.width, codes.height, frame);
 }
@@ -212,20 +227,44 @@ struct Variance {
   float read = infinite, shot = 0, relative_squared = 0;
 };
 
+bool counts(std::uint16_t counted, std::size_t shot) { return (counted >> shot & 1) != 0; }
+
+// How far an average is from what one of the shots tells, relatively. Shots that differ by more
+// than pixels pass over, and do not count here, are told by the pixels' status.
+double disagreement(const MergedFrame& frame, std::uint16_t counted) {
+  if (frame.levelled) return 0;
+  double weight = 0, sum = 0;
+  for (std::size_t i = 0; i < frame.shots; ++i) {
+    if (!counts(counted, i)) continue;
+    const double of_shot = frame.exposures_s[i] * std::sqrt(frame.exposures_s[i]);
+    weight += of_shot;
+    sum += of_shot * frame.gains[i];
+  }
+  const double mean = sum / weight;
+  double most = 0;
+  for (std::size_t i = 0; i < frame.shots; ++i) {
+    const double apart = std::abs(frame.gains[i] / mean - 1);
+    if (counts(counted, i) || apart < passed_over * frame.exposure_error)
+      most = std::max(most, apart);
+  }
+  return most;
+}
+
 Variance variance_of(const MergedFrame& frame, std::uint16_t counted) {
   if (counted == 0) return {};
   double weight = 0, first = 0, second = 0;
-  for (std::size_t i = 0; i < most_window_shots; ++i) {
-    if ((counted >> i & 1) == 0) continue;
+  for (std::size_t i = 0; i < frame.shots; ++i) {
+    if (!counts(counted, i)) continue;
     const double t = frame.exposures_s[i];
     weight += t * std::sqrt(t);
     first += t;
     second += t * t;
   }
   const NoiseModel& noise = frame.noise;
+  const double apart = disagreement(frame, counted);
   return {static_cast<float>(noise.read * first / (weight * weight)),
           static_cast<float>(noise.shot * second / (weight * weight)),
-          static_cast<float>(noise.relative * noise.relative)};
+          static_cast<float>(noise.relative * noise.relative + apart * apart)};
 }
 
 void require_count(std::size_t count) {
@@ -246,8 +285,7 @@ void require_codes(std::span<const Coded> shots, const LinearCodes& codes) {
       throw std::invalid_argument("white lies above black, both within 16 bits");
     }
   }
-  const std::size_t samples =
-      static_cast<std::size_t>(codes.width) * static_cast<std::size_t>(codes.height) * channels;
+  const std::size_t samples = samples_of(codes);
   for (const Coded& shot : shots) {
     require_exposure(shot.exposure_s);
     if (shot.codes.size() != samples) {

@@ -29,6 +29,10 @@ struct WindowMergeSettings {
   double consistency = 4.5;
   // Relative errors of exposure and linearity between shots, which are no sign of motion.
   double exposure_error = 0.01;
+  // Merges shots as if all had the window's mean light: for lamps that flicker with the mains,
+  // before exposures shorter than their period. Where light changes for good, or labels are wrong,
+  // the mean of the window is shown. For global shutters: a rolling one has a gain for every row.
+  bool level_flicker = false;
 };
 
 // One shot of a linear camera's codes: (height, width, 3), interleaved.
@@ -57,10 +61,17 @@ struct MergedFrame {
   std::vector<MergeStatus> status;     // (height, width)
   std::vector<std::uint16_t> counted;  // (height, width, 3): bit i = the window's shot i counts
   NoiseModel noise;
-  std::array<double, most_window_shots> exposures_s{};  // of the window's shots
+  std::size_t shots = 0;                                // of the window
+  std::array<double, most_window_shots> exposures_s{};  // of its shots, as they were merged
+  // The light that each shot tells, over the mean: 1 where shots agree within their noise, or
+  // cannot be compared. Wrong labels, light that drifts and flicker show here.
+  std::array<double, most_window_shots> gains{};
+  bool levelled = false;      // the gains were taken out
+  double exposure_error = 0;  // as in the settings
 
-  // Fills (height, width, 3): the standard deviation of the radiance by the noise model, infinite
-  // where no shot counts. It follows from what counts, so that a merge need not write it.
+  // Fills (height, width, 3): the standard deviation of the radiance, infinite where no shot
+  // counts. It is that of the noise model, and beside it how far by their gains the average is from
+  // what one of the shots tells. It follows from what counts, so that a merge need not write it.
   void fill_deviation(Image& deviation) const;
   Image deviation() const;
 

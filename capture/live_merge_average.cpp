@@ -131,6 +131,53 @@ Reading read_value(Code code, float saturation) {
   return {value <= largest_value ? value : saturation, usable, ~(usable | saturated)};
 }
 
+// The lanes in the middle of a stretch, which are asked whether it changed by what no lane could
+// tell alone.
+constexpr std::size_t asked = 32;
+constexpr std::size_t first_asked = (lanes - asked) / 2;
+
+template <class Code>
+[[gnu::noinline]] void ask(const Code* __restrict values,
+                           const PlannedShot<Code>& __restrict shot,
+                           const float* __restrict saturation,
+                           const float* __restrict mean,
+                           const std::int32_t* __restrict open,
+                           float* __restrict apart,
+                           float* __restrict light) {
+  for (std::size_t k = 0; k < asked; ++k) {
+    const std::size_t i = first_asked + k;
+    const auto [value, usable, lacking] = read_value(values[i], saturation[i]);
+    const float radiance = mul_add(value, shot.scale.v[i], shot.offset.v[i]);
+    apart[k] = keep_if(usable & open[i], radiance - mean[i]);
+    light[k] = keep_if(usable & open[i], mean[i]);
+  }
+}
+
+float sum_of_asked(const float* values) {
+  std::array<float, 8> sums;
+  for (std::size_t k = 0; k < 8; ++k) {
+    sums[k] = (values[k] + values[k + 8]) + (values[k + 16] + values[k + 24]);
+  }
+  return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+
+// Whether a shot departs from the average in the sum of the lanes that are asked, as far as it
+// counts there.
+template <class Code>
+bool shifts(const Code* values,
+            const PlannedShot<Code>& shot,
+            const float* saturation,
+            const float* mean,
+            const std::int32_t* open) {
+  std::array<float, asked> lanes_apart, lanes_light;
+  ask(values, shot, saturation, mean, open, lanes_apart.data(), lanes_light.data());
+  const float apart = sum_of_asked(lanes_apart.data());
+  const float light = sum_of_asked(lanes_light.data());
+  Tolerance allowed = shot.step.allowed;
+  allowed.read *= asked * asked;  // rounding, which neighbours have in common
+  return apart * apart > allowed.at(std::max(light, 0.0F));
+}
+
 // The shortest shot.
 template <class Code>
 [[gnu::noinline]] void start_some(const Code* __restrict values,
@@ -187,23 +234,28 @@ template <class Code>
   }
 }
 
-// All shots from `first` on; shorter ones count in all lanes, and have the average `mean`.
+// All shots from `first` on; shorter ones count in all lanes, and have the average `mean`. Whether
+// a shot shifts.
 template <class Code>
-void average_rest(const Plan<Code>& plan,
+bool average_rest(const Plan<Code>& plan,
                   std::size_t first,
                   const Lanes& mean,
                   std::size_t begin,
                   MixedAverage& average) {
+  bool shifted = false;
   const float* saturation = plan.saturated_value.v.data();
   if (first > 0) start_mixed(plan.shots[first - 1].step, mean, average);
   for (std::size_t i = first; i < plan.count; ++i) {
     const PlannedShot<Code>& shot = plan.shots[i];
+    const Code* values = shot.values + begin;
     if (i == 0) {
-      start_some(shot.values + begin, shot, saturation, average);
-    } else {
-      add_to_some(shot.values + begin, shot, saturation, average);
+      start_some(values, shot, saturation, average);
+      continue;
     }
+    shifted |= shifts(values, shot, saturation, average.mean.v.data(), average.open.v.data());
+    add_to_some(values, shot, saturation, average);
   }
+  return shifted;
 }
 
 std::int32_t union_of(const Flags& flags) {
@@ -261,30 +313,41 @@ void store_mixed(const MixedAverage& average, const Merged& merged) {
 }  // namespace
 
 template <class Code>
-bool average_all(const Plan<Code>& plan, std::size_t begin, const Merged& merged) {
+Doubts average_all(const Plan<Code>& plan, std::size_t begin, const Merged& merged) {
+  static constexpr Flags all_open = [] {
+    Flags flags{};
+    for (std::int32_t& flag : flags.v) flag = -1;
+    return flags;
+  }();
   const auto kind = [&](std::size_t i) {
     return kind_of(plan.shots[i].values + begin, plan.saturation.data());
   };
   Lanes mean;
-  bool contradicted = false;
+  Doubts doubts;
   std::size_t usable = 0;
   for (; usable < plan.count && kind(usable) == Values::usable; ++usable) {
-    contradicted |= add_usable(plan.shots[usable], usable == 0, begin, mean.v.data());
+    const PlannedShot<Code>& shot = plan.shots[usable];
+    if (usable > 0) {
+      doubts.shifted |= shifts(shot.values + begin, shot, plan.saturated_value.v.data(),
+                               mean.v.data(), all_open.v.data());
+    }
+    doubts.contradicted |= add_usable(shot, usable == 0, begin, mean.v.data());
   }
   std::size_t rest = usable;
   while (rest < plan.count && kind(rest) == Values::saturated) ++rest;
   if (rest < plan.count) {
     MixedAverage average;
-    average_rest(plan, usable, mean, begin, average);
+    doubts.shifted |= average_rest(plan, usable, mean, begin, average);
+    doubts.contradicted |= union_of(average.contradictions) < 0;
     store_mixed(average, merged);
-    return contradicted || union_of(average.contradictions) < 0;
+    return doubts;
   }
   // Of the saturated shots the shortest has the highest bound.
   if (usable < rest) {
-    contradicted |= add_bound(plan.shots[usable], usable == 0, begin, mean.v.data());
+    doubts.contradicted |= add_bound(plan.shots[usable], usable == 0, begin, mean.v.data());
   }
   store_uniform(usable > 0 ? &plan.shots[usable - 1].step : nullptr, mean, merged);
-  return contradicted;
+  return doubts;
 }
 
 template <class Code>
@@ -295,9 +358,9 @@ Flags find_contradictions(const Plan<Code>& plan, std::size_t begin) {
   return average.contradictions;
 }
 
-template bool average_all(const Plan<std::uint8_t>&, std::size_t, const Merged&);
-template bool average_all(const Plan<std::uint16_t>&, std::size_t, const Merged&);
-template bool average_all(const Plan<float>&, std::size_t, const Merged&);
+template Doubts average_all(const Plan<std::uint8_t>&, std::size_t, const Merged&);
+template Doubts average_all(const Plan<std::uint16_t>&, std::size_t, const Merged&);
+template Doubts average_all(const Plan<float>&, std::size_t, const Merged&);
 template Flags find_contradictions(const Plan<std::uint8_t>&, std::size_t);
 template Flags find_contradictions(const Plan<std::uint16_t>&, std::size_t);
 template Flags find_contradictions(const Plan<float>&, std::size_t);

@@ -73,6 +73,7 @@ constexpr Code largest() {
 template <class Code>
 struct PlannedShot {
   const Code* values = nullptr;
+  std::size_t place = 0;  // in the window
   std::uint16_t bit = 0;  // of it, in MergedFrame::counted
   ShotTerms terms{};
   Step step;
@@ -99,22 +100,44 @@ struct Merged {
   MergeStatus* status;     // of `stretch_pixels` pixels
 };
 
-// Averages all shots of the stretch of `lanes` samples from `begin` on. Returns whether some of
-// them contradict each other.
+// What speaks against the average of all shots.
+struct Doubts {
+  bool contradicted = false;  // a sample that differs by more than chance
+  bool shifted = false;       // perhaps all samples differ a little, by more than chance in sum
+};
+
+// Averages all shots of the stretch of `lanes` samples from `begin` on.
 template <class Code>
-bool average_all(const Plan<Code>& plan, std::size_t begin, const Merged& merged);
+Doubts average_all(const Plan<Code>& plan, std::size_t begin, const Merged& merged);
 
 // The lanes where the average above is contradicted, as -1.
 template <class Code>
 Flags find_contradictions(const Plan<Code>& plan, std::size_t begin);
 
 // Averages the shots of the pixels that `contradicted` names from the newest on, without older ones
-// that contradict them.
+// that contradict them. Where the sum over a stretch tells of a change that no pixel could tell
+// alone, all its pixels leave out the older shot.
 template <class Code>
 void average_newest(const Plan<Code>& plan,
                     std::size_t begin,
                     const Flags& contradicted,
                     const Merged& merged);
+
+// The light that each shot of the window tells, over the geometric mean of all: 1 where shots agree
+// within their noise, or cannot be compared.
+template <class Code>
+std::array<double, most_window_shots> compare_shots(const Plan<Code>& plan, std::size_t samples);
+
+// The sum of all lanes, in one order.
+inline float sum_of(Lanes lane) {
+  std::size_t left = lanes;
+  for (; left % 2 == 0; left /= 2) {
+    for (std::size_t i = 0; i < left / 2; ++i) lane.v[i] += lane.v[i + left / 2];
+  }
+  float sum = 0;
+  for (std::size_t i = 0; i < left; ++i) sum += lane.v[i];
+  return sum;
+}
 
 // A pixel is judged as one: colours of two things do not mix.
 void join_pixels(Flags& flags);

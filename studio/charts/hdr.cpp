@@ -109,10 +109,10 @@ Shots take(const MadeSensor& sensor,
   return shots;
 }
 
-MergedFrame merged(const Shots& shots, double consistency) {
+MergedFrame merged(const Shots& shots, bool level_flicker = false) {
   MergedFrame frame;
   merge_window(shots.coded16(), shots.codes(),
-               {.noise = noise_of(shots.sensor), .consistency = consistency}, frame);
+               {.noise = noise_of(shots.sensor), .level_flicker = level_flicker}, frame);
   return frame;
 }
 
@@ -397,7 +397,7 @@ class HdrChart {
   }
 
   static StressorSample window_sample(double value, const Shots& shots, const Image& truth) {
-    return judge(value, merged(shots, capture::WindowMergeSettings{}.consistency), truth);
+    return judge(value, merged(shots), truth);
   }
 
   void add_stressors(Chart& chart) {
@@ -408,6 +408,8 @@ class HdrChart {
     chart.stressors.push_back(missing_members(false));
     chart.stressors.push_back(changing_light());
     chart.stressors.push_back(wrong_label());
+    chart.stressors.push_back(flicker(false));
+    chart.stressors.push_back(flicker(true));
     chart.stressors.push_back(bent_response());
   }
 
@@ -451,6 +453,26 @@ class HdrChart {
       }
       stressor.samples.push_back(
           window_sample(factor, take(sensor_of(12), scenes, all_exposures()), scenes.back()));
+    }
+    return stressor;
+  }
+
+  // Lamps at 100 Hz, before exposures far shorter than their period, 60 times a second.
+  Stressor flicker(bool levelled) {
+    Stressor stressor{
+        fmt::format("flicker of lamps, modulation{}", levelled ? ", levelled" : ""), "", true, {}};
+    for (const double modulation : {0.05, 0.1, 0.2, 0.4, 0.6, 0.8}) {
+      std::vector<Image> scenes;
+      double logs = 0;
+      for (std::size_t i = 0; i < members; ++i) {
+        const double phase = 2 * std::numbers::pi * 100 / 60 * static_cast<double>(i) + 0.3;
+        const double factor = 0.5 * (1 + modulation * std::sin(phase));
+        logs += std::log(factor);
+        scenes.push_back(made_scene(stressed_side(), factor));
+      }
+      const Image truth = made_scene(stressed_side(), std::exp(logs / members));
+      const Shots shots = take(sensor_of(12), scenes, all_exposures());
+      stressor.samples.push_back(judge(modulation, merged(shots, levelled), truth));
     }
     return stressor;
   }
