@@ -1,9 +1,8 @@
-// made:plate and made:probe.
+// made:plate and made:probe, as files would give them.
 #include "render/made_camera.h"
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -16,74 +15,18 @@
 #include "calibrate/lens.h"
 #include "capture/camera.h"
 #include "capture/colour.h"
+#include "render/made_camera_request.h"
+#include "render/made_gige_camera.h"
 #include "render/made_studio.h"
 
 namespace render {
 namespace {
 
-[[noreturn]] void fail(std::string_view uri, const std::string& why) {
-  throw std::runtime_error("cannot open made:" + std::string(uri) + ": " + why +
-                           "; write made:plate?width=640&height=480&frames=0&samples=4&seed=1 or "
-                           "made:probe?size=384&frames=0&samples=4&seed=1");
-}
-
-struct Request {
-  bool probe = false;
-  MadeStudioSettings studio;
-  int frames = 0;
-  int samples = 4;
-};
-
-struct Key {
-  std::string_view name;
-  int low, high;
-  int* target;
-};
-
-Request parse(std::string_view uri) {
-  Request request;
-  const std::size_t mark = uri.find('?');
-  const std::string_view name = uri.substr(0, mark);
-  if (name != "plate" && name != "probe") fail(uri, "there is no such made camera");
-  request.probe = name == "probe";
-  int seed = 1;
-  MadeStudioSettings& studio = request.studio;
-  const std::array<Key, 6> keys{{{"width", 16, 8192, &studio.width},
-                                 {"height", 16, 8192, &studio.height},
-                                 {"size", 16, 4096, &studio.probe_size},
-                                 {"frames", 0, 1 << 30, &request.frames},
-                                 {"samples", 1, 65536, &request.samples},
-                                 {"seed", 1, 1'000'000, &seed}}};
-  std::string_view rest = mark == std::string_view::npos ? "" : uri.substr(mark + 1);
-  while (!rest.empty()) {
-    const std::size_t end = std::min(rest.find('&'), rest.size());
-    const std::string_view setting = rest.substr(0, end);
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-    const std::size_t equals = setting.find('=');
-    const auto key = std::ranges::find(keys, setting.substr(0, equals), &Key::name);
-    if (key == keys.end() || equals == std::string_view::npos) {
-      fail(uri, "\"" + std::string(setting) + "\" is no setting");
-    }
-    const std::string_view value = setting.substr(equals + 1);
-    const auto [last, error] =
-        std::from_chars(value.data(), value.data() + value.size(), *key->target);
-    if (error != std::errc{} || last != value.data() + value.size() || *key->target < key->low ||
-        *key->target > key->high) {
-      fail(uri, std::string(key->name) + " must be a whole number from " +
-                    std::to_string(key->low) + " to " + std::to_string(key->high));
-    }
-  }
-  studio.seed = static_cast<std::uint32_t>(seed);
-  // No finer than the picture shows.
-  const int across = request.probe ? studio.probe_size : studio.width;
-  studio.texture_size = std::clamp(4 * across, 64, studio.texture_size);
-  studio.sky_height = std::clamp(across, 128, studio.sky_height);
-  return request;
-}
-
 class MadeStream final : public capture::Camera {
  public:
-  MadeStream(const Request& request, const capture::CameraOptions& options, std::string_view uri)
+  MadeStream(const MadeCameraRequest& request,
+             const capture::CameraOptions& options,
+             std::string_view uri)
       : studio_(make_studio(request.studio)),
         camera_(request.probe ? studio_.probe : studio_.plate),
         frames_(request.frames),
@@ -93,8 +36,8 @@ class MadeStream final : public capture::Camera {
     const auto [x, y, width, height] = crop_;
     if (x < 0 || y < 0 || width < 1 || height < 1 || width > lens.width - x ||
         height > lens.height - y) {
-      fail(uri, "the crop reaches beyond its picture of " + std::to_string(lens.width) + "x" +
-                    std::to_string(lens.height));
+      refuse_made_camera(uri, "the crop reaches beyond its picture of " +
+                                  std::to_string(lens.width) + "x" + std::to_string(lens.height));
     }
     const Scene court(studio_.place);
     parts_ = photograph_parts(studio_, court, calibrate::make_direction_table(lens),
@@ -168,7 +111,9 @@ void register_made_cameras() {
       "made",
       [](std::string_view rest,
          const capture::CameraOptions& options) -> std::unique_ptr<capture::Camera> {
-        return std::make_unique<MadeStream>(parse(rest), options, rest);
+        const MadeCameraRequest request = parse_made_camera(rest);
+        if (request.gige) return open_made_gige(request, options);
+        return std::make_unique<MadeStream>(request, options, rest);
       });
 }
 

@@ -2,9 +2,13 @@
 #include "studio/start.h"
 
 #include "compositing/stand_in.h"
+#include "render/made_camera.h"
 
 namespace studio {
 
-void start() { compositing::register_shaders(); }
+void start() {
+  compositing::register_shaders();
+  render::register_made_cameras();
+}
 
 }  // namespace studio
