@@ -21,6 +21,16 @@ constexpr double least_told = 1e-4;
 
 bool about_equal(double a, double b) { return std::abs(a - b) <= same_exposure * b; }
 
+// The share of values above a radiance, of every seventh.
+double share_above(const capture::Image& radiance, double least) {
+  constexpr std::size_t step = 7;
+  std::size_t above = 0;
+  for (std::size_t i = 0; i < radiance.pixels.size(); i += step) {
+    above += radiance.pixels[i] > least ? 1 : 0;
+  }
+  return static_cast<double>(above * step) / static_cast<double>(radiance.pixels.size());
+}
+
 [[noreturn]] void fail(const Set& set, const std::string& message) {
   const Place place = set.probe->source_place;
   throw SetError({{set.path, place.line, place.column, message}});
@@ -126,9 +136,7 @@ void ProbeSource::merge(capture::Time time) {
     return status_.shares[static_cast<std::size_t>(status)];
   };
   const bool saturated = share_of(capture::MergeStatus::lower_bound) > all_saturated;
-  const double told = share_of(capture::MergeStatus::good) +
-                      share_of(capture::MergeStatus::inconsistent) +
-                      share_of(capture::MergeStatus::lower_bound);
+  const double told = share_above(merged->radiance, bracket_->least_radiance());
   const bool first = newest_.image == nullptr;
   status_.kept_because = first               ? ""
                          : saturated         ? "the probe's shots are all saturated"

@@ -39,6 +39,12 @@ void RollingBracket::add(std::shared_ptr<const capture::Image> linear,
   shots_.push_back({std::move(linear), exposure_s, number});
 }
 
+double RollingBracket::least_radiance() const {
+  double longest_s = 0;
+  for (const Member& shot : shots_) longest_s = std::max(longest_s, shot.exposure_s);
+  return 2 * std::sqrt(settings_.noise.read) / longest_s;
+}
+
 std::shared_ptr<const capture::MergedFrame> RollingBracket::merge() {
   std::vector<capture::LiveShot> window;
   for (const Member& shot : shots_) window.push_back({shot.linear.get(), shot.exposure_s});

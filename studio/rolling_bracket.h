@@ -25,6 +25,8 @@ class RollingBracket {
   // one size. Throws std::invalid_argument for another size, or an exposure that is not > 0.
   void add(std::shared_ptr<const capture::Image> linear, double exposure_s, std::int64_t number);
   std::size_t shots() const { return shots_.size(); }
+  // Radiance that the longest of the shots can just tell from black.
+  double least_radiance() const;
   // Of the shots that were added; at least one must have been.
   std::shared_ptr<const capture::MergedFrame> merge();
 
