@@ -98,6 +98,9 @@ BracketStatistics BracketedCamera::bracket_statistics() const {
 CameraStatistics BracketedCamera::statistics() const {
   CameraStatistics statistics = camera_->statistics();
   statistics.damaged += damaged_;
+  statistics.rejected = counts_.rejected;
+  statistics.unknown = counts_.unknown;
+  statistics.exposure_lag = labeller_.lag();
   return statistics;
 }
 

@@ -37,6 +37,10 @@ struct CameraStatistics {
   std::int64_t delivered = 0;  // all frames that next() gave; the following are among them
   std::int64_t lost = 0;
   std::int64_t damaged = 0;
+  // Of a camera that brackets (bracketed_camera.h):
+  std::int64_t rejected = 0;        // the exposure is not certain
+  std::int64_t unknown = 0;         // black or saturated, so that it cannot be told
+  std::optional<int> exposure_lag;  // frames from a request to its effect, where it is known
 };
 
 struct CameraOptions {

@@ -74,7 +74,11 @@ class MadeStream final : public capture::Camera {
     return frame;
   }
 
-  capture::CameraStatistics statistics() const override { return {.delivered = delivered_}; }
+  capture::CameraStatistics statistics() const override {
+    capture::CameraStatistics statistics;
+    statistics.delivered = delivered_;
+    return statistics;
+  }
 
  private:
   capture::Image decode(const capture::MadeShot& shot) const {

@@ -36,6 +36,7 @@ Json probe_json(const ShowStatus& s) {
           {"lost", s.probe.lost},
           {"rejected", s.probe.rejected},
           {"shots", s.probe.shots},
+          {"exposure_lag", s.probe.exposure_lag ? Json(*s.probe.exposure_lag) : Json(nullptr)},
           {"good", share_of(capture::MergeStatus::good)},
           {"dark", share_of(capture::MergeStatus::dark)},
           {"inconsistent", share_of(capture::MergeStatus::inconsistent)},

@@ -7,13 +7,15 @@
 #include <stdexcept>
 #include <utility>
 
+#include "capture/bracketed_camera.h"
 #include "capture/make_hdr.h"
 
 namespace studio {
 namespace {
 
-constexpr std::size_t longest_cycle = 16;                         // exposures of a bracket
-constexpr double same_exposure = 0.02;                            // relative
+constexpr std::size_t longest_cycle = 16;                            // exposures of a bracket
+constexpr double same_exposure = 0.02;                               // relative
+constexpr capture::Time bracket_patience = std::chrono::seconds(5);  // for a live camera's first
 constexpr capture::Time next_patience = std::chrono::seconds(2);  // for a live camera's next frame
 // From these shares of pixels on, the shots tell nothing.
 constexpr double all_saturated = 0.5;
@@ -66,7 +68,13 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
   options.response = probe.response;
   options.loop = set.camera.loop;
   if (set.show.fps) options.picture_rate = *set.show.fps;
-  camera_ = std::make_unique<Source>(capture::open_camera(probe.source, options));
+  std::unique_ptr<capture::Camera> camera = capture::open_camera(probe.source, options);
+  const bool brackets = camera->info().live && !exposures_s_.empty();
+  if (brackets) {
+    camera = std::make_unique<capture::BracketedCamera>(std::move(camera), probe.source,
+                                                        exposures_s_, capture::LabelSettings{});
+  }
+  camera_ = std::make_unique<Source>(std::move(camera));
   if (camera_->first().image == nullptr) throw std::runtime_error("its first frame is lost");
   if (camera_->is_still()) {
     newest_ = {camera_->first().image, camera_->first().time};
@@ -74,11 +82,15 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
     return;
   }
   status_.live = true;
-  prime();
+  if (brackets) {
+    prime_live();
+  } else {
+    prime();
+  }
 }
 
 double ProbeSource::exposure_s_of(const capture::Frame& frame) const {
-  if (exposures_s_.empty()) return frame.exposure_s;
+  if (exposures_s_.empty() || camera_->is_live()) return frame.exposure_s;
   return exposures_s_[static_cast<std::size_t>(frame.number) % exposures_s_.size()];
 }
 
@@ -106,6 +118,24 @@ void ProbeSource::prime() {
   }
   if (exposures_s.size() > 1) bracket_ = std::make_unique<RollingBracket>(exposures_s.size());
   take(cycle);
+}
+
+// Waits for a whole bracket, or what comes of it in time.
+void ProbeSource::prime_live() {
+  const std::size_t cycle = exposures_s_.size();
+  bracket_ = std::make_unique<RollingBracket>(cycle);
+  const capture::Time end = capture::monotonic_now() + bracket_patience;
+  std::string why = camera_->first().note;
+  while (bracket_->shots() < cycle && capture::monotonic_now() < end) {
+    camera_->wait_for_newer(end);
+    const std::vector<capture::Frame> frames = camera_->advance(capture::Time::max());
+    take(frames);
+    if (!frames.empty() && !frames.back().note.empty()) why = frames.back().note;
+  }
+  if (bracket_->shots() == 0) {
+    throw std::runtime_error("of no frame within 5 s the exposure could be told" +
+                             (why.empty() ? "" : ": " + why));
+  }
 }
 
 // Whether the frame tells new light.
@@ -165,6 +195,7 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time) {
   if (camera_) {
     take(camera_->advance(time - offset_));
     status_.age = time - offset_ - newest_.time;
+    status_.exposure_lag = camera_->statistics().exposure_lag;
   }
   return newest_;
 }

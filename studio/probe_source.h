@@ -23,10 +23,11 @@ struct ProbeStatus {
   std::size_t shots = 0;  // that the newest radiance was merged from
   // Of its pixels, by capture::MergeStatus.
   std::array<double, capture::merge_status_count> shares{};
-  std::int64_t frames = 0;    // of the camera, up to now; the following are among them
-  std::int64_t lost = 0;      // did not come
-  std::int64_t rejected = 0;  // were damaged, or their exposure was not known for certain
-  std::string kept_because;   // why the last good light stays on air; "" = the light is new
+  std::int64_t frames = 0;          // of the camera, up to now; the following are among them
+  std::int64_t lost = 0;            // did not come
+  std::int64_t rejected = 0;        // were damaged, or their exposure was not known for certain
+  std::optional<int> exposure_lag;  // of a camera that is told its exposures, once it is known
+  std::string kept_because;         // why the last good light stays on air; "" = the light is new
 };
 
 // One thread uses it.
@@ -48,6 +49,7 @@ class ProbeSource {
  private:
   void open_camera(const Set& set, const ProbeSettings& probe);
   void prime();
+  void prime_live();
   capture::Frame wait_for_next();
   void take(const std::vector<capture::Frame>& frames);
   bool add(const capture::Frame& frame);

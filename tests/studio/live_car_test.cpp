@@ -1,12 +1,18 @@
 // The live set: its cameras, their packets, their exposures, and the light that comes of them.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <string>
 
 #include "calibrate/lens.h"
 #include "render/made_studio.h"
 #include "studio/set.h"
+#include "studio/show.h"
+#include "studio/start.h"
+#include "tests/made_files.h"
 
 namespace studio {
 namespace {
@@ -40,6 +46,52 @@ TEST(LiveCar, SeesAsItsMadeCamerasDo) {
             1e-6);
   EXPECT_LT(calibrate::length(set.probe->probe_from_set * p - studio.probe.cam_from_set * p), 1e-6);
   EXPECT_EQ(set.probe->exposures_s, studio.probe.exposures_s);
+}
+
+// The same set with pictures that are made faster, and the probe's packets lossy.
+Set quick_set(const std::filesystem::path& dir, const std::string& loss) {
+  std::ifstream file(live_car);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  for (std::size_t at = 0; (at = text.find("samples=8", at)) != std::string::npos;) {
+    text.replace(at, 9, "samples=2&loss=" + loss);
+  }
+  const std::filesystem::path path = dir / "live.toml";
+  std::ofstream(path) << text;
+  return read_set(path);
+}
+
+class LiveCarTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    start();
+    dir_ = made::make_temporary_directory();
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+  std::filesystem::path dir_;
+};
+
+TEST_F(LiveCarTest, IsLitAsItsPlateShows) {
+  ShowOptions options;
+  options.frames = 60;
+  Show show(quick_set(dir_, "0"), options);
+  show.run();
+  const ShowStatus status = *show.status();
+  EXPECT_EQ(status.frames, 60);
+  EXPECT_EQ(status.display_nan, 0);
+  EXPECT_EQ(status.probe.shots, 3U);
+  EXPECT_GT(status.probe.frames, 100);
+  // One unit of radiance fills the plate's well 1 time and the probe's 10 times.
+  for (const float gain : status.match.gain) EXPECT_NEAR(gain, 0.1, 0.004);
+}
+
+TEST_F(LiveCarTest, GoesOnWhilePacketsAreLost) {
+  ShowOptions options;
+  options.frames = 40;
+  Show show(quick_set(dir_, "10"), options);
+  show.run();
+  const ShowStatus status = *show.status();
+  EXPECT_EQ(status.frames, 40);
+  for (const float gain : status.match.gain) EXPECT_NEAR(gain, 0.1, 0.006);
 }
 
 }  // namespace
