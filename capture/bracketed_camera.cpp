@@ -19,13 +19,20 @@ constexpr double distinct_ratio = 1.05;
 // A frame's time may be told rounded.
 constexpr double period_slack = 1.001;
 
+LabelSettings of_thumbnails(LabelSettings settings, const CameraInfo& picture) {
+  settings.noise = noise_of_thumbnail(settings.noise, picture.width, picture.height);
+  return settings;
+}
+
 }  // namespace
 
 BracketedCamera::BracketedCamera(std::unique_ptr<Camera> camera,
                                  std::string name,
                                  std::span<const double> exposures_s,
                                  const LabelSettings& settings)
-    : camera_(std::move(camera)), name_(std::move(name)), labeller_(settings) {
+    : camera_(std::move(camera)),
+      name_(std::move(name)),
+      labeller_(of_thumbnails(settings, camera_->info())) {
   set_exposures(exposures_s);
   for (Member& member : members_) {
     member.taken_s = camera_->set_exposure(member.asked_s);
@@ -132,6 +139,11 @@ std::optional<Frame> BracketedCamera::next() {
     const ExposureLabel label =
         labeller_.label(frame->number, thumbnail_of(*frame->image), frame->exposure_s);
     frame->exposure_s = label.exposure_s;
+    // Nothing contradicts the lag, and what such a picture holds in a few places (the sun) is
+    // wanted.
+    if (label.verdict == LabelVerdict::unknown && labeller_.lag()) {
+      frame->exposure_s = label.predicted_s;
+    }
     counts_.accepted += label.verdict == LabelVerdict::accepted;
     counts_.rejected += label.verdict == LabelVerdict::rejected;
     counts_.unknown += label.verdict == LabelVerdict::unknown;

@@ -27,10 +27,11 @@ struct BracketStatistics {
 // says of each frame which of them made it (see ExposureLabeller). Images are as the camera gives
 // them; their values must be linear, with 1 = saturated.
 //
-// Frame::exposure_s is what made the frame if that is sure. If not it is 0: with status damaged
-// where the picture does not fit (mixed, repeated, asked for in vain, or the lag is not known yet),
-// with the status as it was where the picture is too dark or too bright to tell; the note says why.
-// Frames that arrive lost or damaged are passed on, with exposure 0.
+// Frame::exposure_s is what made the frame if that is sure. If not it is 0, with status damaged and
+// a note, where the picture does not fit (mixed, repeated, asked for in vain, or the lag is not
+// known yet). A picture too dark or too bright to tell has its status as it was, a note, and what
+// the lag foretells, 0 while that is not known. Frames that arrive lost or damaged are passed on,
+// with exposure 0.
 class BracketedCamera final : public Camera {
  public:
   // Asks for each exposure once, to see what the device makes of it. `name` is for messages.

@@ -50,24 +50,65 @@ std::size_t contradicting_end(const Rows& rows, bool top) {
 
 }  // namespace
 
-Thumbnail thumbnail_of(const Image& image, int rows, int columns) {
+Thumbnail thumbnail_of(const Image& image, int rows, int columns, double saturation) {
   if (image.empty() || rows < 1 || columns < 1) {
     throw std::invalid_argument("a thumbnail needs a picture, rows and columns");
   }
   Thumbnail thumbnail{
       std::min(rows, image.height), std::min(columns, image.width), image.channels, {}};
-  thumbnail.values.reserve(static_cast<std::size_t>(thumbnail.rows) * thumbnail.row_size());
-  const auto place = [](int i, int count, int size) {
-    return count > 1 ? static_cast<int>(std::int64_t{i} * (size - 1) / (count - 1)) : size / 2;
+  const std::size_t row_size = thumbnail.row_size();
+  const auto channels = static_cast<std::size_t>(image.channels);
+  const auto limit = static_cast<float>(saturation);
+  const auto edge = [](int i, int count, int size) {
+    return static_cast<int>(std::int64_t{i} * size / count);
   };
+  thumbnail.values.reserve(static_cast<std::size_t>(thumbnail.rows) * row_size);
+  std::vector<double> sums(row_size);
+  std::vector<int> saturated(row_size);
   for (int row = 0; row < thumbnail.rows; ++row) {
-    const int y = place(row, thumbnail.rows, image.height);
+    std::ranges::fill(sums, 0.0);
+    std::ranges::fill(saturated, 0);
+    const int first = edge(row, thumbnail.rows, image.height);
+    const int end = edge(row + 1, thumbnail.rows, image.height);
+    for (int y = first; y < end; ++y) {
+      for (int column = 0; column < thumbnail.columns; ++column) {
+        const float* value =
+            &image.pixels[image.index(y, edge(column, thumbnail.columns, image.width))];
+        const float* stop =
+            image.pixels.data() + image.index(y, 0) +
+            static_cast<std::size_t>(edge(column + 1, thumbnail.columns, image.width)) * channels;
+        const std::size_t cell = static_cast<std::size_t>(column) * channels;
+        for (; value < stop; value += channels) {
+          for (std::size_t c = 0; c < channels; ++c) {
+            sums[cell + c] += value[c];
+            saturated[cell + c] += value[c] >= limit ? 1 : 0;
+          }
+        }
+      }
+    }
     for (int column = 0; column < thumbnail.columns; ++column) {
-      const int x = place(column, thumbnail.columns, image.width);
-      for (int c = 0; c < image.channels; ++c) thumbnail.values.push_back(image.at(y, x, c));
+      const int pixels = (end - first) * (edge(column + 1, thumbnail.columns, image.width) -
+                                          edge(column, thumbnail.columns, image.width));
+      for (std::size_t c = 0; c < channels; ++c) {
+        const std::size_t i = static_cast<std::size_t>(column) * channels + c;
+        const bool in_part = saturated[i] > 0 && saturated[i] < pixels;
+        thumbnail.values.push_back(in_part ? std::numeric_limits<float>::quiet_NaN()
+                                           : static_cast<float>(sums[i] / pixels));
+      }
     }
   }
   return thumbnail;
+}
+
+NoiseModel noise_of_thumbnail(
+    const NoiseModel& noise, int width, int height, int rows, int columns) {
+  // Interpolated colours of neighbours are not independent: four of them count as one.
+  const double cells = static_cast<double>(std::min(rows, height)) * std::min(columns, width);
+  const double independent = std::max(1.0, static_cast<double>(width) * height / cells / 4);
+  NoiseModel of_means = noise;
+  of_means.read /= independent;
+  of_means.shot /= independent;
+  return of_means;
 }
 
 // What values may be if the tried exposure is true, and what the frame's are.

@@ -11,10 +11,9 @@
 
 namespace capture {
 
-// A few linear values of a picture, (rows, columns, channels), 1 = saturated: single pixels, not
-// means, since a mean of saturated and other pixels follows no exposure. The first and the last row
-// are those of the picture, so that a picture that changes its exposure somewhere shows it in one
-// of them. Values that are not finite count as not taken.
+// A few linear values of a picture, (rows, columns, channels), 1 = saturated. The first and the
+// last row hold those of the picture, so that a picture that changes its exposure somewhere shows
+// it in one of them. Values that are not finite count as not taken.
 struct Thumbnail {
   int rows = 0;
   int columns = 0;
@@ -26,9 +25,17 @@ struct Thumbnail {
   }
 };
 
-// Pixels on a grid; fewer where the picture has fewer. Throws std::invalid_argument for an empty
-// picture, or rows or columns below 1.
-Thumbnail thumbnail_of(const Image& image, int rows = 16, int columns = 16);
+// The means of rows x columns cells; fewer where the picture has fewer pixels. So dark pictures, in
+// which no pixel rises above the noise, tell their exposure all the same. A mean of saturated and
+// other pixels follows no exposure, and is no value (NaN). Throws std::invalid_argument for an
+// empty picture, or rows or columns below 1.
+Thumbnail thumbnail_of(const Image& image,
+                       int rows = 16,
+                       int columns = 16,
+                       double saturation = NoiseModel{}.saturation);
+// The noise of such values, where `noise` is that of the picture's pixels.
+NoiseModel noise_of_thumbnail(
+    const NoiseModel& noise, int width, int height, int rows = 16, int columns = 16);
 
 // An exposure that a frame may have had, and those it is to be told from.
 struct TriedExposure {
