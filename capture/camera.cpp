@@ -1,18 +1,17 @@
 // Cameras by URI.
 #include "capture/camera.h"
 
-#include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
 #include "capture/aravis_camera.h"
+#include "capture/camera_response.h"
 #include "capture/linearise.h"
 #include "capture/picture_camera.h"
 #include "capture/replay.h"
-#include "capture/response.h"
 #include "capture/sequence.h"
 #include "capture/v4l2_camera.h"
 #include "capture/video_file.h"
@@ -28,24 +27,16 @@ std::string absolute(std::string_view path, const CameraOptions& options) {
       .string();
 }
 
-// Light between the codes on straight lines, which go on beyond the first and last code.
-Curve curve_of(const std::array<double, Response::codes>& light) {
-  return [light](double value) {
-    constexpr int last_step = Response::codes - 2;
-    const double code = value * (Response::codes - 1);
-    const int below = std::clamp(static_cast<int>(std::floor(code)), 0, last_step);
-    const auto i = static_cast<std::size_t>(below);
-    return light[i] + (code - below) * (light[i + 1] - light[i]);
-  };
-}
-
 LightCurves curves_of(const CameraOptions& options) {
   if (options.response.empty()) {
     return {options.colour, std::nullopt};
   }
-  const Response response = read_rsp(absolute(options.response, options));
-  return {options.colour, std::array{curve_of(response.light[0]), curve_of(response.light[1]),
-                                     curve_of(response.light[2])}};
+  const auto response =
+      std::make_shared<const CameraResponse>(read_response(absolute(options.response, options)));
+  const auto curve_of = [&](int channel) -> Curve {
+    return [response, channel](double value) { return response->light(channel, value); };
+  };
+  return {options.colour, std::array{curve_of(0), curve_of(1), curve_of(2)}};
 }
 
 std::unique_ptr<Camera> open_file(std::string_view rest, const CameraOptions& options) {

@@ -50,8 +50,8 @@ struct CameraOptions {
   bool loop = false;                       // files start again at their end, time going on
   Rational picture_rate{25, 1};            // of sequences, and of stills that loop
   std::string base_dir;                    // relative paths start here
-  std::string response;     // .rsp file of a camera that is not linear; "" = by colour
-  bool keep_coded = false;  // live cameras' frames keep the bytes that came
+  std::string response;                    // .rsp or .toml file (camera_response.h); "" = by colour
+  bool keep_coded = false;                 // live cameras' frames keep the bytes that came
 };
 
 // Exposure times that a camera can be set to.

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "capture/camera_response.h"
 #include "capture/exif.h"
 #include "capture/exr.h"
 #include "capture/files.h"
@@ -148,12 +149,13 @@ void merge_stills(std::vector<ShotFile> files, const HdrOptions& options, HdrRes
     result.exposures_s = std::move(fit.exposures_s);
     result.heldout_error = fit.heldout_error;
     result.candidates = std::move(fit.candidates);
+    result.warnings = std::move(fit.warnings);
   } else if (options.response == "auto" || options.response == "sRGB") {
     result.response = srgb_response();
   } else if (options.response == "linear") {
     result.response = linear_response();
   } else {
-    result.response = read_rsp(options.response);
+    result.response = read_response(options.response).curve;
   }
   MergeTables tables(
       {response_code_table(result.response, 0), response_code_table(result.response, 1),

@@ -15,7 +15,8 @@ struct HdrOptions {
   // other f-numbers and ISO than the first shot's counted as exposure.
   std::vector<double> exposures_s;
   // "auto": recovered from the shots, together with the true exposures (one or two shots count as
-  // sRGB). "sRGB", "linear", or the path of a .rsp file: taken as it is, exposures as they are.
+  // sRGB). "sRGB", "linear", or the path of a .rsp or .toml file
+  // (camera_response.h): taken as it is, exposures as they are.
   std::string response = "auto";
 };
 
@@ -25,6 +26,7 @@ struct HdrResult {
   Response response;                // light of codes; unused for HDR pictures
   double heldout_error = 0;         // of a recovered response (ResponseFit), else 0
   std::vector<ResponseCandidate> candidates;  // that were tried, if it was recovered
+  std::vector<std::string> warnings;          // of its recovery
   double time_ms = 0;
 };
 

@@ -23,20 +23,46 @@ struct Declared {
 
 int report_usage(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App* used = &app;
-  for (const CLI::App* chosen : app.get_subcommands()) used = chosen;
-  const std::string name = used == &app ? "platelight" : "platelight " + used->get_name();
+  std::string name = "platelight";
+  while (!used->get_subcommands().empty()) {
+    used = used->get_subcommands().back();
+    name += " " + used->get_name();
+  }
   std::string reason = error.what();
   std::ranges::replace(reason, '\n', ' ');
   fmt::print(stderr, "{}: {} (see {} --help)\n", name, reason, name);
   return 2;
 }
 
+// The place of a command in the tree: "calibrate response" is under "calibrate".
+CLI::App* add_command(CLI::App& app, const Command& command) {
+  const std::string name(command.name);
+  const std::size_t space = name.find(' ');
+  if (space == std::string::npos) return app.add_subcommand(name, std::string(command.summary));
+  const std::string group_name = name.substr(0, space);
+  const std::vector<CLI::App*> known =
+      app.get_subcommands([&](const CLI::App* sub) { return sub->get_name() == group_name; });
+  CLI::App* group = known.empty() ? nullptr : known.front();
+  if (group == nullptr) {
+    group = app.add_subcommand(group_name, std::string(command.group_summary));
+    group->require_subcommand(1);
+  }
+  return group->add_subcommand(name.substr(space + 1), std::string(command.summary));
+}
+
+bool is_first_word(const Command& command, std::string_view word) {
+  return command.name.substr(0, command.name.find(' ')) == word;
+}
+
 }  // namespace
 
 std::span<const Command> commands() {
   static const std::vector<Command> all{
-      run_command(),  check_command(), still_command(), hdr_command(),     capture_command(),
-      demo_command(), chart_command(), bench_command(), devices_command(),
+      run_command(),     check_command(),
+      still_command(),   hdr_command(),
+      capture_command(), demo_command(),
+      chart_command(),   bench_command(),
+      devices_command(), calibrate_response_command(),
   };
   return all;
 }
@@ -52,7 +78,7 @@ int run_command_line(int count, const char* const* words) {
   std::string figures_file;
   std::vector<Declared> declared;
   for (const Command& command : commands()) {
-    CLI::App* sub = app.add_subcommand(std::string(command.name), std::string(command.summary));
+    CLI::App* sub = add_command(app, command);
     Arguments arguments(*sub);
     auto run = command.declare(arguments);
     arguments.option("--json", figures_file, "write the figures to this file");
@@ -63,7 +89,8 @@ int run_command_line(int count, const char* const* words) {
 
   // CLI11 would only say that a command is missing.
   if (count > 1 && words[1][0] != '-' &&
-      std::ranges::find(commands(), words[1], &Command::name) == commands().end()) {
+      std::ranges::none_of(
+          commands(), [&](const Command& command) { return is_first_word(command, words[1]); })) {
     fmt::print(stderr, "platelight: there is no command \"{}\" (see platelight --help)\n",
                words[1]);
     return 2;

@@ -12,12 +12,13 @@
 namespace studio {
 
 struct Command {
-  std::string_view name;
+  std::string_view name;  // "hdr"; or two words, a group's and its own: "calibrate response"
   std::string_view summary;
   std::string_view example;  // a whole command line
   // Declares the options and returns what runs with them. What runs throws std::runtime_error when
   // it fails, UsageError when the options do not go together.
   std::function<void(Console&)> (*declare)(Arguments& arguments);
+  std::string_view group_summary = {};  // of the group, if there is one
 };
 
 std::span<const Command> commands();

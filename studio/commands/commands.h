@@ -6,6 +6,7 @@
 namespace studio {
 
 Command bench_command();
+Command calibrate_response_command();
 Command capture_command();
 Command chart_command();
 Command check_command();

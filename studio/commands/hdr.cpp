@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/camera_response.h"
 #include "capture/exr.h"
 #include "capture/make_hdr.h"
 #include "studio/commands/commands.h"
@@ -35,13 +36,14 @@ nlohmann::ordered_json to_json(const capture::HdrResult& result, double stops) {
             {"coefficients", result.response.coefficients},
             {"heldout_error", result.heldout_error},
             {"candidates", candidates}}},
+          {"warnings", result.warnings},
           {"stops", stops},
           {"time_ms", result.time_ms}};
 }
 
 void save_response(const HdrCommandOptions& options, const capture::HdrResult& result) {
   try {
-    capture::write_rsp(options.response_out, result.response);
+    capture::write_response(options.response_out, {result.response, std::nullopt});
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(
         fmt::format("cannot write {}: {}", options.response_out, error.what()));
@@ -55,6 +57,7 @@ void hdr(const HdrCommandOptions& options, Console& console) {
   capture::write_exr(options.out, result.radiance);
   const double stops = capture::range_stops(result.radiance);
   console.figures(to_json(result, stops).dump(2));
+  for (const std::string& warning : result.warnings) console.warn(warning);
   console.say(fmt::format("{}: {}x{}, {:.1f} stops from {} files, response {}", options.out,
                           result.radiance.width, result.radiance.height, stops,
                           options.shots.size(), result.response.name));
@@ -63,20 +66,20 @@ void hdr(const HdrCommandOptions& options, Console& console) {
 }  // namespace
 
 Command hdr_command() {
-  return {"hdr", "Merge bracketed shots to an HDR picture, or convert one",
-          "platelight hdr bracket/*.JPG -o light.exr --json light.json",
-          [](Arguments& arguments) -> std::function<void(Console&)> {
-            auto o = std::make_shared<HdrCommandOptions>();
-            arguments.positionals("SHOTS", o->shots,
-                                  "shots with EXIF times, or one HDR or EXR file");
-            arguments.option("-o,--out", o->out, "EXR file");
-            arguments.required("--out");
-            arguments.option("--response", o->response,
-                             "auto (recovered), sRGB, linear, or a .rsp file");
-            arguments.option("--response-out", o->response_out,
-                             "write the response to this .rsp file, for sets and other shots");
-            return [o](Console& console) { hdr(*o, console); };
-          }};
+  return {
+      "hdr", "Merge bracketed shots to an HDR picture, or convert one",
+      "platelight hdr bracket/*.JPG -o light.exr --json light.json",
+      [](Arguments& arguments) -> std::function<void(Console&)> {
+        auto o = std::make_shared<HdrCommandOptions>();
+        arguments.positionals("SHOTS", o->shots, "shots with EXIF times, or one HDR or EXR file");
+        arguments.option("-o,--out", o->out, "EXR file");
+        arguments.required("--out");
+        arguments.option("--response", o->response,
+                         "auto (recovered), sRGB, linear, or a .rsp or .toml file");
+        arguments.option("--response-out", o->response_out,
+                         "write the response to this .rsp or .toml file, for sets and other shots");
+        return [o](Console& console) { hdr(*o, console); };
+      }};
 }
 
 }  // namespace studio

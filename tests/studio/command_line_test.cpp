@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -13,7 +14,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "capture/camera_response.h"
 #include "capture/exr.h"
+#include "capture/made_sensor.h"
 #include "capture/png.h"
 #include "studio/command.h"
 #include "tests/studio/made_show.h"
@@ -88,8 +91,19 @@ TEST_F(CommandLine, ListsEveryCommand) {
   const Outcome outcome = run("--help");
   EXPECT_EQ(outcome.status, 0);
   for (const Command& command : commands()) {
-    EXPECT_THAT(outcome.out, HasSubstr(std::string(command.summary)));
+    const bool grouped = !command.group_summary.empty();
+    EXPECT_THAT(outcome.out,
+                HasSubstr(std::string(grouped ? command.group_summary : command.summary)));
   }
+}
+
+TEST_F(CommandLine, FindsCommandsOfTwoWords) {
+  EXPECT_EQ(run("calibrate").status, 2);
+  EXPECT_EQ(run("calibrate respons").status, 2);
+  const Outcome outcome = run("calibrate response");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("platelight calibrate response --help"));
+  EXPECT_EQ(run("calibrate --help").status, 0);
 }
 
 TEST_F(CommandLine, ReturnsTwoAndOneLineForWrongUsage) {
@@ -313,6 +327,79 @@ TEST_F(Runs, ConvertAnHdrPicture) {
   }
   EXPECT_EQ(run("hdr " + (dir_ / "sky.exr").string() + " -o out.jpg").status, 2);
   EXPECT_EQ(run("hdr " + (dir_ / "absent.jpg").string() + " -o " + out).status, 1);
+}
+
+// Shots of a sensor of 8 bits, to files; their paths, space-separated.
+std::string write_shots(const std::filesystem::path& directory,
+                        const capture::MadeSensor& sensor,
+                        const std::vector<double>& exposures_s) {
+  capture::Image scene = capture::make_image(192, 192);
+  for (int y = 0; y < scene.height; ++y) {
+    for (int x = 0; x < scene.width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        const int patch = (y / 16 * 12 + x / 16 + 5 * c) % 17;
+        scene.at(y, x, c) = static_cast<float>(std::exp2(-patch / 2.0) * (1 + 0.1 * (x % 16) / 16));
+      }
+    }
+  }
+  std::string paths;
+  for (std::size_t i = 0; i < exposures_s.size(); ++i) {
+    const capture::MadeShot shot = capture::expose(sensor, scene, exposures_s[i], i);
+    const std::filesystem::path path = directory / ("shot" + std::to_string(i) + ".png");
+    const std::vector<std::uint8_t> codes(shot.codes.begin(), shot.codes.end());
+    capture::write_png(path, shot.width, shot.height, 3, codes);
+    paths += path.string() + " ";
+  }
+  return paths;
+}
+
+TEST_F(CommandLine, CalibratesALinearSensorFromItsShots) {
+  const capture::MadeSensor sensor{
+      .full_well_e = 4000, .read_noise_e = 20, .bits = 8, .pedestal = 12};
+  const std::string shots = write_shots(dir_, sensor, {0.1, 0.1, 0.4, 0.4, 1.5, 1.5});
+  const std::string out = (dir_ / "camera.toml").string();
+  const std::string json = (dir_ / "response.json").string();
+  const std::string command = "calibrate response " + shots + "-o " + out + " --json " + json;
+  const Outcome outcome = run(command + " --exposures 0.1,1/10,0.4,0.4,1.5,3/2");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("electrons per code"));
+  const auto figures = nlohmann::json::parse(content_of(json));
+  EXPECT_EQ(figures["model"], "linear");
+  EXPECT_NEAR(figures["black"][0]["value"], 12, 0.5);
+  EXPECT_NEAR(figures["gain"][1]["value"], 4000.0 / 243, 2);
+  EXPECT_NEAR(figures["read_noise_e"][2]["value"], 20, 3);
+  for (const char* key : {"parameters", "saturation", "noise", "warnings", "time_ms"}) {
+    EXPECT_TRUE(figures.contains(key)) << key;
+  }
+  EXPECT_TRUE(capture::read_response(out).linear);
+
+  EXPECT_EQ(run(command + " --exposures 0.1,0.4").status, 2);
+  EXPECT_EQ(run(command + " --exposures soon").status, 2);
+  EXPECT_EQ(run("calibrate response " + shots + "-o a.txt").status, 2);
+  const Outcome untold = run(command);  // PNG files tell no exposures
+  EXPECT_EQ(untold.status, 1);
+  expect_one_line(untold.err);
+  const Outcome equal = run(command + " --exposures 1,1,1,1,1,1");
+  EXPECT_EQ(equal.status, 1);
+  EXPECT_THAT(equal.err, HasSubstr("all shots have one exposure"));
+  EXPECT_EQ(run("calibrate response replay:" + (dir_ / "absent").string() + " -o " + out).status,
+            1);
+}
+
+TEST_F(CommandLine, CalibratesACurveWithItsCandidates) {
+  const capture::MadeSensor sensor{
+      .full_well_e = 40'000, .read_noise_e = 4, .bits = 8, .transfer = capture::Transfer::srgb};
+  const std::string shots = write_shots(dir_, sensor, {0.02, 0.1, 0.1, 0.5, 2});
+  const std::string out = (dir_ / "camera.toml").string();
+  const std::string json = (dir_ / "response.json").string();
+  const Outcome outcome = run("calibrate response " + shots + "-o " + out + " --json " + json +
+                              " --exposures 0.02,0.1,0.1,0.5,2");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto figures = nlohmann::json::parse(content_of(json));
+  EXPECT_EQ(figures["model"], "sRGB");
+  EXPECT_GT(figures["candidates"].size(), 6U);
+  EXPECT_LT(figures["heldout_error"], 0.03);
+  EXPECT_EQ(capture::read_response(out).curve.name, "sRGB");
 }
 
 }  // namespace
