@@ -1,0 +1,271 @@
+// Vignetting by least squares over logarithms, places' light eliminated.
+#include "calibrate/vignetting_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+
+#include <Eigen/Dense>
+
+#include "calibrate/vignetting.h"
+
+namespace calibrate {
+namespace {
+
+constexpr int most_terms = 4;
+constexpr double least_sensitivity = 0.02;  // whose logarithm is taken
+constexpr int folds = 5;
+
+// Samples of one place follow each other.
+struct Places {
+  std::vector<VignettingSample> samples;
+  std::vector<std::size_t> begins;  // of each place, and the end
+};
+
+Places by_place(std::span<const VignettingSample> samples) {
+  Places places;
+  places.samples.assign(samples.begin(), samples.end());
+  std::stable_sort(places.samples.begin(), places.samples.end(),
+                   [](const auto& a, const auto& b) { return a.place < b.place; });
+  for (std::size_t i = 0; i < places.samples.size(); ++i) {
+    if (i == 0 || places.samples[i].place != places.samples[i - 1].place) {
+      places.begins.push_back(i);
+    }
+  }
+  places.begins.push_back(places.samples.size());
+  return places;
+}
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double log_sensitivity(std::span<const double> terms, double angle_rad) {
+  return std::log(std::max(least_sensitivity, sensitivity(terms, angle_rad)));
+}
+
+// What samples tell beyond the sensitivity: the place's light, left over after its median.
+std::vector<double> residuals_of(const Places& places, std::span<const double> terms) {
+  std::vector<double> residuals;
+  std::vector<double> logs;
+  for (std::size_t p = 0; p + 1 < places.begins.size(); ++p) {
+    logs.clear();
+    for (std::size_t i = places.begins[p]; i < places.begins[p + 1]; ++i) {
+      logs.push_back(std::log(places.samples[i].radiance) -
+                     log_sensitivity(terms, places.samples[i].angle_rad));
+    }
+    double centre = 0;
+    for (const double log : logs) centre += log / static_cast<double>(logs.size());
+    if (logs.size() > 4) centre = median_of(logs);
+    for (const double log : logs) residuals.push_back(log - centre);
+  }
+  return residuals;
+}
+
+// Gauss-Newton; `used` says which samples count.
+std::vector<double> solve(const Places& places, int count, const std::vector<bool>& used) {
+  std::vector<double> terms(static_cast<std::size_t>(count), 0.0);
+  constexpr int rounds = 20;
+  for (int round = 0; round < rounds && count > 0; ++round) {
+    const std::vector<double> residuals = residuals_of(places, terms);
+    std::vector<double> sizes;
+    for (const double r : residuals) sizes.push_back(std::abs(r));
+    const double spread = std::max(1e-6, 1.4826 * median_of(std::move(sizes)));
+    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(count, count);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
+    for (std::size_t p = 0; p + 1 < places.begins.size(); ++p) {
+      // The derivatives of log sensitivity, less their weighted mean over the place.
+      double weights = 0;
+      Eigen::VectorXd mean = Eigen::VectorXd::Zero(count);
+      double mean_residual = 0;
+      std::vector<std::pair<Eigen::VectorXd, double>> rows;
+      std::vector<double> row_weights;
+      for (std::size_t i = places.begins[p]; i < places.begins[p + 1]; ++i) {
+        if (!used[i]) continue;
+        const double angle = places.samples[i].angle_rad;
+        const double s = std::max(least_sensitivity, sensitivity(terms, angle));
+        Eigen::VectorXd row(count);
+        double power = 1;
+        for (int t = 0; t < count; ++t) row[t] = (power *= angle * angle) / s;
+        constexpr double width_squared = 9;
+        const double weight =
+            1 / (1 + residuals[i] * residuals[i] / (spread * spread * width_squared));
+        mean += weight * row;
+        mean_residual += weight * residuals[i];
+        weights += weight;
+        rows.emplace_back(std::move(row), residuals[i]);
+        row_weights.push_back(weight);
+      }
+      if (rows.size() < 2) continue;
+      mean /= weights;
+      mean_residual /= weights;
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        const Eigen::VectorXd row = rows[i].first - mean;
+        matrix += row_weights[i] * row * row.transpose();
+        right += row_weights[i] * (rows[i].second - mean_residual) * row;
+      }
+    }
+    matrix.diagonal().array() += 1e-9 * std::max(1.0, matrix.diagonal().maxCoeff());
+    const Eigen::VectorXd step = matrix.ldlt().solve(right);
+    for (int t = 0; t < count; ++t) terms[static_cast<std::size_t>(t)] += step[t];
+    if (step.cwiseAbs().maxCoeff() < 1e-7) break;
+  }
+  return terms;
+}
+
+// Places are held out; samples, where there is one place.
+double heldout_error(const Places& places, int count) {
+  const bool one_place = places.begins.size() == 2;
+  std::vector<double> squares;
+  for (int fold = 0; fold < folds; ++fold) {
+    std::vector<bool> used(places.samples.size(), true);
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      const std::size_t key = one_place ? i : places.samples[i].place;
+      if (key * 2654435761U % 4294967296U % folds == static_cast<unsigned>(fold)) used[i] = false;
+    }
+    const std::vector<double> residuals = residuals_of(places, solve(places, count, used));
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      if (!used[i]) squares.push_back(residuals[i] * residuals[i]);
+    }
+  }
+  if (squares.empty()) return std::numeric_limits<double>::infinity();
+  // Without the largest hundredth: what moved.
+  std::sort(squares.begin(), squares.end());
+  squares.resize(std::max<std::size_t>(1, squares.size() - squares.size() / 100));
+  double sum = 0;
+  for (const double square : squares) sum += square;
+  return std::sqrt(sum / static_cast<double>(squares.size()));
+}
+
+void check(std::span<const VignettingSample> samples, const Places& places) {
+  for (const VignettingSample& sample : samples) {
+    if (!(sample.radiance > 0) || !std::isfinite(sample.radiance) || !(sample.angle_rad >= 0) ||
+        !std::isfinite(sample.angle_rad)) {
+      throw std::invalid_argument("samples of vignetting need radiance above 0 and an angle");
+    }
+  }
+  constexpr double least_spread_rad = 0.1;
+  constexpr std::size_t least_samples = 50;
+  std::size_t telling = 0;
+  for (std::size_t p = 0; p + 1 < places.begins.size(); ++p) {
+    const auto first = places.samples.begin() + static_cast<std::ptrdiff_t>(places.begins[p]);
+    const auto last = places.samples.begin() + static_cast<std::ptrdiff_t>(places.begins[p + 1]);
+    const auto [low, high] = std::minmax_element(
+        first, last, [](const auto& a, const auto& b) { return a.angle_rad < b.angle_rad; });
+    if (high->angle_rad - low->angle_rad > least_spread_rad) {
+      telling += static_cast<std::size_t>(last - first);
+    }
+  }
+  if (telling < least_samples) {
+    throw std::runtime_error(
+        "too few places are seen at different angles off the axis to tell vignetting; turn the "
+        "camera by tens of degrees between shots, or take an even field");
+  }
+}
+
+// The mean over 3 x 3 pixels and channels, if it can be used.
+std::optional<double> sample_at(const capture::Image& image, Vec2 q, double saturation) {
+  const int x = static_cast<int>(std::lround(q.x));
+  const int y = static_cast<int>(std::lround(q.y));
+  if (x < 1 || y < 1 || x + 1 >= image.width || y + 1 >= image.height) return std::nullopt;
+  double sum = 0;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      double mean = 0;
+      for (int c = 0; c < image.channels; ++c) {
+        const auto value = static_cast<double>(image.at(y + dy, x + dx, c));
+        if (!std::isfinite(value) || value >= saturation) return std::nullopt;
+        mean += value / image.channels;
+      }
+      low = std::min(low, mean);
+      high = std::max(high, mean);
+      sum += mean / 9;
+    }
+  }
+  constexpr double uneven = 0.1;
+  if (!(sum > 0) || high - low > uneven * sum) return std::nullopt;
+  return sum;
+}
+
+double angle_of(Vec3 v_cam) { return std::atan2(std::hypot(v_cam.x, v_cam.y), v_cam.z); }
+
+void check_size(const capture::Image& image, const Lens& lens) {
+  if (image.width != lens.width || image.height != lens.height || image.empty()) {
+    throw std::invalid_argument("shots for vignetting have the lens's size");
+  }
+}
+
+}  // namespace
+
+VignettingFit fit_vignetting(std::span<const VignettingSample> samples) {
+  const Places places = by_place(samples);
+  check(samples, places);
+  VignettingFit fit;
+  double best = std::numeric_limits<double>::infinity();
+  for (int count = 0; count <= most_terms; ++count) {
+    fit.candidates.push_back({count, heldout_error(places, count)});
+    best = std::min(best, fit.candidates.back().heldout_error);
+  }
+  constexpr double as_good = 1.1;
+  const auto chosen =
+      std::find_if(fit.candidates.begin(), fit.candidates.end(),
+                   [&](const auto& c) { return c.heldout_error <= as_good * best; });
+  fit.terms = solve(places, chosen->terms, std::vector<bool>(places.samples.size(), true));
+  fit.heldout_error = chosen->heldout_error;
+  for (const VignettingSample& sample : samples) {
+    fit.max_angle_rad = std::max(fit.max_angle_rad, sample.angle_rad);
+  }
+  return fit;
+}
+
+std::vector<VignettingSample> turned_samples(std::span<const TurnedShot> shots,
+                                             const Lens& lens,
+                                             double saturation) {
+  if (shots.empty()) throw std::invalid_argument("there are no shots to tell vignetting");
+  for (const TurnedShot& shot : shots) check_size(*shot.radiance, lens);
+  constexpr std::size_t directions = 4000;
+  std::vector<VignettingSample> samples;
+  for (std::size_t i = 0; i < directions; ++i) {
+    // Fibonacci's spiral: evenly over the sphere.
+    const double z = 1 - 2 * (static_cast<double>(i) + 0.5) / directions;
+    const double turn = static_cast<double>(i) * std::numbers::pi * (3 - std::sqrt(5.0));
+    const double r = std::sqrt(1 - z * z);
+    const Vec3 v_set{r * std::cos(turn), r * std::sin(turn), z};
+    for (const TurnedShot& shot : shots) {
+      const Vec3 v_cam = shot.cam_from_set.R * v_set;
+      const std::optional<Vec2> q = project(lens, v_cam);
+      if (!q) continue;
+      if (const auto value = sample_at(*shot.radiance, *q, saturation)) {
+        samples.push_back({i, angle_of(v_cam), *value});
+      }
+    }
+  }
+  return samples;
+}
+
+std::vector<VignettingSample> even_field_samples(const capture::Image& radiance,
+                                                 const Lens& lens,
+                                                 double saturation) {
+  check_size(radiance, lens);
+  constexpr int across = 80;
+  const int step = std::max(3, std::max(lens.width, lens.height) / across);
+  std::vector<VignettingSample> samples;
+  for (int y = 1; y < lens.height; y += step) {
+    for (int x = 1; x < lens.width; x += step) {
+      const Vec2 q{static_cast<double>(x), static_cast<double>(y)};
+      const std::optional<Vec3> v_cam = unproject(lens, q);
+      const std::optional<double> value = sample_at(radiance, q, saturation);
+      if (v_cam && value) samples.push_back({0, angle_of(*v_cam), *value});
+    }
+  }
+  return samples;
+}
+
+}  // namespace calibrate
