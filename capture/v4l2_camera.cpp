@@ -76,6 +76,7 @@ class V4l2Camera final : public Camera {
   int time_outs_ = 0;
   std::string away_note_;
   Time next_search_{};
+  std::optional<double> asked_exposure_s_;  // the last one
 };
 
 V4l2Camera::V4l2Camera(std::string_view rest,
@@ -172,6 +173,7 @@ bool V4l2Camera::search() {
     const auto path = find_v4l2(io_, identity_);
     if (!path) return false;
     auto stream = std::make_unique<V4l2Stream>(io_, *path, settings_);
+    if (asked_exposure_s_) stream->set_exposure(*asked_exposure_s_);
     frames_.set_layout(stream->layout(), crop_);
     stream_ = std::move(stream);
   } catch (const std::runtime_error& error) {
@@ -204,17 +206,19 @@ void V4l2Camera::read_next() {
 double V4l2Camera::set_exposure(double exposure_s) {
   if (!stream_) throw std::runtime_error(uri_ + " is away: " + away_note_);
   try {
-    return stream_->set_exposure(exposure_s);
+    const double taken_s = stream_->set_exposure(exposure_s);
+    asked_exposure_s_ = taken_s;
+    return taken_s;
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(uri_ + ": " + words_of_error(error));
   }
 }
 
-// Gives the device up until it can be opened again.
+// Gives the device up until it can be opened again: at once, unless it was just opened.
 void V4l2Camera::leave(const std::string& note) {
   stream_.reset();
   away_note_ = note;
-  next_search_ = io_->now();
+  next_search_ = std::max(next_search_, io_->now());
 }
 
 void V4l2Camera::read_buffer(const V4l2Buffer& buffer) {

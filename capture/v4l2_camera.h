@@ -14,7 +14,7 @@ namespace capture {
 // come as the device fills its buffers; next() waits for them. Gaps in the device's numbers and
 // time-outs are lost frames, pictures that driver or decoder call faulty are damaged ones. A device
 // that fails or is unplugged gives lost frames at its rate until the same one (bus and name, not
-// node number) is back, with all its settings.
+// node number) is back, with all its settings and the exposure that was asked for last.
 //
 // Throws std::runtime_error naming the device, what was asked, and what is possible.
 std::unique_ptr<Camera> open_v4l2(std::string_view rest,

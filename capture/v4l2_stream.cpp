@@ -250,6 +250,9 @@ void V4l2Stream::give_back() {
 std::optional<V4l2Buffer> V4l2Stream::next(Time longest) {
   give_back();
   const int ready = node_.io().wait(node_.descriptor(), longest);
+  if (ready == 0 && gave_up_) {
+    throw std::runtime_error("the stream ended: the driver gave empty buffers, then no more");
+  }
   if (ready == 0) return std::nullopt;
   if (ready < 0) fail("the stream ended", -ready);
   v4l2_buffer filled{};
@@ -264,6 +267,7 @@ std::optional<V4l2Buffer> V4l2Stream::next(Time longest) {
   held_ = filled.index;
   const Mapping& mapping = *mappings_[filled.index];
   V4l2Buffer buffer = stamp_of(filled);
+  gave_up_ = buffer.marked_faulty && filled.bytesused == 0;
   buffer.bytes = {mapping.memory, std::min<std::size_t>(filled.bytesused, mapping.bytes)};
   return buffer;
 }

@@ -66,6 +66,7 @@ class V4l2Stream {
   bool exposure_is_ours_ = false;
   std::vector<std::unique_ptr<Mapping>> mappings_;
   std::optional<std::uint32_t> held_;  // the buffer that was lent last
+  bool gave_up_ = false;  // the last buffer was faulty and empty, as of drivers that give all back
   bool streaming_ = false;
 };
 

@@ -100,6 +100,22 @@ TEST_F(V4l2CameraTest, RefusesExposuresThatItHasNot) {
   EXPECT_THROW(camera->set_exposure(0.01), std::runtime_error);
 }
 
+TEST_F(V4l2CameraTest, ReturnsWithTheExposureThatWasAskedForLast) {
+  const auto camera = open("/dev/video0?format=YUYV&auto_exposure=1&exposure_time_absolute=50");
+  camera->next();
+  for (const double exposure_s : {0.02, 0.03}) camera->set_exposure(exposure_s);
+  device().controls[1].value = V4L2_EXPOSURE_APERTURE_PRIORITY;
+  device().controls[2].value = 7;
+  device().events.push_back({.wait_result = -EIO});
+  std::optional<Frame> frame;
+  do {
+    frame = camera->next();
+  } while (frame->status == FrameStatus::lost);
+  EXPECT_EQ(device().controls[1].value, V4L2_EXPOSURE_MANUAL);
+  EXPECT_EQ(device().controls[2].value, 300);
+  EXPECT_EQ(frame->exposure_s, 0) << "which frame has it is not known";
+}
+
 TEST_F(V4l2CameraTest, KeepsWhatCameIfAsked) {
   CameraOptions options;
   options.keep_coded = true;
@@ -245,6 +261,30 @@ TEST_F(V4l2CameraTest, StartsAStreamAnewThatIsSilent) {
   for (int i = 0; i < 4; ++i) camera->next();
   EXPECT_EQ(io_->open_nodes, 0) << "the camera was let go";
   EXPECT_EQ(camera->next()->status, FrameStatus::good);
+}
+
+TEST_F(V4l2CameraTest, StartsAStreamAnewThatEndsWithEmptyBuffers) {
+  const auto camera = open("/dev/video0?format=YUYV");
+  camera->next();
+  const FakeEvent empty{.sequence_step = 0, .flags = V4L2_BUF_FLAG_ERROR, .bytes_short = 6144};
+  device().events.assign(4, empty);
+  for (int i = 0; i < 4; ++i) EXPECT_THAT(camera->next()->note, HasSubstr("0 of 6144"));
+  EXPECT_EQ(camera->next()->status, FrameStatus::good) << "it may go on";
+  device().events.assign(2, empty);
+  device().events.push_back({.wait_result = 0});
+  for (int i = 0; i < 2; ++i) camera->next();
+  EXPECT_THAT(camera->next()->note, HasSubstr("the stream ended"));
+  EXPECT_EQ(io_->open_nodes, 0) << "the camera was let go";
+  EXPECT_EQ(camera->next()->status, FrameStatus::good);
+}
+
+TEST_F(V4l2CameraTest, WaitsBetweenStartsThatEndAtOnce) {
+  const auto camera = open("/dev/video0?format=YUYV");
+  camera->next();
+  device().events.assign(1000, {.wait_result = -EIO});
+  const Time start = io_->clock;
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(camera->next()->status, FrameStatus::lost);
+  EXPECT_GT(io_->clock - start, 2s) << "frames are lost at about the camera's rate";
 }
 
 TEST_F(V4l2CameraTest, ComesBackAfterErrorsOfTheDriver) {
