@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs a command under Debian's kernel in QEMU, with made cameras of the vivid driver.
+# Runs a command under Debian's kernel in QEMU, with made cameras of the vivid driver, and a made USB
+# host controller into which a command can plug devices of its own.
 #   tests/guest/boot.sh COMMAND [ARGUMENTS...]
 # The guest sees this machine's files, read-only, and the same working directory. Ends with the
 # command's exit status; 124 = out of time, 125 = the guest died, 77 = cannot run here, with the
@@ -35,7 +36,7 @@ if [ ! -e "$kernel_root/lib/modules/$version/modules.dep.bin" ]; then
   cp -rs "$(realpath "$kernel_root/lib/modules/$version")/." "$module_root/lib/modules/$version/"
   depmod -b "$module_root" "$version"
 fi
-for module in virtio_pci 9pnet_virtio 9p vivid; do
+for module in virtio_pci 9pnet_virtio 9p vivid vhci-hcd uvcvideo; do
   modprobe -d "$module_root" -S "$version" --show-depends "$module" 2>/dev/null ||
     skip "the kernel has no module $module"
 done | while read -r verb path _; do
