@@ -121,6 +121,7 @@ void AravisCamera::open(const CameraOptions& options) {
   info_.width = crop_.width;
   info_.height = crop_.height;
   info_.rate = stream_->rate();
+  info_.live = true;
   exposures_ = stream_->exposure_range();
   set_exposures_s_[0] = settings_.exposure_s.value_or(0);
   last_sign_ = monotonic_now();

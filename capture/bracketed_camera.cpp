@@ -141,7 +141,8 @@ std::optional<Frame> BracketedCamera::next() {
     frame->exposure_s = label.exposure_s;
     // Nothing contradicts the lag, and what such a picture holds in a few places (the sun) is
     // wanted.
-    if (label.verdict == LabelVerdict::unknown && labeller_.lag()) {
+    if (label.verdict == LabelVerdict::unknown && label.evidence.fit == Fit::silent &&
+        labeller_.lag()) {
       frame->exposure_s = label.predicted_s;
     }
     counts_.accepted += label.verdict == LabelVerdict::accepted;

@@ -19,7 +19,7 @@ namespace render {
 //
 // The last two are GigE Vision cameras of this process, read over packets by aravis: as time goes
 // by (made_gige_camera.h): `lag` is how many frames pass until an exposure has effect, `loss` how
-// many packets in a thousand are lost. The plate has RGB8, the probe linear BayerRG12.
+// many packets in a thousand are lost. Both have linear codes, BayerRG12.
 void register_made_cameras();
 
 }  // namespace render

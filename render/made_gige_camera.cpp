@@ -24,7 +24,7 @@ class View {
   explicit View(const MadeCameraRequest& request)
       : studio_(make_studio(request.studio)),
         camera_(request.probe ? studio_.probe : studio_.plate),
-        sensor_(sensor_of(request, camera_)) {
+        sensor_(sensor_of(camera_)) {
     const Scene court(studio_.place);
     parts_ = photograph_parts(studio_, court, calibrate::make_direction_table(camera_.lens),
                               camera_.cam_from_set, {.samples = request.samples});
@@ -32,13 +32,11 @@ class View {
 
   const MadeCamera& camera() const { return camera_; }
 
-  // What the sensor of a machine-vision probe gives is linear, with 12 bits.
-  static capture::MadeSensor sensor_of(const MadeCameraRequest& request, const MadeCamera& camera) {
+  // What machine-vision cameras give is linear, with 12 bits.
+  static capture::MadeSensor sensor_of(const MadeCamera& camera) {
     capture::MadeSensor sensor = camera.sensor;
-    if (request.probe) {
-      sensor.bits = 12;
-      sensor.transfer = capture::Transfer::linear;
-    }
+    sensor.bits = 12;
+    sensor.transfer = capture::Transfer::linear;
     return sensor;
   }
 
@@ -87,7 +85,7 @@ class MadeGige final : public capture::Camera {
     capture::MadeGigeSettings settings;
     settings.width = camera.lens.width;
     settings.height = camera.lens.height;
-    settings.formats = {request.probe ? "BayerRG12" : "RGB8"};
+    settings.formats = {"BayerRG12"};
     settings.rate = request.rate > 0 ? request.rate : camera.rate.value();
     settings.exposures = {1e-6, 1};
     settings.exposure_s = camera.exposures_s.front();

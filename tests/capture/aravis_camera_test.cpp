@@ -232,6 +232,7 @@ TEST_F(AravisCameraTest, CountsOnOverTheEndOfItsNumbers) {
   settings.exposure_s = 1e-3;
   make(settings);
   const auto camera = open("?format=Mono12");
+  EXPECT_TRUE(camera->info().live);
   int last = code(*camera->next(), 0);
   for (int i = 1; i < 100; ++i) {
     const auto frame = camera->next();
