@@ -219,7 +219,9 @@ CodeTable response_code_table(const Response& response, int channel, double code
         least_step, (light[static_cast<std::size_t>(high)] - light[static_cast<std::size_t>(low)]) /
                         (high - low));
     table.value.push_back(light[static_cast<std::size_t>(code)]);
-    table.variance.push_back(code < saturated ? step * step * code_sigma * code_sigma : infinite);
+    // A linear sensor may be full below the last code: its curve is flat from there on.
+    const bool full = code >= saturated || !(light[static_cast<std::size_t>(code)] < light.back());
+    table.variance.push_back(full ? infinite : step * step * code_sigma * code_sigma);
   }
   return table;
 }

@@ -401,5 +401,17 @@ TEST(MergeTables, MergeThreeShotsOf512x512In1500Microseconds) {
   EXPECT_LT(best_us, 1500);
 }
 
+TEST(ResponseCodeTable, TakesCodesFromAFullWellOnForSaturated) {
+  Response response = linear_response();  // of a sensor that is full at code 200
+  for (auto& channel : response.light) {
+    for (std::size_t z = 0; z < channel.size(); ++z) {
+      channel[z] = std::min(1.0, static_cast<double>(z) / 200);
+    }
+  }
+  const CodeTable table = response_code_table(response, 0);
+  EXPECT_TRUE(std::isfinite(table.variance[199]));
+  for (std::size_t z = 200; z < 256; ++z) EXPECT_TRUE(std::isinf(table.variance[z])) << z;
+}
+
 }  // namespace
 }  // namespace capture
