@@ -51,7 +51,10 @@ struct CameraOptions {
   Rational picture_rate{25, 1};            // of sequences, and of stills that loop
   std::string base_dir;                    // relative paths start here
   std::string response;                    // .rsp or .toml file (camera_response.h); "" = by colour
-  bool keep_coded = false;                 // live cameras' frames keep the bytes that came
+  // Bayer pictures: colours that were interpolated near saturated sites, and so are darker than the
+  // light was, are no values (NaN). For brackets.
+  bool mark_saturated = false;
+  bool keep_coded = false;  // live cameras' frames keep the bytes that came
 };
 
 // Exposure times that a camera can be set to.

@@ -235,10 +235,14 @@ class JpegReader final : public CodedPictureReader::Reader {
   libav::FrameHandle frame_;
 };
 
+constexpr float saturation = 0.98F;  // as NoiseModel has it
+
 class RawReader final : public CodedPictureReader::Reader {
  public:
   RawReader(const CodedLayout& layout, const RawLayout& raw, const LightCurves& curves)
-      : raw_(raw), by_response_(curves.response.has_value()) {
+      : raw_(raw),
+        by_response_(curves.response.has_value()),
+        mark_saturated_(curves.mark_saturated) {
     const std::size_t least = packed_row_bytes(raw.packing, layout.width);
     row_bytes_ = layout.row_bytes == 0 ? least : layout.row_bytes;
     if (row_bytes_ < least || row_bytes_ > 8 * least + 65536) {
@@ -273,6 +277,7 @@ class RawReader final : public CodedPictureReader::Reader {
       }
     }
     demosaic(mosaic_, raw_.pattern, crop, image);
+    if (mark_saturated_) mark_saturated(mosaic_, raw_.pattern, saturation, crop, image);
     return {};
   }
 
@@ -317,6 +322,7 @@ class RawReader final : public CodedPictureReader::Reader {
 
   RawLayout raw_;
   bool by_response_;
+  bool mark_saturated_;
   std::size_t row_bytes_ = 0;
   Mosaic mosaic_;
   std::vector<std::uint16_t> codes_;

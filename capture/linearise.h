@@ -24,6 +24,7 @@ using Curve = std::function<double(double)>;
 struct LightCurves {
   PlateColour colour;                            // for all channels
   std::optional<std::array<Curve, 3>> response;  // instead, whatever the tags say
+  bool mark_saturated = false;                   // see CameraOptions
 };
 
 // Turns pictures into light by tables, as colour.md defines it. Keeps tables and row buffers

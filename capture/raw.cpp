@@ -2,6 +2,7 @@
 #include "capture/raw.h"
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 namespace capture {
@@ -185,6 +186,34 @@ void demosaic(Mosaic& mosaic, BayerPattern pattern, const Crop& crop, Image& ima
         to[own] = near.colour_beside();
         to[1] = near.own;
         to[2 - own] = near.colour_above();
+      }
+    }
+  }
+}
+
+void mark_saturated(
+    const Mosaic& mosaic, BayerPattern pattern, float saturation, const Crop& crop, Image& image) {
+  constexpr int reach = Mosaic::margin;
+  const auto width = static_cast<std::size_t>(crop.width);
+  std::vector<std::uint8_t> above(width + 2 * reach);  // columns from crop.x - reach on
+  for (int y = crop.y; y < crop.y + crop.height; ++y) {
+    // The columns that have a saturated site in the rows that count.
+    std::ranges::fill(above, std::uint8_t{0});
+    for (int from = y - reach; from <= y + reach; ++from) {
+      const float* row = mosaic.row(from) + crop.x - reach;
+      for (std::size_t x = 0; x < above.size(); ++x) {
+        above[x] |= row[x] >= saturation ? std::uint8_t{1} : std::uint8_t{0};
+      }
+    }
+    std::uint8_t any = 0;
+    for (const std::uint8_t one : above) any |= one;
+    if (any == 0) continue;
+    for (int x = 0; x < crop.width; ++x) {
+      const auto first = above.begin() + x;
+      if (std::find(first, first + 2 * reach + 1, 1) == first + 2 * reach + 1) continue;
+      const int own = colour_of_site(pattern, y, crop.x + x);
+      for (int c = 0; c < 3; ++c) {
+        if (c != own) image.at(y - crop.y, x, c) = std::numeric_limits<float>::quiet_NaN();
       }
     }
   }

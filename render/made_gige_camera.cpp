@@ -18,6 +18,29 @@ namespace {
 
 constexpr int sun_steps = 64;  // that the sun's strength is rounded to
 
+// A row or column of (1, 2, 1) / 4: what lies `step` apart becomes one.
+void soften(capture::Image& image, int size, std::size_t step, std::size_t from) {
+  float* value = image.pixels.data() + from;
+  float before = *value;
+  for (int i = 0; i < size; ++i, value += step) {
+    const float after = i + 1 < size ? value[step] : *value;
+    const float softened = (before + 2 * *value + after) / 4;
+    before = *value;
+    *value = softened;
+  }
+}
+
+// The optical low-pass filter that stands before Bayer mosaics, so that a point, such as the sun,
+// is seen by sites of all colours alike.
+void filter_for_mosaic(capture::Image& image) {
+  const auto width = static_cast<std::size_t>(image.width);
+  const std::size_t row = 3 * width;
+  for (std::size_t y = 0; y < static_cast<std::size_t>(image.height); ++y) {
+    for (std::size_t c = 0; c < 3; ++c) soften(image, image.width, 3, y * row + c);
+  }
+  for (std::size_t x = 0; x < row; ++x) soften(image, image.height, row, x);
+}
+
 // One of the studio's cameras with all that it sees.
 class View {
  public:
@@ -46,6 +69,7 @@ class View {
     const int step = static_cast<int>(std::lround(strength * sun_steps));
     if (step != step_) {
       radiance_ = add_light(parts_, static_cast<float>(step) / sun_steps);
+      filter_for_mosaic(radiance_);
       step_ = step;
     }
     sensor_.expose(radiance_, wanted.exposure_s, static_cast<std::uint64_t>(wanted.number), shot_);

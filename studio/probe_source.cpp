@@ -67,6 +67,7 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
   options.colour.transfer = probe.colour;
   options.response = probe.response;
   options.loop = set.camera.loop;
+  options.mark_saturated = true;
   if (set.show.fps) options.picture_rate = *set.show.fps;
   std::unique_ptr<capture::Camera> camera = capture::open_camera(probe.source, options);
   const bool brackets = camera->info().live && !exposures_s_.empty();

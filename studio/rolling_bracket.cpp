@@ -11,7 +11,7 @@ namespace {
 
 constexpr double same_exposure = 0.02;  // relative
 constexpr std::size_t most_shots = 16;  // of a window
-constexpr std::int64_t longest_cycles = 3;
+constexpr std::int64_t longest_cycles = 8;
 
 }  // namespace
 

@@ -15,7 +15,7 @@ namespace studio {
 
 // Merges a camera that cycles through exposures: every new shot takes the place of the one before
 // of about the same exposure, so that each shot gives a new radiance picture, at the camera's full
-// rate. A shot whose exposure does not come again stays for three cycles.
+// rate. A shot whose exposure does not come again stays for eight cycles.
 class RollingBracket {
  public:
   // `cycle` is how many shots the camera takes until its exposures repeat, 1 to 16.

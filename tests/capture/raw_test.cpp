@@ -229,5 +229,31 @@ TEST(Demosaic, RefusesGreySensorsAndPartsBeyondThem) {
   EXPECT_THROW(mosaic.resize(3, 8), std::invalid_argument);
 }
 
+TEST(MarkSaturated, LeavesOutWhatWasInterpolatedFromSaturatedSites) {
+  Mosaic mosaic;
+  mosaic.resize(20, 16);
+  for (int y = 0; y < 16; ++y) std::fill_n(mosaic.row(y), 20, 0.5F);
+  mosaic.row(7)[9] = 1;
+  for (const Crop crop : {Crop{0, 0, 20, 16}, Crop{8, 7, 5, 4}, Crop{0, 0, 8, 16}}) {
+    Image image;
+    demosaic(mosaic, BayerPattern::rggb, crop, image);
+    const Image before = image;
+    mark_saturated(mosaic, BayerPattern::rggb, 0.98F, crop, image);
+    for (int y = 0; y < crop.height; ++y) {
+      for (int x = 0; x < crop.width; ++x) {
+        const bool near = std::abs(crop.x + x - 9) <= 2 && std::abs(crop.y + y - 7) <= 2;
+        for (int c = 0; c < 3; ++c) {
+          const bool own = colour_of_site(BayerPattern::rggb, crop.y + y, crop.x + x) == c;
+          if (near && !own) {
+            EXPECT_TRUE(std::isnan(image.at(y, x, c))) << x << ' ' << y;
+          } else {
+            EXPECT_EQ(image.at(y, x, c), before.at(y, x, c)) << x << ' ' << y;
+          }
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace capture

@@ -11,12 +11,15 @@ constexpr std::uint8_t video_class = 0x0e;
 
 // A descriptor with its length in front.
 Bytes sized(const Bytes& body) {
-  Bytes all{static_cast<std::uint8_t>(body.size() + 1)};
-  all.insert(all.end(), body.begin(), body.end());
+  Bytes all(body.size() + 1);
+  all[0] = static_cast<std::uint8_t>(all.size());
+  std::ranges::copy(body, all.begin() + 1);
   return all;
 }
 
-void join(Bytes& bytes, const Bytes& more) { bytes.insert(bytes.end(), more.begin(), more.end()); }
+void join(Bytes& bytes, const Bytes& more) {
+  for (const std::uint8_t byte : more) bytes.push_back(byte);
+}
 
 // VideoControl: a camera whose exposure can be set, and where its pictures go.
 Bytes control_descriptors() {

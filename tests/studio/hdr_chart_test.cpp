@@ -48,7 +48,7 @@ TEST(HdrChart, HasMergesThatErrNoMoreThanOpenCvsAndTellTheirDeviation) {
 
 // The worst sample of each says so: by its status, or by a deviation as large as its error.
 TEST(HdrChart, SaysWhereItFails) {
-  EXPECT_EQ(quick_chart().stressors.size(), 7U);
+  EXPECT_EQ(quick_chart().stressors.size(), 9U);
   for (const char* wrong : {"light, times what", "members missing, the shortest"}) {
     EXPECT_TRUE(stressor_of(wrong).samples.back().status.starts_with("lower bound")) << wrong;
   }

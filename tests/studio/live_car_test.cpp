@@ -45,7 +45,6 @@ TEST(LiveCar, SeesAsItsMadeCamerasDo) {
   EXPECT_LT(calibrate::length(set.camera.pose.cam_from_set * p - studio.plate.cam_from_set * p),
             1e-6);
   EXPECT_LT(calibrate::length(set.probe->probe_from_set * p - studio.probe.cam_from_set * p), 1e-6);
-  EXPECT_EQ(set.probe->exposures_s, studio.probe.exposures_s);
 }
 
 // The same set with pictures that are made faster, and the probe's packets lossy.
