@@ -178,10 +178,7 @@ FrameMaker::Due FrameMaker::wait_for_plate() {
   }
   // The camera may be the faster one.
   const capture::Time soonest = last_due_.time + 3 * period / 4;
-  capture::Frame newest;
-  do {
-    newest = plate_->wait_for_newer(until);
-  } while (newest.time < soonest && capture::monotonic_now() < until);
+  const capture::Frame newest = plate_->wait_for_newer(until, soonest);
   if (newest.time < soonest) {
     last_due_ = {last_due_.frame + 1, last_due_.time + period};
     return last_due_;

@@ -130,8 +130,9 @@ void ProbeSource::prime_live() {
   while (bracket_->shots() < cycle && capture::monotonic_now() < end) {
     camera_->wait_for_newer(end);
     const std::vector<capture::Frame> frames = camera_->advance(capture::Time::max());
+    if (frames.empty()) break;
     take(frames);
-    if (!frames.empty() && !frames.back().note.empty()) why = frames.back().note;
+    if (!frames.back().note.empty()) why = frames.back().note;
   }
   if (bracket_->shots() == 0) {
     throw std::runtime_error("of no frame within 5 s the exposure could be told" +

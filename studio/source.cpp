@@ -78,9 +78,17 @@ std::optional<capture::Time> Source::next_time() const {
   return next_.empty() ? std::nullopt : std::optional(next_.front().frame.time);
 }
 
-const capture::Frame& Source::wait_for_newer(capture::Time until) {
-  fetch(next_.empty() ? until : capture::Time{});
+const capture::Frame& Source::newest() const {
   return next_.empty() ? current_.frame : next_.back().frame;
+}
+
+const capture::Frame& Source::wait_for_newer(capture::Time until, capture::Time soonest) {
+  fetch({});
+  while ((next_.empty() || newest().time < soonest) && !live_->ended() &&
+         capture::monotonic_now() < until) {
+    fetch(until);
+  }
+  return newest();
 }
 
 std::vector<capture::Sound> Source::take_sound() { return std::exchange(sound_, {}); }

@@ -36,9 +36,9 @@ class Source {
   // Of the frame that comes next; nothing at the end, and before a live one has come.
   std::optional<capture::Time> next_time() const;
 
-  // Of a live camera: the newest frame that has come. Waits, until `until` on the monotonic clock,
-  // for one that at() and advance() have not given.
-  const capture::Frame& wait_for_newer(capture::Time until);
+  // Of a live camera: the newest frame that has come. Waits, until `until` on the monotonic clock
+  // or the camera's end, for one that at() and advance() have not given, of `soonest` or later.
+  const capture::Frame& wait_for_newer(capture::Time until, capture::Time soonest = {});
   // Of a live camera: when the frame that at() gave last was there, on the monotonic clock.
   capture::Time arrived() const { return current_.arrived; }
 
@@ -48,6 +48,7 @@ class Source {
  private:
   void read_ahead();
   void fetch(capture::Time until);
+  const capture::Frame& newest() const;
 
   std::unique_ptr<capture::Camera> camera_;    // null = a live one
   std::unique_ptr<capture::LiveReader> live_;  // null = a file's
