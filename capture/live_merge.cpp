@@ -27,17 +27,24 @@ constexpr std::size_t stretches_per_task = 64;
 constexpr double passed_over = 6.4;  // exposure errors between two shots that no pixel tells
 
 template <class Code>
-void merge_stretch(const Plan<Code>& plan, std::size_t begin, const Merged& merged) {
-  const Doubts doubts = average_all(plan, begin, merged);
+void merge_stretch(const Kernel<Code>& kernel,
+                   const Plan<Code>& plan,
+                   std::size_t begin,
+                   const Merged& merged) {
+  const Doubts doubts = kernel.average_all(plan, begin, merged);
   if (!doubts.contradicted && !doubts.shifted) return;
-  Flags contradicted = find_contradictions(plan, begin);
+  Flags contradicted = kernel.find_contradictions(plan, begin);
   join_pixels(contradicted);
   average_newest(plan, begin, contradicted, merged);
 }
 
 // The last stretch of a picture, if it is a short one: filled up with its last pixel.
 template <class Code>
-void merge_rest(const Plan<Code>& plan, std::size_t begin, std::size_t count, MergedFrame& frame) {
+void merge_rest(const Kernel<Code>& kernel,
+                const Plan<Code>& plan,
+                std::size_t begin,
+                std::size_t count,
+                MergedFrame& frame) {
   Plan<Code> rest = plan;
   std::array<std::array<Code, lanes>, most_window_shots> values;
   for (std::size_t i = 0; i < plan.count; ++i) {
@@ -50,7 +57,7 @@ void merge_rest(const Plan<Code>& plan, std::size_t begin, std::size_t count, Me
   Lanes radiance;
   std::array<std::uint16_t, lanes> counted;
   std::array<MergeStatus, stretch_pixels> status;
-  merge_stretch(rest, 0, {radiance.v.data(), counted.data(), status.data()});
+  merge_stretch(kernel, rest, 0, {radiance.v.data(), counted.data(), status.data()});
   std::copy_n(radiance.v.data(), count, &frame.radiance.pixels[begin]);
   std::copy_n(counted.data(), count, &frame.counted[begin]);
   std::copy_n(status.data(), count / channels, &frame.status[begin / channels]);
@@ -87,21 +94,22 @@ void resize(Image& image, int width, int height) {
 }
 
 template <class Code>
-void merge_all(const Plan<Code>& plan, int width, int height, MergedFrame& frame) {
+void merge_all(
+    const Kernel<Code>& kernel, const Plan<Code>& plan, int width, int height, MergedFrame& frame) {
   resize(frame.radiance, width, height);
   const std::size_t samples = frame.radiance.pixels.size();
   frame.counted.resize(samples);
   frame.status.resize(samples / channels);
   const auto merge = [&](const tbb::blocked_range<std::size_t>& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      merge_stretch(plan, i * lanes,
+      merge_stretch(kernel, plan, i * lanes,
                     {&frame.radiance.pixels[i * lanes], &frame.counted[i * lanes],
                      &frame.status[i * stretch_pixels]});
     }
   };
   const std::size_t stretches = samples / lanes;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, stretches, stretches_per_task), merge);
-  if (samples % lanes != 0) merge_rest(plan, stretches * lanes, samples % lanes, frame);
+  if (samples % lanes != 0) merge_rest(kernel, plan, stretches * lanes, samples % lanes, frame);
 }
 
 // The lowest code that is saturated: at the latest the largest there is.
@@ -184,6 +192,8 @@ void plan_steps(const Shots<Code>& shots,
     step.dark = dark_below(mean_read, mean_shot, plan.relative_squared);
     step.counted |= shot.bit;
     shot.step = step;
+    plan.dark[i + 1] = step.dark;
+    plan.counted[i + 1] = step.counted;
     plan_scale(codes, from.exposure_s, shot);
   }
 }
@@ -219,7 +229,8 @@ void merge_shots_of(Shots<Code> shots,
   frame.shots = shots.count;
   frame.exposure_error = settings.exposure_error;
   for (std::size_t i = 0; i < shots.count; ++i) frame.exposures_s[i] = shots.of[i].exposure_s;
-  merge_all(plan, codes.width, codes.height, frame);
+  merge_all(settings.widest_registers ? best_kernel<Code>() : built_kernel<Code>(), plan,
+            codes.width, codes.height, frame);
 }
 
 // Of an average of radiance L: read + L * (shot + L * relative_squared).

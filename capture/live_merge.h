@@ -33,6 +33,8 @@ struct WindowMergeSettings {
   // before exposures shorter than their period. Where light changes for good, or labels are wrong,
   // the mean of the window is shown. For global shutters: a rolling one has a gain for every row.
   bool level_flicker = false;
+  // Uses AVX-512 where the machine has it. The same bits without.
+  bool widest_registers = true;
 };
 
 // One shot of a linear camera's codes: (height, width, 3), interleaved.

@@ -85,6 +85,10 @@ struct Plan {
   std::array<PlannedShot<Code>, most_window_shots> shots;     // the shortest first
   std::array<std::size_t, most_window_shots> newest_first{};  // places among them
   std::size_t count = 0;
+  // By how many shots are taken, the shortest first: below which radiance their average is dark,
+  // infinite for none, and which they are.
+  std::array<float, most_window_shots + 1> dark{infinite};
+  std::array<std::int32_t, most_window_shots + 1> counted{};
   alignas(64) std::array<Code, lanes> saturation;
   Lanes saturated_value;       // the same as floats
   float read = 0, shot = 0;    // the average's variance: (read * firsts + shot * seconds * L) / W^2
@@ -106,13 +110,20 @@ struct Doubts {
   bool shifted = false;       // perhaps all samples differ a little, by more than chance in sum
 };
 
-// Averages all shots of the stretch of `lanes` samples from `begin` on.
 template <class Code>
-Doubts average_all(const Plan<Code>& plan, std::size_t begin, const Merged& merged);
+struct Kernel {
+  // Averages all shots of the stretch of `lanes` samples from `begin` on.
+  Doubts (*average_all)(const Plan<Code>& plan, std::size_t begin, const Merged& merged);
+  // The lanes where that average is contradicted, as -1.
+  Flags (*find_contradictions)(const Plan<Code>& plan, std::size_t begin);
+};
 
-// The lanes where the average above is contradicted, as -1.
+// For the instruction set that the program is built for, and the widest one that the machine has
+// (AVX-512, if it was built for AVX2 and FMA): the same bits.
 template <class Code>
-Flags find_contradictions(const Plan<Code>& plan, std::size_t begin);
+Kernel<Code> built_kernel();
+template <class Code>
+Kernel<Code> best_kernel();
 
 // Averages the shots of the pixels that `contradicted` names from the newest on, without older ones
 // that contradict them. Where the sum over a stretch tells of a change that no pixel could tell

@@ -306,6 +306,29 @@ TEST(MergeWindow, GivesTheSameBitsInOneThread) {
   EXPECT_EQ(alone.counted, frame.counted);
 }
 
+// Whatever a register holds: 37 shades from black to saturated, and a lamp that is switched.
+TEST(MergeWindow, GivesTheSameBitsWithTheWidestRegisters) {
+  const MadeSensor sensor = camera();
+  Image radiance = make_image(67, 301);
+  for (std::size_t i = 0; i < radiance.pixels.size(); ++i) {
+    radiance.pixels[i] = std::exp2(static_cast<float>(i / 700 % 37) * 0.5F - 12);
+  }
+  for (const std::vector<double>& exposures_s : brackets) {
+    Window window = take(sensor, radiance, exposures_s, 3);
+    for (const bool lamp : {false, true}) {
+      if (lamp) window.taken.back() = expose(sensor, grey(0.05, 301, 67), exposures_s.back(), 9);
+      WindowMergeSettings settings{.noise = noise_of(sensor)};
+      MergedFrame wide, built;
+      merge_window(window.shots(), codes_of(sensor, 301, 67), settings, wide);
+      settings.widest_registers = false;
+      merge_window(window.shots(), codes_of(sensor, 301, 67), settings, built);
+      EXPECT_EQ(wide.radiance.pixels, built.radiance.pixels);
+      EXPECT_EQ(wide.counted, built.counted);
+      EXPECT_EQ(wide.status, built.status);
+    }
+  }
+}
+
 TEST(MergeWindow, AllocatesNothingOnceItHasMergedAFrameOfThatSize) {
   const MadeSensor sensor = camera();
   Window window = take(sensor, grey(0.3, 301, 67), brackets[0], 3);

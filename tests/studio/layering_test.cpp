@@ -134,7 +134,7 @@ TEST(Tree, IsFormattedByItsOwnRules) {
   }
   const auto faults = lines_of("cd " PLATELIGHT_SOURCE_DIR
                                " && find capture calibrate render compositing studio tests"
-                               " \\( -name '*.h' -o -name '*.cpp' \\) -print0"
+                               " \\( -name '*.h' -o -name '*.cpp' -o -name '*.inc' \\) -print0"
                                " | xargs -0 clang-format --dry-run -Werror 2>&1"
                                " | grep -E '(warning|error):'");
   EXPECT_EQ(faults, std::vector<std::string>{}) << "clang-format -i mends it";
