@@ -58,11 +58,17 @@ bool is_first_word(const Command& command, std::string_view word) {
 
 std::span<const Command> commands() {
   static const std::vector<Command> all{
-      run_command(),     check_command(),
-      still_command(),   hdr_command(),
-      capture_command(), demo_command(),
-      chart_command(),   bench_command(),
-      devices_command(), calibrate_response_command(),
+      run_command(),
+      check_command(),
+      still_command(),
+      hdr_command(),
+      capture_command(),
+      demo_command(),
+      chart_command(),
+      bench_command(),
+      devices_command(),
+      calibrate_response_command(),
+      calibrate_vignetting_command(),
   };
   return all;
 }

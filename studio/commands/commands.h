@@ -7,6 +7,7 @@ namespace studio {
 
 Command bench_command();
 Command calibrate_response_command();
+Command calibrate_vignetting_command();
 Command capture_command();
 Command chart_command();
 Command check_command();

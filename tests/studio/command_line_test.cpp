@@ -403,5 +403,41 @@ TEST_F(CommandLine, CalibratesACurveWithItsCandidates) {
   EXPECT_EQ(capture::read_response(out).curve.name, "sRGB");
 }
 
+TEST_F(CommandLine, CalibratesVignettingFromAnEvenField) {
+  const std::string lens =
+      write("lens.toml",
+            "model = \"equisolid\"\nwidth = 100\nheight = 100\nf = 35\ncx = 49.5\ncy = 49.5\n"
+            "max_angle = 85\n");
+  capture::Image field = capture::make_image(100, 100);
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 100; ++x) {
+      const double angle = 2 * std::asin(std::min(1.0, std::hypot(x - 49.5, y - 49.5) / 70));
+      const double light = 0.4 * (1 - 0.2 * angle * angle) + 0.004 * ((x * 7 + y * 13) % 5 - 2);
+      for (int c = 0; c < 3; ++c) field.at(y, x, c) = static_cast<float>(light);
+    }
+  }
+  const std::string even = (dir_ / "even.exr").string();
+  capture::write_exr(even, field);
+  const std::string json = (dir_ / "vignetting.json").string();
+  const std::string command = "calibrate vignetting " + even + " --lens " + lens;
+  const Outcome outcome = run(command + " --json " + json);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("vignetting = ["));
+  const auto figures = nlohmann::json::parse(content_of(json));
+  ASSERT_GE(figures["vignetting"].size(), 1U);
+  EXPECT_NEAR(figures["vignetting"][0], -0.2, 0.01);
+  EXPECT_EQ(figures["candidates"].size(), 5U);
+
+  EXPECT_EQ(run(command + " --poses a.cameramodel").status, 2);
+  const std::string small =
+      write("small.toml",
+            "model = \"equisolid\"\nwidth = 50\nheight = 50\nf = 35\ncx = 24.5\n"
+            "cy = 24.5\n");
+  const Outcome other = run("calibrate vignetting " + even + " --lens " + small);
+  EXPECT_EQ(other.status, 1);
+  EXPECT_THAT(other.err, HasSubstr("100x100"));
+  expect_one_line(other.err);
+}
+
 }  // namespace
 }  // namespace studio

@@ -1,0 +1,162 @@
+// platelight calibrate vignetting: how a lens dims towards its rim.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "calibrate/camera_model.h"
+#include "calibrate/vignetting_fit.h"
+#include "capture/camera.h"
+#include "studio/commands/commands.h"
+
+namespace studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double degree = std::numbers::pi / 180;
+// Of pictures of codes, where 1 is saturated. Brighter values are of HDR pictures.
+constexpr double saturation_of_codes = 0.98;
+
+struct VignettingOptions {
+  std::vector<std::string> shots;
+  std::string lens;
+  std::string poses;
+  std::string response;
+};
+
+struct Shot {
+  std::shared_ptr<const capture::Image> radiance;
+  double saturation = 0;
+};
+
+// The first frame of a picture, video or camera.
+Shot read_shot(const std::string& source, const VignettingOptions& options) {
+  capture::CameraOptions reading;
+  reading.response = options.response;
+  const auto camera = capture::open_camera(source, reading);
+  const std::optional<capture::Frame> frame = camera->next();
+  if (!frame || frame->image == nullptr) throw std::runtime_error(source + ": has no picture");
+  bool codes = true;
+  for (const float value : frame->image->pixels) codes &= !(value > 1);
+  return {frame->image, codes ? saturation_of_codes : HUGE_VAL};
+}
+
+std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> words;
+  for (std::size_t begin = 0; begin < list.size();) {
+    const std::size_t end = std::min(list.find(',', begin), list.size());
+    words.push_back(list.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return words;
+}
+
+calibrate::Pose read_pose(const std::string& path) {
+  const calibrate::CameraModel model = calibrate::read_camera_model(path);
+  if (!model.cam_from_ref) throw std::runtime_error(path + ": has no extrinsics");
+  return *model.cam_from_ref;
+}
+
+// A scene in several orientations if there are poses, else an even field each.
+std::vector<calibrate::VignettingSample> samples_of(const VignettingOptions& options,
+                                                    const calibrate::Lens& lens) {
+  std::vector<Shot> shots;
+  for (const std::string& source : options.shots) {
+    shots.push_back(read_shot(source, options));
+    const capture::Image& image = *shots.back().radiance;
+    if (image.width != lens.width || image.height != lens.height) {
+      throw std::runtime_error(fmt::format("{}: is {}x{}, but {} is of {}x{}", source, image.width,
+                                           image.height, options.lens, lens.width, lens.height));
+    }
+  }
+  if (!options.poses.empty()) {
+    const std::vector<std::string> poses = split(options.poses);
+    if (poses.size() != shots.size() || poses.size() < 2) {
+      throw UsageError(
+          fmt::format("--poses needs a file for each of two shots or more; there are {} for {}",
+                      poses.size(), shots.size()));
+    }
+    std::vector<calibrate::TurnedShot> turned;
+    double saturation = HUGE_VAL;
+    for (std::size_t i = 0; i < shots.size(); ++i) {
+      turned.push_back({shots[i].radiance.get(), read_pose(poses[i])});
+      saturation = std::min(saturation, shots[i].saturation);
+    }
+    return calibrate::turned_samples(turned, lens, saturation);
+  }
+  std::vector<calibrate::VignettingSample> samples;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    auto field = calibrate::even_field_samples(*shots[i].radiance, lens, shots[i].saturation);
+    for (calibrate::VignettingSample& sample : field) sample.place = i;
+    samples.insert(samples.end(), field.begin(), field.end());
+  }
+  return samples;
+}
+
+void calibrate_vignetting(const VignettingOptions& options, Console& console) {
+  const calibrate::Lens lens = calibrate::read_lens(options.lens);
+  const std::vector<calibrate::VignettingSample> samples = samples_of(options, lens);
+  const calibrate::VignettingFit fit = [&] {
+    try {
+      return calibrate::fit_vignetting(samples);
+    } catch (const std::invalid_argument& error) {
+      throw std::runtime_error(error.what());
+    }
+  }();
+  Json candidates = Json::array();
+  console.say("terms  held-out error");
+  for (const calibrate::VignettingCandidate& c : fit.candidates) {
+    console.say(fmt::format("{:>5} {:>13.2f} %", c.terms, 100 * c.heldout_error));
+    candidates.push_back({{"terms", c.terms}, {"heldout_error", c.heldout_error}});
+  }
+  const double seen_deg = fit.max_angle_rad / degree;
+  console.figures(Json{
+      {"vignetting", fit.terms},
+      {"heldout_error", fit.heldout_error},
+      {"seen_deg", seen_deg},
+      {"samples", samples.size()},
+      {"candidates",
+       candidates}}.dump(2));
+  if (fit.max_angle_rad < 0.95 * lens.max_angle_rad) {
+    console.warn(fmt::format("no light was seen beyond {:.0f} degrees: there the terms are a guess",
+                             seen_deg));
+  }
+  if (fit.terms.empty()) {
+    console.say("even: a set needs no vignetting for it");
+  } else {
+    std::string terms;
+    for (const double term : fit.terms) {
+      terms += fmt::format("{}{:.4f}", terms.empty() ? "" : ", ", term);
+    }
+    console.say(fmt::format("vignetting = [{}]", terms));
+  }
+}
+
+}  // namespace
+
+Command calibrate_vignetting_command() {
+  return {"calibrate vignetting", "Measure how a lens dims towards its rim",
+          "platelight calibrate vignetting even.exr --lens fisheye.toml --json vignetting.json",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto o = std::make_shared<VignettingOptions>();
+            arguments.positionals("SHOTS", o->shots,
+                                  "pictures of even fields; or of one scene, the camera turned");
+            arguments.option("--lens", o->lens, "the lens: a .toml or .cameramodel file");
+            arguments.required("--lens");
+            arguments.option("--poses", o->poses,
+                             ".cameramodel files with the pose of each shot, joined by commas");
+            arguments.option("--response", o->response,
+                             ".rsp or .toml file of calibrate response, for pictures of codes");
+            return [o](Console& console) { calibrate_vignetting(*o, console); };
+          }};
+}
+
+}  // namespace studio
