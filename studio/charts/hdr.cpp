@@ -410,6 +410,7 @@ class HdrChart {
     chart.stressors.push_back(wrong_label());
     chart.stressors.push_back(flicker(false));
     chart.stressors.push_back(flicker(true));
+    chart.stressors.push_back(rolling_flicker());
     chart.stressors.push_back(bent_response());
   }
 
@@ -475,6 +476,36 @@ class HdrChart {
       stressor.samples.push_back(judge(modulation, merged(shots, levelled), truth));
     }
     return stressor;
+  }
+
+  // The same before a rolling shutter: bands, as rows are taken one after the other.
+  Stressor rolling_flicker() {
+    Stressor stressor{"flicker of lamps before a rolling shutter, modulation", "", true, {}};
+    const Image even = made_scene(stressed_side(), 0.5);
+    for (const double modulation : {0.01, 0.05, 0.1, 0.2, 0.4, 0.6}) {
+      std::vector<Image> scenes(members, even);
+      Image truth = even;
+      for (int y = 0; y < even.height; ++y) {
+        double logs = 0;
+        for (std::size_t i = 0; i < members; ++i) {
+          const double frames = static_cast<double>(i) + static_cast<double>(y) / even.height;
+          const double factor = 1 + modulation * std::sin(2 * std::numbers::pi * 100 / 60 * frames);
+          logs += std::log(factor);
+          scale_row(scenes[i], y, factor);
+        }
+        scale_row(truth, y, std::exp(logs / members));
+      }
+      stressor.samples.push_back(
+          window_sample(modulation, take(sensor_of(12), scenes, all_exposures()), truth));
+    }
+    return stressor;
+  }
+
+  static void scale_row(Image& image, int y, double factor) {
+    const std::size_t row = static_cast<std::size_t>(image.width) * 3;
+    const auto begin = image.pixels.begin() + static_cast<std::ptrdiff_t>(row) * y;
+    std::for_each(begin, begin + static_cast<std::ptrdiff_t>(row),
+                  [&](float& value) { value *= static_cast<float>(factor); });
   }
 
   // The newest exposure but one says another time than it had.

@@ -328,6 +328,21 @@ TEST_F(AravisCameraTest, ReturnsWithItsSettingsAfterItWasUnplugged) {
   EXPECT_NEAR(camera->set_exposure(0.001), 0.001, 1e-9);
 }
 
+// An exposure far longer than a frame slows the camera: its frames come later, and none is lost.
+TEST_F(AravisCameraTest, WaitsForTheSlowestFrames) {
+  MadeGigeSettings settings = small();
+  settings.exposures = {1e-5, 2};
+  make(settings);
+  const auto camera = open("?format=Mono12&rate=30&exposure=0.5");
+  next_good(*camera);
+  for (int i = 0; i < 3; ++i) {
+    const auto frame = camera->next();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->status, FrameStatus::good) << frame->note;
+  }
+  EXPECT_EQ(camera->statistics().lost, 0);
+}
+
 TEST_F(AravisCameraTest, ReturnsWithItsExposure) {
   const auto camera = open("?format=Mono12&rate=30");
   camera->set_exposure(0.003);
