@@ -1,6 +1,7 @@
 // The schedule of a bracket, and the frames' labels.
 #include "capture/bracketed_camera.h"
 
+#include <algorithm>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -18,6 +19,9 @@ std::string seconds(double exposure_s) {
 constexpr double distinct_ratio = 1.05;
 // A frame's time may be told rounded.
 constexpr double period_slack = 1.001;
+// Of a frame's time: sensors take some of it for themselves.
+constexpr double longest_share = 0.9;
+constexpr double unknown_period_s = 1.0 / 30;
 
 LabelSettings of_thumbnails(LabelSettings settings, const CameraInfo& picture) {
   settings.noise = noise_of_thumbnail(settings.noise, picture.width, picture.height);
@@ -34,6 +38,27 @@ BracketedCamera::BracketedCamera(std::unique_ptr<Camera> camera,
       name_(std::move(name)),
       labeller_(of_thumbnails(settings, camera_->info())) {
   set_exposures(exposures_s);
+  try_all();
+}
+
+BracketedCamera::BracketedCamera(std::unique_ptr<Camera> camera,
+                                 std::string name,
+                                 const AutoExposureSettings& exposures,
+                                 LightMeterSettings meter,
+                                 const LabelSettings& settings)
+    : camera_(std::move(camera)),
+      name_(std::move(name)),
+      labeller_(of_thumbnails(settings, camera_->info())) {
+  AutoExposureSettings possible_ones = exposures;
+  possible_ones.choice.possible = possible();
+  auto_.emplace(possible_ones);
+  meter_.emplace(std::move(meter));
+  set_exposures(auto_->exposures_s());
+  try_all();
+}
+
+// Asks for each exposure once.
+void BracketedCamera::try_all() {
   for (Member& member : members_) {
     member.taken_s = camera_->set_exposure(member.asked_s);
     labeller_.requested(-1, member.taken_s);
@@ -50,20 +75,35 @@ BracketedCamera::BracketedCamera(std::unique_ptr<Camera> camera,
   schedule_members();
 }
 
+ExposureRange BracketedCamera::range() const {
+  if (const std::optional<ExposureRange> range = camera_->exposure_range()) return *range;
+  throw std::runtime_error(name_ +
+                           ": its exposure cannot be set from frame to frame; give the set a "
+                           "camera with a fixed exposure, or another one");
+}
+
+// What frames have room for.
+ExposureRange BracketedCamera::possible() const {
+  const ExposureRange all = range();
+  const Rational rate = camera_->info().rate;
+  const double period_s = rate.num > 0 ? 1 / rate.value() : unknown_period_s;
+  if (all.shortest_s > period_s) {
+    throw std::runtime_error(name_ + ": its shortest exposure, " + seconds(all.shortest_s) +
+                             ", is longer than a frame, " + seconds(period_s) +
+                             "; choose a lower rate");
+  }
+  return {all.shortest_s, std::clamp(longest_share * period_s, all.shortest_s, all.longest_s)};
+}
+
 void BracketedCamera::check(std::span<const double> exposures_s) const {
   if (exposures_s.empty()) throw std::invalid_argument("a bracket has exposures");
-  const std::optional<ExposureRange> range = camera_->exposure_range();
-  if (!range) {
-    throw std::runtime_error(name_ +
-                             ": its exposure cannot be set from frame to frame; give the set a "
-                             "camera with a fixed exposure, or another one");
-  }
+  const ExposureRange possible = range();
   const Rational rate = camera_->info().rate;
   for (const double exposure_s : exposures_s) {
-    if (!(exposure_s >= range->shortest_s && exposure_s <= range->longest_s)) {
+    if (!(exposure_s >= possible.shortest_s && exposure_s <= possible.longest_s)) {
       throw std::runtime_error(name_ + ": an exposure of " + seconds(exposure_s) +
-                               " is not possible, only " + seconds(range->shortest_s) + " to " +
-                               seconds(range->longest_s));
+                               " is not possible, only " + seconds(possible.shortest_s) + " to " +
+                               seconds(possible.longest_s));
     }
     if (rate.num > 0 && exposure_s * rate.value() > period_slack) {
       throw std::runtime_error(name_ + ": an exposure of " + seconds(exposure_s) +
@@ -76,15 +116,14 @@ void BracketedCamera::check(std::span<const double> exposures_s) const {
 void BracketedCamera::set_exposures(std::span<const double> exposures_s) {
   check(exposures_s);
   std::vector<Member> members;
+  std::optional<std::size_t> first_new;
   for (const double exposure_s : exposures_s) {
-    Member member{exposure_s, exposure_s};
-    for (const Member& known : members_) {
-      if (known.asked_s == exposure_s) member = known;
-    }
-    members.push_back(member);
+    const auto known = std::ranges::find(members_, exposure_s, &Member::asked_s);
+    if (known == members_.end() && !first_new) first_new = members.size();
+    members.push_back(known == members_.end() ? Member{exposure_s, exposure_s} : *known);
   }
+  turn_ = first_new.value_or(turn_ % members.size());
   members_ = std::move(members);
-  turn_ %= members_.size();
   schedule_members();
 }
 
@@ -108,7 +147,17 @@ CameraStatistics BracketedCamera::statistics() const {
   statistics.rejected = counts_.rejected;
   statistics.unknown = counts_.unknown;
   statistics.exposure_lag = labeller_.lag();
+  statistics.exposures_s = exposures_s();
+  statistics.too_bright = auto_ && auto_->too_bright();
+  statistics.too_dark = auto_ && auto_->too_dark();
   return statistics;
+}
+
+void BracketedCamera::follow_light(const Frame& frame) {
+  const std::vector<double> taken_s = exposures_s();
+  if (auto_->observe(meter_->measure(*frame.image), frame.exposure_s, taken_s, labeller_.lag())) {
+    set_exposures(auto_->exposures_s());
+  }
 }
 
 void BracketedCamera::request(std::int64_t after_frame) {
@@ -153,6 +202,7 @@ std::optional<Frame> BracketedCamera::next() {
       frame->status = FrameStatus::damaged;
       ++damaged_;
     }
+    if (auto_) follow_light(*frame);
   }
   request(frame->number);
   return frame;

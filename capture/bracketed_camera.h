@@ -9,8 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "capture/auto_exposures.h"
 #include "capture/camera.h"
 #include "capture/exposure_labels.h"
+#include "capture/light_meter.h"
 
 namespace capture {
 
@@ -43,8 +45,17 @@ class BracketedCamera final : public Camera {
                   std::span<const double> exposures_s,
                   const LabelSettings& settings);
 
+  // Exposures that follow the light (see AutoExposures), from all that the camera can set within
+  // its frames; `settings.choice.possible` is not used. Throws as above, and for an error that no
+  // exposure has.
+  BracketedCamera(std::unique_ptr<Camera> camera,
+                  std::string name,
+                  const AutoExposureSettings& exposures,
+                  LightMeterSettings meter,
+                  const LabelSettings& settings);
+
   // Other exposures from the next request on; merges that hold older frames go on with them. Throws
-  // as the constructor, but asks the device for nothing yet.
+  // as the constructor, but asks the device for nothing yet. Those that are new come first.
   void set_exposures(std::span<const double> exposures_s);
   // What the device makes of the schedule, in its order.
   std::vector<double> exposures_s() const;
@@ -61,7 +72,11 @@ class BracketedCamera final : public Camera {
     double asked_s = 0;
     double taken_s = 0;  // as the device rounds it
   };
+  void try_all();
+  ExposureRange range() const;
+  ExposureRange possible() const;
   void check(std::span<const double> exposures_s) const;
+  void follow_light(const Frame& frame);
   void request(std::int64_t after_frame);
   void schedule_members();
 
@@ -72,6 +87,9 @@ class BracketedCamera final : public Camera {
   std::size_t turn_ = 0;  // of the next request
   BracketStatistics counts_;
   std::int64_t damaged_ = 0;  // by our verdict
+  // Of exposures that follow the light.
+  std::optional<AutoExposures> auto_;
+  std::optional<LightMeter> meter_;
 };
 
 }  // namespace capture

@@ -41,6 +41,10 @@ struct CameraStatistics {
   std::int64_t rejected = 0;        // the exposure is not certain
   std::int64_t unknown = 0;         // black or saturated, so that it cannot be told
   std::optional<int> exposure_lag;  // frames from a request to its effect, where it is known
+  std::vector<double> exposures_s;  // that it is told in turn
+  // Of exposures that follow the light (auto_exposures.h):
+  bool too_bright = false;  // something saturates in the shortest possible exposure
+  bool too_dark = false;    // the longest possible exposure is too short
 };
 
 struct CameraOptions {

@@ -1,6 +1,7 @@
 // Which exposures a scene needs.
 #pragma once
 
+#include <cstddef>
 #include <vector>
 
 #include "capture/camera.h"
@@ -25,6 +26,7 @@ struct ChoiceSettings {
 
 struct ExposureChoice {
   std::vector<double> exposures_s;  // the shortest first
+  double relative_error = 0;        // that was asked for, or had to be
   // What they resolve: less than was asked for if the camera's range ends before.
   RadianceRange resolved;
   bool too_bright = false;  // the shortest possible exposure is too long
@@ -38,6 +40,10 @@ double merged_error(double radiance,
                     const NoiseModel& noise,
                     double fullest);
 
+// The least value whose deviation is at most the settings' error, relative to it. Throws
+// std::invalid_argument if no value up to `fullest` has so small an error.
+double least_resolved_value(const ChoiceSettings& settings);
+
 // The fewest exposures whose merge resolves a scene: one resolves the values from that on whose
 // noise is small enough up to `fullest`, and the next longer one begins where it ends. They are
 // spread evenly, in stops, from the one that the brightest radiance needs to the one that the
@@ -46,5 +52,11 @@ double merged_error(double radiance,
 // Throws std::invalid_argument for ranges or settings that are not above 0 and in order, and for an
 // error that no value up to `fullest` has.
 ExposureChoice choose_exposures(const RadianceRange& scene, const ChoiceSettings& settings);
+
+// The same with at most `most` exposures: where more are needed the error is larger, by a twentieth
+// at a time. Throws also for `most` = 0.
+ExposureChoice choose_at_most(std::size_t most,
+                              const RadianceRange& scene,
+                              const ChoiceSettings& settings);
 
 }  // namespace capture
