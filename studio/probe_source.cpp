@@ -7,7 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "calibrate/lens.h"
 #include "capture/bracketed_camera.h"
+#include "capture/camera_response.h"
 #include "capture/make_hdr.h"
 
 namespace studio {
@@ -31,6 +33,60 @@ double share_above(const capture::Image& radiance, double least) {
     above += radiance.pixels[i] > least ? 1 : 0;
   }
   return static_cast<double>(above * step) / static_cast<double>(radiance.pixels.size());
+}
+
+// The camera's noise, where calibration has told it.
+capture::NoiseModel noise_of(const ProbeSettings& probe) {
+  if (!probe.response.ends_with(".toml")) return {};
+  const capture::CameraResponse response = capture::read_response(probe.response);
+  return response.linear ? response.linear->noise : capture::NoiseModel{};
+}
+
+// Pixels that the lens sees.
+capture::LightMeterSettings meter_of(const ProbeSettings& probe, const capture::CameraInfo& info) {
+  capture::LightMeterSettings meter;
+  meter.width = info.width;
+  meter.height = info.height;
+  if (!probe.lens || probe.lens->width != info.width || probe.lens->height != info.height) {
+    return meter;
+  }
+  for (int y = 0; y < info.height; ++y) {
+    for (int x = 0; x < info.width; ++x) {
+      const calibrate::Vec2 q{static_cast<double>(x), static_cast<double>(y)};
+      meter.counts.push_back(calibrate::unproject(*probe.lens, q) ? 1 : 0);
+    }
+  }
+  return meter;
+}
+
+// Light that has gone is expected back for half a second.
+int hold_of(const capture::CameraInfo& info) {
+  return info.rate.num > 0 ? static_cast<int>(std::lround(info.rate.value() / 2)) : 30;
+}
+
+struct Bracketed {
+  std::unique_ptr<capture::Camera> camera;
+  std::size_t cycle = 0;  // exposures at first; 0 = it is left as it is
+};
+
+// A live camera that takes exposures in turn: those of the set, or what the light asks for. One
+// whose exposure cannot be set stays as it is, unless the set asks for it.
+Bracketed bracket(std::unique_ptr<capture::Camera> camera, const ProbeSettings& probe) {
+  if (!probe.exposures_s.empty()) {
+    return {std::make_unique<capture::BracketedCamera>(std::move(camera), probe.source,
+                                                       probe.exposures_s, capture::LabelSettings{}),
+            probe.exposures_s.size()};
+  }
+  if (!probe.asks_auto && !camera->exposure_range()) return {std::move(camera)};
+  capture::AutoExposureSettings exposures;
+  exposures.choice.noise = noise_of(probe);
+  exposures.choice.relative_error = probe.exposure_error;
+  exposures.hold = hold_of(camera->info());
+  capture::LightMeterSettings meter = meter_of(probe, camera->info());
+  auto bracketed = std::make_unique<capture::BracketedCamera>(
+      std::move(camera), probe.source, exposures, std::move(meter), capture::LabelSettings{});
+  const std::size_t cycle = bracketed->exposures_s().size();
+  return {std::move(bracketed), cycle};
 }
 
 [[noreturn]] void fail(const Set& set, const std::string& message) {
@@ -70,10 +126,11 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
   options.mark_saturated = true;
   if (set.show.fps) options.picture_rate = *set.show.fps;
   std::unique_ptr<capture::Camera> camera = capture::open_camera(probe.source, options);
-  const bool brackets = camera->info().live && !exposures_s_.empty();
-  if (brackets) {
-    camera = std::make_unique<capture::BracketedCamera>(std::move(camera), probe.source,
-                                                        exposures_s_, capture::LabelSettings{});
+  std::size_t cycle = 0;
+  if (camera->info().live) {
+    auto bracketed = bracket(std::move(camera), probe);
+    camera = std::move(bracketed.camera);
+    cycle = bracketed.cycle;
   }
   camera_ = std::make_unique<Source>(std::move(camera));
   if (camera_->first().image == nullptr) throw std::runtime_error("its first frame is lost");
@@ -83,8 +140,8 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
     return;
   }
   status_.live = true;
-  if (brackets) {
-    prime_live();
+  if (cycle > 0) {
+    prime_live(cycle);
   } else {
     prime();
   }
@@ -122,8 +179,7 @@ void ProbeSource::prime() {
 }
 
 // Waits for a whole bracket, or what comes of it in time.
-void ProbeSource::prime_live() {
-  const std::size_t cycle = exposures_s_.size();
+void ProbeSource::prime_live(std::size_t cycle) {
   bracket_ = std::make_unique<RollingBracket>(cycle);
   const capture::Time end = capture::monotonic_now() + bracket_patience;
   std::string why = camera_->first().note;
@@ -132,6 +188,8 @@ void ProbeSource::prime_live() {
     const std::vector<capture::Frame> frames = camera_->advance(capture::Time::max());
     if (frames.empty()) break;
     take(frames);
+    // Exposures that follow the light may have become fewer.
+    cycle = std::min(cycle, camera_->statistics().exposures_s.size());
     if (!frames.back().note.empty()) why = frames.back().note;
   }
   if (bracket_->shots() == 0) {
@@ -161,6 +219,8 @@ bool ProbeSource::add(const capture::Frame& frame) {
 }
 
 void ProbeSource::merge(capture::Time time) {
+  note_camera();
+  if (!status_.exposures_s.empty()) bracket_->set_cycle(status_.exposures_s);
   const std::shared_ptr<const capture::MergedFrame> merged = bracket_->merge();
   status_.shots = bracket_->shots();
   status_.shares = merged->status_shares();
@@ -176,6 +236,14 @@ void ProbeSource::merge(capture::Time time) {
                                              : "";
   if (!status_.kept_because.empty()) return;
   newest_ = {{merged, &merged->radiance}, time};
+}
+
+void ProbeSource::note_camera() {
+  capture::CameraStatistics camera = camera_->statistics();
+  status_.exposure_lag = camera.exposure_lag;
+  status_.exposures_s = std::move(camera.exposures_s);
+  status_.too_bright = camera.too_bright;
+  status_.too_dark = camera.too_dark;
 }
 
 void ProbeSource::take(const std::vector<capture::Frame>& frames) {
@@ -197,7 +265,7 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time) {
   if (camera_) {
     take(camera_->advance(time - offset_));
     status_.age = time - offset_ - newest_.time;
-    status_.exposure_lag = camera_->statistics().exposure_lag;
+    note_camera();
   }
   return newest_;
 }

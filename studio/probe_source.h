@@ -27,7 +27,11 @@ struct ProbeStatus {
   std::int64_t lost = 0;            // did not come
   std::int64_t rejected = 0;        // were damaged, or their exposure was not known for certain
   std::optional<int> exposure_lag;  // of a camera that is told its exposures, once it is known
-  std::string kept_because;         // why the last good light stays on air; "" = the light is new
+  // Of such a camera, now; of exposures that follow the light, whether it is beyond the camera's.
+  std::vector<double> exposures_s;
+  bool too_bright = false;
+  bool too_dark = false;
+  std::string kept_because;  // why the last good light stays on air; "" = the light is new
 };
 
 // One thread uses it.
@@ -49,7 +53,8 @@ class ProbeSource {
  private:
   void open_camera(const Set& set, const ProbeSettings& probe);
   void prime();
-  void prime_live();
+  void prime_live(std::size_t cycle);
+  void note_camera();
   capture::Frame wait_for_next();
   void take(const std::vector<capture::Frame>& frames);
   bool add(const capture::Frame& frame);

@@ -11,15 +11,32 @@ namespace {
 
 constexpr double same_exposure = 0.02;  // relative
 constexpr std::size_t most_shots = 16;  // of a window
+// How long a shot stays: while its exposure is to come again, and if it is not.
 constexpr std::int64_t longest_cycles = 8;
+constexpr std::int64_t last_cycles = 2;
+
+bool same(double a, double b) { return std::abs(a / b - 1) <= same_exposure; }
+
+std::int64_t checked(std::size_t cycle) {
+  if (cycle < 1 || cycle > most_shots) {
+    throw std::invalid_argument("a bracket has 1 to 16 exposures");
+  }
+  return static_cast<std::int64_t>(cycle);
+}
 
 }  // namespace
 
 RollingBracket::RollingBracket(std::size_t cycle, capture::WindowMergeSettings settings)
-    : settings_(settings), longest_stay_(longest_cycles * static_cast<std::int64_t>(cycle)) {
-  if (cycle < 1 || cycle > most_shots) {
-    throw std::invalid_argument("a bracket has 1 to 16 exposures");
-  }
+    : settings_(settings), cycle_(checked(cycle)) {}
+
+void RollingBracket::set_cycle(std::span<const double> exposures_s) {
+  cycle_ = checked(exposures_s.size());
+  exposures_s_.assign(exposures_s.begin(), exposures_s.end());
+}
+
+bool RollingBracket::comes_again(double exposure_s) const {
+  return exposures_s_.empty() ||
+         std::ranges::any_of(exposures_s_, [=](double other) { return same(other, exposure_s); });
 }
 
 void RollingBracket::add(std::shared_ptr<const capture::Image> linear,
@@ -32,8 +49,8 @@ void RollingBracket::add(std::shared_ptr<const capture::Image> linear,
     throw std::invalid_argument("the shots of a bracket must have one size and three channels");
   }
   std::erase_if(shots_, [&](const Member& shot) {
-    return std::abs(shot.exposure_s / exposure_s - 1) <= same_exposure ||
-           shot.number < number - longest_stay_;
+    const std::int64_t cycles = comes_again(shot.exposure_s) ? longest_cycles : last_cycles;
+    return same(shot.exposure_s, exposure_s) || shot.number < number - cycles * cycle_;
   });
   if (shots_.size() == most_shots) shots_.erase(shots_.begin());
   shots_.push_back({std::move(linear), exposure_s, number});
@@ -46,10 +63,10 @@ double RollingBracket::least_radiance() const {
 }
 
 std::shared_ptr<const capture::MergedFrame> RollingBracket::merge() {
-  std::vector<capture::LiveShot> window;
-  for (const Member& shot : shots_) window.push_back({shot.linear.get(), shot.exposure_s});
+  window_.clear();
+  for (const Member& shot : shots_) window_.push_back({shot.linear.get(), shot.exposure_s});
   std::shared_ptr<capture::MergedFrame> merged = pool_.lend();
-  capture::merge_window(window, settings_, *merged);
+  capture::merge_window(window_, settings_, *merged);
   return merged;
 }
 

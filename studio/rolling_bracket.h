@@ -15,11 +15,15 @@ namespace studio {
 
 // Merges a camera that cycles through exposures: every new shot takes the place of the one before
 // of about the same exposure, so that each shot gives a new radiance picture, at the camera's full
-// rate. A shot whose exposure does not come again stays for eight cycles.
+// rate. A shot whose exposure does not come again for a while stays for eight cycles.
 class RollingBracket {
  public:
   // `cycle` is how many shots the camera takes until its exposures repeat, 1 to 16.
   explicit RollingBracket(std::size_t cycle, capture::WindowMergeSettings settings = {});
+
+  // The exposures that the camera takes in turn have changed: shots of others stay for two cycles.
+  // Throws std::invalid_argument for none, or more than 16.
+  void set_cycle(std::span<const double> exposures_s);
 
   // Shot number `number` of the camera, rising; linear, 1 = saturated: (height, width, 3), all of
   // one size. Throws std::invalid_argument for another size, or an exposure that is not > 0.
@@ -37,9 +41,13 @@ class RollingBracket {
     std::int64_t number;
   };
 
+  bool comes_again(double exposure_s) const;
+
   capture::WindowMergeSettings settings_;
-  std::int64_t longest_stay_;  // in shots
-  std::vector<Member> shots_;  // the newest last
+  std::int64_t cycle_;
+  std::vector<double> exposures_s_;  // of the cycle; empty = any may come
+  std::vector<Member> shots_;        // the newest last
+  std::vector<capture::LiveShot> window_;
   capture::Pool<capture::MergedFrame> pool_;
 };
 

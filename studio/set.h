@@ -78,7 +78,9 @@ struct ProbeSettings {
   std::optional<calibrate::Lens> lens;  // nothing = latitude-longitude
   calibrate::Pose probe_from_set;
   double yaw_rad = 0;               // of a map: turned to the left, seen from above
-  std::vector<double> exposures_s;  // empty = as the source tells
+  std::vector<double> exposures_s;  // empty = "auto"
+  bool asks_auto = false;           // "auto" is what the set says
+  double exposure_error = 0.1;      // of radiance, that "auto" is to reach
   render::Unseen unseen = render::Unseen::floor;
   MatchSettings match;
   std::optional<std::array<int, 4>> albedo_patch;  // a level spot whose implied albedo is reported

@@ -139,14 +139,16 @@ void read_match(Section& section, std::array<int, 2> picture, MatchSettings& mat
   }
 }
 
-void read_exposures(Section& section, std::vector<double>& exposures_s) {
+void read_exposures(Section& section, ProbeSettings& probe) {
+  section.number("exposure_error", probe.exposure_error, {0.001, 1});
   const TomlValue* given = section.value("exposures");
   if (given == nullptr) return;
   if (given->kind == TomlValue::Kind::text) {
     std::string word;
     section.word("exposures", word, {"auto"});
+    probe.asks_auto = true;
   } else {
-    section.numbers("exposures", exposures_s, {}, exposure_range);
+    section.numbers("exposures", probe.exposures_s, {}, exposure_range);
   }
 }
 
@@ -305,7 +307,7 @@ ProbeSettings read_probe_section(Section section, const SetContext& context) {
     probe.yaw_rad = yaw_deg * degree;
   }
 
-  read_exposures(section, probe.exposures_s);
+  read_exposures(section, probe);
   if (!probe.exposures_s.empty() && !probe.shots.empty() &&
       probe.exposures_s.size() != probe.shots.size()) {
     section.fault("exposures", fmt::format("has {} times for {} shots", probe.exposures_s.size(),

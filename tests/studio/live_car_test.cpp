@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "calibrate/lens.h"
 #include "render/made_studio.h"
@@ -48,9 +49,15 @@ TEST(LiveCar, SeesAsItsMadeCamerasDo) {
 }
 
 // The same set with pictures that are made faster, and the probe's packets lossy.
-Set quick_set(const std::filesystem::path& dir, const std::string& loss) {
+Set quick_set(const std::filesystem::path& dir,
+              const std::string& loss,
+              const std::string& exposures = "") {
   std::ifstream file(live_car);
   std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (!exposures.empty()) {
+    const std::string list = "[0.008, 0.0003, 0.00001]";
+    text.replace(text.find(list), list.size(), exposures);
+  }
   for (std::size_t at = 0; (at = text.find("samples=8", at)) != std::string::npos;) {
     text.replace(at, 9, "samples=2&loss=" + loss);
   }
@@ -80,6 +87,23 @@ TEST_F(LiveCarTest, IsLitAsItsPlateShows) {
   EXPECT_EQ(status.probe.shots, 3U);
   EXPECT_GT(status.probe.frames, 100);
   // One unit of radiance fills the plate's well 1 time and the probe's 10 times.
+  for (const float gain : status.match.gain) EXPECT_NEAR(gain, 0.1, 0.004);
+}
+
+TEST_F(LiveCarTest, ChoosesItsProbesExposures) {
+  ShowOptions options;
+  options.frames = 60;
+  Show show(quick_set(dir_, "0", "\"auto\""), options);
+  show.run();
+  const ShowStatus status = *show.status();
+  EXPECT_EQ(status.frames, 60);
+  const std::vector<double>& exposures_s = status.probe.exposures_s;
+  ASSERT_FALSE(exposures_s.empty());
+  EXPECT_LE(exposures_s.size(), 4U);
+  EXPECT_GE(exposures_s.front(), 1e-6);
+  EXPECT_LE(exposures_s.back(), 1.0 / 60);
+  EXPECT_GE(status.probe.shots, exposures_s.size());
+  EXPECT_FALSE(status.probe.too_bright) << "1 us is short enough for its sun";
   for (const float gain : status.match.gain) EXPECT_NEAR(gain, 0.1, 0.004);
 }
 
