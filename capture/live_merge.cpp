@@ -80,8 +80,9 @@ void require_settings(const WindowMergeSettings& settings) {
       !(noise.saturation > 0) || !sane(noise.saturation)) {
     throw std::invalid_argument("a noise model has variance at black, and a saturation above it");
   }
-  if (!sane(settings.consistency) || !sane(settings.exposure_error)) {
-    throw std::invalid_argument("consistency and exposure_error are not below 0");
+  if (!sane(settings.consistency) || !sane(settings.exposure_error) ||
+      !sane(settings.most_levelled)) {
+    throw std::invalid_argument("consistency, exposure_error and most_levelled are not below 0");
   }
 }
 
@@ -220,8 +221,10 @@ void merge_shots_of(Shots<Code> shots,
   }
   plan_steps(shots, codes, noise, plan);
   frame.gains = compare_shots(plan, samples_of(codes));
-  frame.levelled = settings.level_flicker;
-  if (settings.level_flicker) {
+  const auto [least, most] = std::minmax_element(
+      frame.gains.begin(), frame.gains.begin() + static_cast<std::ptrdiff_t>(shots.count));
+  frame.levelled = settings.level_flicker && *most <= settings.most_levelled * *least;
+  if (frame.levelled) {
     for (std::size_t i = 0; i < shots.count; ++i) shots.of[i].exposure_s *= frame.gains[i];
     plan_steps(shots, codes, noise, plan);
   }

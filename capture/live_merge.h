@@ -33,6 +33,8 @@ struct WindowMergeSettings {
   // before exposures shorter than their period. Where light changes for good, or labels are wrong,
   // the mean of the window is shown. For global shutters: a rolling one has a gain for every row.
   bool level_flicker = false;
+  // The largest ratio of two shots' light that is levelled: beyond it, light has changed.
+  double most_levelled = 8;
   // Uses AVX-512 where the machine has it. The same bits without.
   bool widest_registers = true;
 };

@@ -1,6 +1,7 @@
 // How much light each shot of a window tells, compared with the others: labels that are wrong,
 // light that drifts and lamps that flicker show here, long before they show in a pixel.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "capture/live_merge_plan.h"
@@ -10,7 +11,8 @@ namespace {
 
 constexpr std::size_t most_compared = 128;  // stretches, all over the picture
 constexpr std::size_t fewest_compared = 8;
-constexpr double most_noise = 0.01;  // relative, of a stretch's sum
+// Of a stretch's sum, relative: the noisier ones are asked where the others are too few.
+constexpr std::array most_noise{0.01, 0.03};
 
 // What two shots tell over the samples of a stretch that both resolve.
 struct Pair {
@@ -68,19 +70,25 @@ double compare(const Plan<Code>& plan,
                const PlannedShot<Code>& shorter,
                const PlannedShot<Code>& longer,
                std::size_t stretches) {
-  std::array<double, most_compared> ratios, deviations;
-  std::size_t count = 0;
   const std::size_t compared = std::min(stretches, most_compared);
+  std::array<Pair, most_compared> pairs;
   for (std::size_t k = 0; k < compared; ++k) {
     const std::size_t place = compared < stretches ? k * std::size_t{2654435761} % stretches : k;
-    const auto [ratio, deviation] = compare_stretch(plan, shorter, longer, place * lanes);
-    if (ratio == 0 || deviation > most_noise) continue;
-    ratios[count] = ratio;
-    deviations[count++] = deviation;
+    pairs[k] = compare_stretch(plan, shorter, longer, place * lanes);
   }
-  if (count < fewest_compared) return 1;
-  const double ratio = median(ratios, count);
-  return std::abs(ratio - 1) > 2 * median(deviations, count) ? ratio : 1;
+  for (const double noise : most_noise) {
+    std::array<double, most_compared> ratios, deviations;
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < compared; ++k) {
+      if (pairs[k].ratio == 0 || pairs[k].deviation > noise) continue;
+      ratios[count] = pairs[k].ratio;
+      deviations[count++] = pairs[k].deviation;
+    }
+    if (count < fewest_compared) continue;
+    const double ratio = median(ratios, count);
+    return std::abs(ratio - 1) > 2 * median(deviations, count) ? ratio : 1;
+  }
+  return 1;
 }
 
 }  // namespace

@@ -27,24 +27,27 @@ Json probe_json(const ShowStatus& s) {
   const auto share_of = [&](capture::MergeStatus status) {
     return s.probe.shares[static_cast<std::size_t>(status)];
   };
-  return {{"live", s.probe.live},
-          {"age_frames", s.light_age_frames},
-          {"age_frames_p99", s.light_age_frames_p99},
-          {"kept_frames", s.kept_light_frames},
-          {"kept_because", s.probe.kept_because},
-          {"frames", s.probe.frames},
-          {"lost", s.probe.lost},
-          {"rejected", s.probe.rejected},
-          {"shots", s.probe.shots},
-          {"exposure_lag", s.probe.exposure_lag ? Json(*s.probe.exposure_lag) : Json(nullptr)},
-          {"exposures_s", s.probe.exposures_s},
-          {"too_bright", s.probe.too_bright},
-          {"too_dark", s.probe.too_dark},
-          {"good", share_of(capture::MergeStatus::good)},
-          {"dark", share_of(capture::MergeStatus::dark)},
-          {"inconsistent", share_of(capture::MergeStatus::inconsistent)},
-          {"lower_bound", share_of(capture::MergeStatus::lower_bound)},
-          {"missing", share_of(capture::MergeStatus::missing)}};
+  return {
+      {"live", s.probe.live},
+      {"age_frames", s.light_age_frames},
+      {"age_frames_p99", s.light_age_frames_p99},
+      {"kept_frames", s.kept_light_frames},
+      {"kept_because", s.probe.kept_because},
+      {"frames", s.probe.frames},
+      {"lost", s.probe.lost},
+      {"rejected", s.probe.rejected},
+      {"shots", s.probe.shots},
+      {"exposure_lag", s.probe.exposure_lag ? Json(*s.probe.exposure_lag) : Json(nullptr)},
+      {"exposures_s", s.probe.exposures_s},
+      {"too_bright", s.probe.too_bright},
+      {"too_dark", s.probe.too_dark},
+      {"flicker_hz", s.probe.flicker ? Json(s.probe.flicker->light_hz) : Json(nullptr)},
+      {"flicker_modulation", s.probe.flicker ? Json(s.probe.flicker->modulation) : Json(nullptr)},
+      {"good", share_of(capture::MergeStatus::good)},
+      {"dark", share_of(capture::MergeStatus::dark)},
+      {"inconsistent", share_of(capture::MergeStatus::inconsistent)},
+      {"lower_bound", share_of(capture::MergeStatus::lower_bound)},
+      {"missing", share_of(capture::MergeStatus::missing)}};
 }
 
 Json record_json(const compositing::RecorderStatus& recorder) {

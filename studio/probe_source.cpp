@@ -71,20 +71,24 @@ struct Bracketed {
 
 // A live camera that takes exposures in turn: those of the set, or what the light asks for. One
 // whose exposure cannot be set stays as it is, unless the set asks for it.
-Bracketed bracket(std::unique_ptr<capture::Camera> camera, const ProbeSettings& probe) {
+Bracketed bracket(std::unique_ptr<capture::Camera> camera,
+                  const ProbeSettings& probe,
+                  const capture::NoiseModel& noise) {
+  capture::LabelSettings labels;
+  labels.noise = noise;
   if (!probe.exposures_s.empty()) {
     return {std::make_unique<capture::BracketedCamera>(std::move(camera), probe.source,
-                                                       probe.exposures_s, capture::LabelSettings{}),
+                                                       probe.exposures_s, labels),
             probe.exposures_s.size()};
   }
   if (!probe.asks_auto && !camera->exposure_range()) return {std::move(camera)};
   capture::AutoExposureSettings exposures;
-  exposures.choice.noise = noise_of(probe);
+  exposures.choice.noise = noise;
   exposures.choice.relative_error = probe.exposure_error;
   exposures.hold = hold_of(camera->info());
   capture::LightMeterSettings meter = meter_of(probe, camera->info());
-  auto bracketed = std::make_unique<capture::BracketedCamera>(
-      std::move(camera), probe.source, exposures, std::move(meter), capture::LabelSettings{});
+  auto bracketed = std::make_unique<capture::BracketedCamera>(std::move(camera), probe.source,
+                                                              exposures, std::move(meter), labels);
   const std::size_t cycle = bracketed->exposures_s().size();
   return {std::move(bracketed), cycle};
 }
@@ -125,10 +129,11 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
   options.loop = set.camera.loop;
   options.mark_saturated = true;
   if (set.show.fps) options.picture_rate = *set.show.fps;
+  merging_.noise = noise_of(probe);
   std::unique_ptr<capture::Camera> camera = capture::open_camera(probe.source, options);
   std::size_t cycle = 0;
   if (camera->info().live) {
-    auto bracketed = bracket(std::move(camera), probe);
+    auto bracketed = bracket(std::move(camera), probe, merging_.noise);
     camera = std::move(bracketed.camera);
     cycle = bracketed.cycle;
   }
@@ -174,13 +179,14 @@ void ProbeSource::prime() {
     if (again) break;
     exposures_s.push_back(exposure_s);
   }
-  if (exposures_s.size() > 1) bracket_ = std::make_unique<RollingBracket>(exposures_s.size());
+  if (exposures_s.size() > 1)
+    bracket_ = std::make_unique<RollingBracket>(exposures_s.size(), merging_);
   take(cycle);
 }
 
 // Waits for a whole bracket, or what comes of it in time.
 void ProbeSource::prime_live(std::size_t cycle) {
-  bracket_ = std::make_unique<RollingBracket>(cycle);
+  bracket_ = std::make_unique<RollingBracket>(cycle, merging_);
   const capture::Time end = capture::monotonic_now() + bracket_patience;
   std::string why = camera_->first().note;
   while (bracket_->shots() < cycle && capture::monotonic_now() < end) {
@@ -214,7 +220,7 @@ bool ProbeSource::add(const capture::Frame& frame) {
     ++status_.rejected;
     return false;
   }
-  bracket_->add(frame.image, exposure_s, frame.number);
+  bracket_->add(frame.image, exposure_s, frame.number, frame.time);
   return true;
 }
 
@@ -223,6 +229,7 @@ void ProbeSource::merge(capture::Time time) {
   if (!status_.exposures_s.empty()) bracket_->set_cycle(status_.exposures_s);
   const std::shared_ptr<const capture::MergedFrame> merged = bracket_->merge();
   status_.shots = bracket_->shots();
+  status_.flicker = bracket_->flicker();
   status_.shares = merged->status_shares();
   const auto share_of = [&](capture::MergeStatus status) {
     return status_.shares[static_cast<std::size_t>(status)];

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/flicker.h"
 #include "capture/image.h"
 #include "capture/live_merge.h"
 #include "studio/rolling_bracket.h"
@@ -31,6 +32,7 @@ struct ProbeStatus {
   std::vector<double> exposures_s;
   bool too_bright = false;
   bool too_dark = false;
+  std::optional<capture::Flicker> flicker;  // of lamps, which is levelled
   std::string kept_because;  // why the last good light stays on air; "" = the light is new
 };
 
@@ -63,7 +65,8 @@ class ProbeSource {
 
   std::vector<double> exposures_s_;
   capture::Time offset_{};
-  std::unique_ptr<Source> camera_;  // null = the radiance stays
+  capture::WindowMergeSettings merging_;  // with the camera's noise, if calibration has told it
+  std::unique_ptr<Source> camera_;        // null = the radiance stays
   std::unique_ptr<RollingBracket> bracket_;
   Radiance newest_;
   ProbeStatus status_;

@@ -14,6 +14,9 @@ constexpr std::size_t most_shots = 16;  // of a window
 // How long a shot stays: while its exposure is to come again, and if it is not.
 constexpr std::int64_t longest_cycles = 8;
 constexpr std::int64_t last_cycles = 2;
+// Up to which lamps' flicker is levelled, and ratios of light, times those that it makes.
+constexpr double largest_modulation = 0.7;
+constexpr double beyond_swing = 1.3;
 
 bool same(double a, double b) { return std::abs(a / b - 1) <= same_exposure; }
 
@@ -41,7 +44,8 @@ bool RollingBracket::comes_again(double exposure_s) const {
 
 void RollingBracket::add(std::shared_ptr<const capture::Image> linear,
                          double exposure_s,
-                         std::int64_t number) {
+                         std::int64_t number,
+                         capture::Time time) {
   if (!(exposure_s > 0)) throw std::invalid_argument("a shot's exposure is above 0");
   if (linear == nullptr || linear->channels != 3 ||
       (!shots_.empty() && (linear->width != shots_.front().linear->width ||
@@ -53,7 +57,7 @@ void RollingBracket::add(std::shared_ptr<const capture::Image> linear,
     return same(shot.exposure_s, exposure_s) || shot.number < number - cycles * cycle_;
   });
   if (shots_.size() == most_shots) shots_.erase(shots_.begin());
-  shots_.push_back({std::move(linear), exposure_s, number});
+  shots_.push_back({std::move(linear), exposure_s, number, time});
 }
 
 double RollingBracket::least_radiance() const {
@@ -67,7 +71,26 @@ std::shared_ptr<const capture::MergedFrame> RollingBracket::merge() {
   for (const Member& shot : shots_) window_.push_back({shot.linear.get(), shot.exposure_s});
   std::shared_ptr<capture::MergedFrame> merged = pool_.lend();
   capture::merge_window(window_, settings_, *merged);
+  watch(*merged);
   return merged;
+}
+
+// Looks at the shots that came one after the other since the last time.
+void RollingBracket::watch(const capture::MergedFrame& merged) {
+  for (std::size_t i = 1; i < shots_.size(); ++i) {
+    const Member& before = shots_[i - 1];
+    const Member& shot = shots_[i];
+    if (shot.number <= watched_ || shot.number != before.number + 1) continue;
+    watch_.add({before.time, before.exposure_s, merged.gains[i - 1]},
+               {shot.time, shot.exposure_s, merged.gains[i]});
+  }
+  watched_ = shots_.back().number;
+  flicker_ = watch_.found();
+  settings_.level_flicker = flicker_.has_value();
+  if (flicker_) {
+    const double swing = std::min(flicker_->modulation, largest_modulation);
+    settings_.most_levelled = beyond_swing * (1 + swing) / (1 - swing);
+  }
 }
 
 }  // namespace studio

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
+#include <numbers>
 #include <random>
 #include <thread>
 
@@ -104,13 +106,16 @@ std::shared_ptr<const capture::Image> shot_of(double radiance, double exposure_s
   return std::make_shared<const capture::Image>(std::move(shot));
 }
 
+capture::Time at_60(std::int64_t number) { return capture::time_of_frame(number, {60, 1}); }
+
 TEST(RollingBracket, MergesRadianceFromTheNewestShotOfEachExposure) {
   const std::vector<double> exposures_s{0.001, 0.01, 0.1};
   RollingBracket bracket(exposures_s.size());
   std::int64_t number = 0;
   for (const double radiance : {0.05, 3.0, 60.0, 700.0}) {
     for (const double exposure_s : exposures_s) {
-      bracket.add(shot_of(radiance, exposure_s), exposure_s, number++);
+      bracket.add(shot_of(radiance, exposure_s), exposure_s, number, at_60(number));
+      ++number;
     }
     for (const float v : bracket.merge()->radiance.pixels)
       EXPECT_NEAR(v / radiance, 1, 0.01) << radiance;
@@ -121,16 +126,75 @@ TEST(RollingBracket, LeavesOutWhatDoesNotComeAgain) {
   RollingBracket bracket(2);
   for (std::int64_t n = 0; n < 20; ++n) {
     const double exposure_s = n == 0 ? 0.5 : n % 2 == 0 ? 0.001 : 0.01;
-    bracket.add(shot_of(3, exposure_s), exposure_s, n);
+    bracket.add(shot_of(3, exposure_s), exposure_s, n, at_60(n));
     EXPECT_EQ(bracket.shots(), n == 0 ? 1U : n == 1 ? 2U : n < 17 ? 3U : 2U) << n;
   }
 }
 
+// Of a grey scene of two stops, and light that changes from frame to frame; noise as a camera has.
+std::shared_ptr<const capture::Image> wide_shot(double light, double exposure_s) {
+  static std::mt19937 random(5);
+  std::normal_distribution<double> normal(0, 1);
+  capture::Image shot = capture::make_image(48, 64);
+  for (std::size_t i = 0; i < shot.pixels.size(); ++i) {
+    const double value = light * exposure_s * (1 + static_cast<double>(i % 64) / 21);
+    shot.pixels[i] =
+        static_cast<float>(std::min(1.0, value + normal(random) * std::sqrt(1e-6 + 5e-5 * value)));
+  }
+  return std::make_shared<const capture::Image>(std::move(shot));
+}
+
+// How far the merged light goes up and down in the last 30 of 150 frames, relatively.
+double swing_of(RollingBracket& bracket, const std::function<double(double)>& light) {
+  const std::vector<double> exposures_s{0.0005, 0.002, 0.001};
+  double least = 1e9, most = 0;
+  for (std::int64_t n = 0; n < 150; ++n) {
+    const double exposure_s = exposures_s[static_cast<std::size_t>(n) % 3];
+    const double time_s = static_cast<double>(n) / 60;
+    bracket.add(wide_shot(light(time_s), exposure_s), exposure_s, n, at_60(n));
+    const auto merged = bracket.merge();
+    double sum = 0;
+    for (const float v : merged->radiance.pixels) sum += static_cast<double>(v);
+    if (n < 120) continue;
+    least = std::min(least, sum);
+    most = std::max(most, sum);
+  }
+  return most / least - 1;
+}
+
+double lamp(double time_s) { return 80 * (1 + 0.3 * std::sin(200 * std::numbers::pi * time_s)); }
+
+TEST(RollingBracket, LevelsLampsThatFlicker) {
+  RollingBracket bracket(3);
+  EXPECT_LT(swing_of(bracket, lamp), 0.02);  // .6 as it comes
+  ASSERT_TRUE(bracket.flicker());
+  EXPECT_EQ(bracket.flicker()->light_hz, 100);
+  EXPECT_NEAR(bracket.flicker()->modulation, 0.3, 0.05);
+}
+
+TEST(RollingBracket, FollowsALampThatIsSwitchedWhileOthersFlicker) {
+  RollingBracket bracket(3);
+  swing_of(bracket, lamp);
+  double light = 0;
+  for (std::int64_t n = 150; n < 152; ++n) {  // the newest exposure and the next one
+    bracket.add(wide_shot(320, 0.0005), 0.0005, n, at_60(n));
+    light = static_cast<double>(bracket.merge()->radiance.pixels[0]);
+  }
+  EXPECT_NEAR(light, 320, 40);
+}
+
+TEST(RollingBracket, LevelsNoOtherLight) {
+  RollingBracket bracket(3);
+  const double swing = swing_of(bracket, [](double t) { return 80 * std::exp2(-t / 4); });
+  EXPECT_FALSE(bracket.flicker());
+  EXPECT_NEAR(swing, std::exp2(29.0 / 60 / 4) - 1, 0.02);
+}
+
 TEST(RollingBracket, RefusesShotsOfTwoSizes) {
   RollingBracket bracket(2);
-  bracket.add(std::make_shared<capture::Image>(capture::make_image(4, 6)), 0.01, 0);
+  bracket.add(std::make_shared<capture::Image>(capture::make_image(4, 6)), 0.01, 0, at_60(0));
   const auto turned = std::make_shared<capture::Image>(capture::make_image(6, 4));
-  EXPECT_THROW(bracket.add(turned, 0.1, 1), std::invalid_argument);
+  EXPECT_THROW(bracket.add(turned, 0.1, 1, at_60(1)), std::invalid_argument);
 }
 
 }  // namespace
