@@ -149,19 +149,23 @@ struct BenchOptions {
 
 Command bench_command() {
   return {"bench",
-          "Measure the kernel against bare Embree over the same rays, or what inputs cost a set",
+          "Measure the kernel against bare Embree over the same rays, or what inputs and live "
+          "light cost",
           "platelight bench kernel --json kernel.json",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto o = std::make_shared<BenchOptions>();
-            arguments.positional("WHAT", o->what, "kernel, or inputs (plate, probe, light table)");
+            arguments.positional(
+                "WHAT", o->what,
+                "kernel, inputs (plate, probe, light table), or hdr (a live probe's frames)");
             arguments.option("--set", o->set, "the set file whose inputs are measured");
             arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
             return [o](Console& console) {
               const int runs = static_cast<int>(*o->runs);
               if (o->what == "kernel") return bench_kernel(runs, console);
+              if (o->what == "hdr") return bench_hdr(runs, console);
               if (o->what != "inputs") {
                 throw UsageError(fmt::format(
-                    "there is no benchmark of \"{}\": there are kernel and inputs", o->what));
+                    "there is no benchmark of \"{}\": there are kernel, inputs and hdr", o->what));
               }
               if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");
               bench_inputs(o->set, runs, console);

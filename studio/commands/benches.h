@@ -14,4 +14,8 @@ void bench_kernel(int runs, Console& console);
 // Throws SetError.
 void bench_inputs(const std::string& set_path, int runs, Console& console);
 
+// CPU time of a live lightprobe's HDR frame of 1024x1024 pixels, a bracket of five, by the camera's
+// format: from its bytes to light, labelled, and merged; the best of `runs` passes.
+void bench_hdr(int runs, Console& console);
+
 }  // namespace studio

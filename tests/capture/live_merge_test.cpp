@@ -306,6 +306,39 @@ TEST(MergeWindow, GivesTheSameBitsInOneThread) {
   EXPECT_EQ(alone.counted, frame.counted);
 }
 
+// As beside saturated sites of a mosaic.
+TEST(MergeWindow, LeavesOutWhatIsNoValue) {
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<double> exposures_s{0.25, 1, 0.0625};
+  for (std::size_t mask = 0; mask < 8; ++mask) {
+    std::vector<Shot> shots, left;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto value =
+          static_cast<float>(0.3 * exposures_s[i] * (1 + 0.002 * static_cast<double>(mask + i)));
+      shots.push_back({Image{1, 1, {value, value, value}}, exposures_s[i]});
+      if ((mask >> i & 1) != 0) {
+        left.push_back(shots.back());
+      } else {
+        shots.back().linear.pixels[1] = none;
+      }
+    }
+    MergedFrame frame;
+    merge_window(live_shots(shots), {}, frame);
+    EXPECT_EQ(frame.counted[1], mask);
+    if (mask == 0) {
+      EXPECT_EQ(frame.status[0], MergeStatus::missing);
+      EXPECT_EQ(frame.radiance.pixels[1], 0);
+      EXPECT_TRUE(std::isinf(frame.deviation().pixels[1]));
+      continue;
+    }
+    MergedFrame of_left;
+    merge_window(live_shots(left), {}, of_left);
+    EXPECT_EQ(frame.status[0], MergeStatus::good);
+    EXPECT_NEAR(frame.radiance.pixels[1], of_left.radiance.pixels[1], 1e-6) << mask;
+    EXPECT_NEAR(frame.deviation().pixels[1], of_left.deviation().pixels[1], 1e-6) << mask;
+  }
+}
+
 // Whatever a register holds: 37 shades from black to saturated, and a lamp that is switched.
 TEST(MergeWindow, GivesTheSameBitsWithTheWidestRegisters) {
   const MadeSensor sensor = camera();
