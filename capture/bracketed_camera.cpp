@@ -19,8 +19,9 @@ std::string seconds(double exposure_s) {
 constexpr double distinct_ratio = 1.05;
 // A frame's time may be told rounded.
 constexpr double period_slack = 1.001;
-// Of a frame's time: sensors take some of it for themselves.
-constexpr double longest_share = 0.9;
+// Of a frame's time: a longer exposure arrives so late that the next request, after it, misses a
+// frame.
+constexpr double longest_share = 0.5;
 constexpr double unknown_period_s = 1.0 / 30;
 
 LabelSettings of_thumbnails(LabelSettings settings, const CameraInfo& picture) {

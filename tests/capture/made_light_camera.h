@@ -53,12 +53,13 @@ struct LightScript {
   std::function<double(std::int64_t)> gain = [](std::int64_t) { return 1.0; };
   int lag = 2;
   capture::ExposureRange exposures{20e-6, 1};
+  bool settable = true;
   double unit_s = 1e-6;        // that exposures are rounded to
   std::vector<double> made_s;  // what made the frames, by number
 };
 
 // At 60 frames a second, 12 bits, 20,000 electrons.
-class LightCamera final : public capture::Camera {
+class LightCamera : public capture::Camera {
  public:
   static constexpr double period_s = 1.0 / 60;
   static constexpr double pedestal = 64;
@@ -75,7 +76,7 @@ class LightCamera final : public capture::Camera {
   const capture::CameraInfo& info() const override { return info_; }
   capture::CameraStatistics statistics() const override { return {}; }
   std::optional<capture::ExposureRange> exposure_range() const override {
-    return script_->exposures;
+    return script_->settable ? std::optional(script_->exposures) : std::nullopt;
   }
   double set_exposure(double exposure_s) override {
     const double unit_s = script_->unit_s;
@@ -103,10 +104,12 @@ class LightCamera final : public capture::Camera {
     return frame;
   }
 
+ protected:
+  capture::CameraInfo info_;
+
  private:
   std::shared_ptr<LightScript> script_;
   capture::LiveSensor sensor_;
-  capture::CameraInfo info_;
   capture::MadeShot shot_;
   std::deque<std::pair<std::int64_t, double>> requests_;  // before which frame
   double in_effect_s_ = 0.005;

@@ -6,12 +6,17 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <stdexcept>
+#include <thread>
 
 #include "capture/live_reader.h"
+#include "studio/rolling_bracket.h"
+#include "tests/capture/made_light_camera.h"
 
 namespace studio {
 namespace {
@@ -150,6 +155,104 @@ TEST_F(ProbeSourceTest, MergesWithoutAMemberThatIsMissingForAWhile) {
   for (const double now : light) EXPECT_NEAR(now, 100, 1);
   EXPECT_EQ(statuses_[50 - 3].shots, 2U);
   EXPECT_EQ(statuses_.back().shots, 3U);
+}
+
+// The made light camera as time goes by, some five times as fast as its frames' numbers say.
+class LiveLightCamera final : public made::LightCamera {
+ public:
+  explicit LiveLightCamera(const std::shared_ptr<made::LightScript>& script) : LightCamera(script) {
+    info_.live = true;
+  }
+  std::optional<capture::Frame> next() override {
+    std::this_thread::sleep_for(3ms);
+    auto frame = LightCamera::next();
+    frame->time = capture::monotonic_now();
+    return frame;
+  }
+};
+
+class LiveProbeTest : public testing::Test {
+ protected:
+  ProbeSource open(bool asks_auto) {
+    capture::register_camera("light", [this](std::string_view, const capture::CameraOptions&) {
+      return std::make_unique<LiveLightCamera>(script_);
+    });
+    Set set;
+    set.probe.emplace();
+    set.probe->kind = ProbeSettings::Kind::camera;
+    set.probe->source = "light:";
+    set.probe->asks_auto = asks_auto;
+    return ProbeSource(set);
+  }
+  // How far the newest light's mean is off, relative.
+  double error_of(ProbeSource& source, double gain) const {
+    const auto image = source.at(capture::monotonic_now()).image;
+    double sum = 0;
+    double truth = 0;
+    for (const float value : image->pixels) sum += value;
+    for (const float value : script_->scene.pixels) truth += gain * value;
+    return std::abs(sum / truth - 1);
+  }
+  template <class Done>
+  static bool comes_true(const Done& done) {
+    const capture::Time end = capture::monotonic_now() + 60s;
+    while (!done() && capture::monotonic_now() < end) std::this_thread::sleep_for(5ms);
+    return done();
+  }
+
+  std::shared_ptr<made::LightScript> script_ = std::make_shared<made::LightScript>();
+};
+
+TEST_F(LiveProbeTest, ItsExposuresFollowTheLight) {
+  std::atomic<double> gain = 1;
+  script_->gain = [&](std::int64_t) { return gain.load(); };
+  script_->scene = made::make_light(2, 60, 300, 4);
+  for (const bool asks_auto : {true, false}) {
+    gain = 1;
+    ProbeSource source = open(asks_auto);
+    EXPECT_TRUE(comes_true(
+        [&] { return error_of(source, 1) < 0.01 && source.status().exposures_s.size() == 2; }));
+    const double longest_s = source.status().exposures_s.back();
+    gain = 50;
+    EXPECT_TRUE(comes_true([&] {
+      return error_of(source, 50) < 0.01 && source.status().exposures_s.back() < longest_s / 10;
+    }));
+    EXPECT_FALSE(source.status().too_bright || source.status().too_dark);
+    gain = 1e5;
+    EXPECT_TRUE(comes_true([&] {
+      static_cast<void>(source.at(capture::monotonic_now()));
+      return source.status().too_bright;
+    }));
+    gain = 1;
+    EXPECT_TRUE(
+        comes_true([&] { return error_of(source, 1) < 0.01 && !source.status().too_bright; }));
+  }
+}
+
+TEST_F(LiveProbeTest, TakesACameraAsItIsUnlessToldOtherwise) {
+  script_->settable = false;
+  ProbeSource source = open(false);
+  EXPECT_NE(source.at(capture::monotonic_now()).image, nullptr);
+  EXPECT_TRUE(source.status().exposures_s.empty());
+  try {
+    static_cast<void>(open(true));
+    FAIL();
+  } catch (const SetError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("cannot be set from frame to frame"));
+  }
+}
+
+TEST(RollingBracket, KeepsAShotThatDoesNotComeAgainForTwoCycles) {
+  const auto image = std::make_shared<capture::Image>(capture::make_image(4, 8));
+  RollingBracket bracket(3);
+  for (std::int64_t n = 0; n < 3; ++n)
+    bracket.add(image, exposures_s.at(static_cast<std::size_t>(n % 3)), n);
+  bracket.set_cycle(std::array{0.016, 0.001});
+  for (std::int64_t n = 3; n < 12; ++n) {
+    bracket.add(image, exposures_s.at(static_cast<std::size_t>(n % 2)), n);
+    EXPECT_EQ(bracket.shots(), n <= 2 + 4 ? 3U : 2U) << n;
+  }
+  EXPECT_THROW(bracket.set_cycle({}), std::invalid_argument);
 }
 
 }  // namespace
