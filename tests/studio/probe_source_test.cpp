@@ -246,10 +246,12 @@ TEST(RollingBracket, KeepsAShotThatDoesNotComeAgainForTwoCycles) {
   const auto image = std::make_shared<capture::Image>(capture::make_image(4, 8));
   RollingBracket bracket(3);
   for (std::int64_t n = 0; n < 3; ++n)
-    bracket.add(image, exposures_s.at(static_cast<std::size_t>(n % 3)), n);
+    bracket.add(image, exposures_s.at(static_cast<std::size_t>(n % 3)), n,
+                capture::time_of_frame(n, {60, 1}));
   bracket.set_cycle(std::array{0.016, 0.001});
   for (std::int64_t n = 3; n < 12; ++n) {
-    bracket.add(image, exposures_s.at(static_cast<std::size_t>(n % 2)), n);
+    bracket.add(image, exposures_s.at(static_cast<std::size_t>(n % 2)), n,
+                capture::time_of_frame(n, {60, 1}));
     EXPECT_EQ(bracket.shots(), n <= 2 + 4 ? 3U : 2U) << n;
   }
   EXPECT_THROW(bracket.set_cycle({}), std::invalid_argument);
