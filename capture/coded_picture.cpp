@@ -271,10 +271,11 @@ class RawReader final : public CodedPictureReader::Reader {
     for (int y = 0; y < mosaic_.height; ++y) {
       unpack(bytes, y);
       float* const to = mosaic_.row(y);
-      for (int x = 0; x < mosaic_.width; ++x) {
-        const auto c = static_cast<std::size_t>(colour_of_site(raw_.pattern, y, x));
-        to[x] = tables_[c][codes_[static_cast<std::size_t>(x)]];
-      }
+      const auto table = [&](int x) {
+        return tables_[static_cast<std::size_t>(colour_of_site(raw_.pattern, y, x))].data();
+      };
+      const std::array tables{table(0), table(1)};  // of every second site
+      for (std::size_t x = 0; x < codes_.size(); ++x) to[x] = tables[x % 2][codes_[x]];
     }
     demosaic(mosaic_, raw_.pattern, crop, image);
     if (mark_saturated_) mark_saturated(mosaic_, raw_.pattern, saturation, crop, image);

@@ -2,6 +2,7 @@
 #include "capture/raw.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <stdexcept>
 
@@ -112,29 +113,28 @@ void unpack_row(Packing packing,
     throw std::invalid_argument("a row of codes that is too short, or packed otherwise");
   }
   const int mask = (1 << bits) - 1;
-  for (std::size_t x = 0; x < to.size(); ++x) {
-    int code = 0;
-    switch (packing) {
-      case Packing::bytes:
-        code = byte_at(from, x);
-        break;
-      case Packing::words:
-        code = (byte_at(from, 2 * x) | byte_at(from, 2 * x + 1) << 8) & mask;
-        break;
-      case Packing::mipi10: {
+  const auto fill = [&](auto code_at) {
+    for (std::size_t x = 0; x < to.size(); ++x) to[x] = static_cast<std::uint16_t>(code_at(x));
+  };
+  switch (packing) {
+    case Packing::bytes:
+      return fill([&](std::size_t x) { return byte_at(from, x); });
+    case Packing::words:
+      return fill([&](std::size_t x) {
+        return (byte_at(from, 2 * x) | byte_at(from, 2 * x + 1) << 8) & mask;
+      });
+    case Packing::mipi10:
+      return fill([&](std::size_t x) {
         const std::size_t group = x / 4 * 5;
         const int low = byte_at(from, group + 4) >> (2 * (x % 4)) & 3;
-        code = byte_at(from, group + x % 4) << 2 | low;
-        break;
-      }
-      case Packing::mipi12: {
+        return byte_at(from, group + x % 4) << 2 | low;
+      });
+    case Packing::mipi12:
+      return fill([&](std::size_t x) {
         const std::size_t group = x / 2 * 3;
         const int low = byte_at(from, group + 2) >> (4 * (x % 2)) & 15;
-        code = byte_at(from, group + x % 2) << 4 | low;
-        break;
-      }
-    }
-    to[x] = static_cast<std::uint16_t>(code);
+        return byte_at(from, group + x % 2) << 4 | low;
+      });
   }
 }
 
@@ -194,26 +194,35 @@ void demosaic(Mosaic& mosaic, BayerPattern pattern, const Crop& crop, Image& ima
 void mark_saturated(
     const Mosaic& mosaic, BayerPattern pattern, float saturation, const Crop& crop, Image& image) {
   constexpr int reach = Mosaic::margin;
+  constexpr std::uint8_t side = 2 * reach + 1;
   const auto width = static_cast<std::size_t>(crop.width);
   std::vector<std::uint8_t> above(width + 2 * reach);  // columns from crop.x - reach on
+  std::vector<std::uint8_t> near(above.size() - 2 * reach);
   for (int y = crop.y; y < crop.y + crop.height; ++y) {
-    // The columns that have a saturated site in the rows that count.
+    // Saturated sites among the rows that count, by column; then within reach of each site.
     std::ranges::fill(above, std::uint8_t{0});
     for (int from = y - reach; from <= y + reach; ++from) {
       const float* row = mosaic.row(from) + crop.x - reach;
       for (std::size_t x = 0; x < above.size(); ++x) {
-        above[x] |= row[x] >= saturation ? std::uint8_t{1} : std::uint8_t{0};
+        above[x] = static_cast<std::uint8_t>(above[x] + (row[x] >= saturation ? 1 : 0));
       }
     }
     std::uint8_t any = 0;
     for (const std::uint8_t one : above) any |= one;
     if (any == 0) continue;
-    for (int x = 0; x < crop.width; ++x) {
-      const auto first = above.begin() + x;
-      if (std::find(first, first + 2 * reach + 1, 1) == first + 2 * reach + 1) continue;
-      const int own = colour_of_site(pattern, y, crop.x + x);
+    std::ranges::fill(near, std::uint8_t{0});
+    for (std::size_t i = 0; i < side; ++i) {
+      for (std::size_t x = 0; x < width; ++x) {
+        near[x] = static_cast<std::uint8_t>(near[x] + above[x + i]);
+      }
+    }
+    const std::array own{colour_of_site(pattern, y, crop.x),
+                         colour_of_site(pattern, y, crop.x + 1)};
+    float* to = image.pixels.data() + image.index(y - crop.y, 0);
+    for (std::size_t x = 0; x < width; ++x, to += 3) {
+      if (near[x] == 0 || near[x] == side * side) continue;
       for (int c = 0; c < 3; ++c) {
-        if (c != own) image.at(y - crop.y, x, c) = std::numeric_limits<float>::quiet_NaN();
+        if (c != own[x % 2]) to[c] = std::numeric_limits<float>::quiet_NaN();
       }
     }
   }

@@ -68,9 +68,10 @@ int colour_of_site(BayerPattern pattern, int y, int x);
 // Throws std::invalid_argument if `crop` reaches beyond the mosaic, or `pattern` is none.
 void demosaic(Mosaic& mosaic, BayerPattern pattern, const Crop& crop, Image& image);
 
-// Sets colours to NaN that demosaic() took from sites among which one has `saturation` or more, up
-// to two rows and columns away: they are darker than the light was. What a pixel's own site
-// measured stays. `image` is what demosaic() made of `mosaic` with this `crop`.
+// Sets colours to NaN that demosaic() took from sites among which some have `saturation` or more,
+// and some less, up to two rows and columns away: they are darker than the light was. What a
+// pixel's own site measured stays; so does what comes of nothing but saturated sites, and is
+// saturated. `image` is what demosaic() made of `mosaic` with this `crop`.
 void mark_saturated(
     const Mosaic& mosaic, BayerPattern pattern, float saturation, const Crop& crop, Image& image);
 

@@ -255,5 +255,28 @@ TEST(MarkSaturated, LeavesOutWhatWasInterpolatedFromSaturatedSites) {
   }
 }
 
+TEST(MarkSaturated, KeepsWhatIsSaturatedAllAround) {
+  constexpr Crop whole{0, 0, 21, 16};
+  Mosaic mosaic;
+  mosaic.resize(whole.width, whole.height);
+  for (int y = 0; y < whole.height; ++y) {
+    std::fill_n(mosaic.row(y), whole.width, 0.5F);
+    if (y >= 5) std::fill_n(mosaic.row(y), whole.width, 1.0F);
+  }
+  Image image;
+  demosaic(mosaic, BayerPattern::gbrg, whole, image);
+  mark_saturated(mosaic, BayerPattern::gbrg, 0.98F, whole, image);
+  for (int y = 0; y < whole.height; ++y) {
+    for (int x = 0; x < whole.width; ++x) {
+      int none = 0;
+      for (int c = 0; c < 3; ++c) none += std::isnan(image.at(y, x, c)) ? 1 : 0;
+      EXPECT_EQ(none, y >= 3 && y <= 6 ? 2 : 0) << x << ' ' << y;
+      if (y > 6) {
+        for (int c = 0; c < 3; ++c) EXPECT_EQ(image.at(y, x, c), 1);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace capture
