@@ -120,23 +120,23 @@ bool AutoExposures::observe(const FrameLight& light,
 
 // Whether it is of the bracket. What a frame contradicts is forgotten: light has changed.
 bool AutoExposures::note_labelled(const FrameLight& light, double exposure_s) {
-  const auto labelled = std::ranges::find_if(
-      members_, [=](const Member& member) { return same(member.taken_s, exposure_s, same_label); });
-  if (labelled == members_.end()) return false;
   const bool saturates = light.saturated > 0;
-  for (auto other = members_.begin(); other != members_.end(); ++other) {
-    const bool would_be = other->light.saturated > 0;
-    if (saturates ? other > labelled && !would_be : other < labelled && would_be) {
-      other->seen_at = -1;
+  bool is_member = false;
+  for (std::size_t i = 0; i < members_.size(); ++i) {
+    Member& member = members_[i];
+    if (same(member.taken_s, exposure_s,
+             same_label)) {  // two of them, if the device rounds coarsely
+      member.light = light;
+      member.seen_at = frames_;
+      if (awaited_s_ && same(exposures_s_[i], *awaited_s_, same_label)) awaited_s_.reset();
+      is_member = true;
+    } else {
+      const bool saturated = member.light.saturated > 0;
+      const bool is_longer = member.taken_s > exposure_s;
+      if (saturates != saturated && is_longer == saturates) member.seen_at = -1;
     }
   }
-  labelled->light = light;
-  labelled->seen_at = frames_;
-  if (awaited_s_ && same(exposures_s_[static_cast<std::size_t>(labelled - members_.begin())],
-                         *awaited_s_, same_label)) {
-    awaited_s_.reset();
-  }
-  return true;
+  return is_member;
 }
 
 void AutoExposures::note_unlabelled(const FrameLight& light) {

@@ -268,6 +268,15 @@ TEST(AutoExposures, TakeACoarseDeviceAsItIs) {
   }
 }
 
+// Two exposures that are one to the device.
+TEST(AutoExposures, GoOnWhereTheDeviceTakesTwoForOne) {
+  const auto script = scene(make_middle());
+  AutoExposures exposures(settings_of(*script));
+  const std::vector<double> taken_s(exposures.exposures_s().size(), 0.002);
+  const FrameLight light{.dark = 0.02, .brightest = 0.6, .saturated = 0};
+  EXPECT_TRUE(exposures.observe(light, 0.002, taken_s, 2));
+}
+
 TEST(AutoExposures, MakeDoWithALargerErrorForFewerExposures) {
   const auto script = scene(made::make_light(1, 20000, 20000, 4));
   AutoExposureSettings settings = settings_of(*script);

@@ -76,6 +76,8 @@ loop = true
 [probe]
 source = "map.exr"
 yaw = 90
+exposures = "auto"
+exposure_error = 0.05
 unseen = "mean"
 match = { patch = [10, 20, 30, 40], albedo = 0.8 }
 vignetting = [0.5]
@@ -134,6 +136,8 @@ timecode = "10:00:00:00"
   ASSERT_TRUE(set.probe);
   EXPECT_EQ(set.probe->kind, ProbeSettings::Kind::map);
   EXPECT_NEAR(set.probe->yaw_rad, 90 * degree, 1e-12);
+  EXPECT_TRUE(set.probe->asks_auto);
+  EXPECT_EQ(set.probe->exposure_error, 0.05);
   EXPECT_EQ(set.probe->unseen, render::Unseen::mean);
   EXPECT_EQ(set.probe->match.method, MatchSettings::Method::patch);
   EXPECT_EQ(set.probe->match.patch, (std::array{10, 20, 30, 40}));
@@ -169,6 +173,8 @@ TEST_F(SetFile, TakesADirectoryOfShotsInOrderOfTheirNames) {
   EXPECT_EQ(set.probe->kind, ProbeSettings::Kind::bracket);
   EXPECT_EQ(set.probe->shots,
             (std::vector{(dir_ / "bracket/a.jpg").string(), (dir_ / "bracket/b.jpg").string()}));
+  EXPECT_FALSE(set.probe->asks_auto);
+  EXPECT_EQ(set.probe->exposure_error, 0.1);
 }
 
 TEST_F(SetFile, CountsInstancesOverAllObjects) {
