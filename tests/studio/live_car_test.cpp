@@ -104,7 +104,9 @@ TEST_F(LiveCarTest, ChoosesItsProbesExposures) {
   EXPECT_LE(exposures_s.back(), 1.0 / 60);
   EXPECT_GE(status.probe.shots, exposures_s.size());
   EXPECT_FALSE(status.probe.too_bright) << "1 us is short enough for its sun";
-  for (const float gain : status.match.gain) EXPECT_NEAR(gain, 0.1, 0.004);
+  // While exposures change on a busy machine the light may be some frames old, as where packets are
+  // lost.
+  for (const float gain : status.match.gain) EXPECT_NEAR(gain, 0.1, 0.006);
 }
 
 TEST_F(LiveCarTest, GoesOnWhilePacketsAreLost) {
