@@ -2,6 +2,7 @@
 #include "capture/exposure_labels.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -14,6 +15,9 @@ constexpr std::size_t kept_requests = 24;
 constexpr double same_ratio = 1.01;
 // Values that are neither black nor saturated, from which a picture is not featureless.
 constexpr int least_seen = 32;
+// Frames in a row that what is known does not explain, until it is held for true no longer where it
+// tells but roughly.
+constexpr int most_contradictions = 3;
 // Deviations from black.
 constexpr double seen_deviations = 32;
 
@@ -90,6 +94,10 @@ void ExposureLabeller::restart() {
   known_.clear();
   lags_.clear();
   searching_ = false;
+  contradictions_ = 0;
+  explained_before_ = false;
+  explained_s_ = 0;
+  accepted_.reset();
   last_number_.reset();
   last_.values.clear();
 }
@@ -114,11 +122,24 @@ TriedExposure ExposureLabeller::tried(std::int64_t number, int lag, double expos
     if (other < exposure_s) tried.shorter_s = other;
     if (other > exposure_s && tried.longer_s == 0) tried.longer_s = other;
   }
-  tried.partners_s = {predicted(number - 2, lag), predicted(number - 1, lag),
-                      predicted(number + 1, lag)};
-  for (double& partner_s : tried.partners_s) {
-    if (same(partner_s, exposure_s)) partner_s = 0;
+  const auto add_partner = [&](std::array<double, 8>& partners_s, double partner_s) {
+    if (partner_s <= 0 || same(partner_s, exposure_s) || holds(partners_s, partner_s)) return;
+    const auto free = std::ranges::find(partners_s, 0.0);
+    if (free != partners_s.end()) *free = partner_s;
+  };
+  const auto add_partners = [&](int of_lag) {
+    const double now_s = predicted(number, of_lag);
+    add_partner(tried.before_s, predicted(number - 1, of_lag));
+    add_partner(tried.before_s, now_s);
+    add_partner(tried.after_s, predicted(number + 1, of_lag));
+    add_partner(tried.after_s, now_s);
+  };
+  add_partners(lag);
+  if (!before_sure_) {
+    for (const double other : in_play_s_) add_partner(tried.before_s, other);
   }
+  // Those that foretold the same until now need not have for the frame before or after.
+  if (std::ranges::find(lags_, lag) != lags_.end()) std::ranges::for_each(lags_, add_partners);
   return tried;
 }
 
@@ -172,6 +193,7 @@ void ExposureLabeller::extend_run(
   if (run.light.empty()) {
     run.since = number;
     run.first_s = label_s;
+    run.frames = 0;
     run.moved_on = false;
     run.cycles = 0;
     run.labelled_s.clear();
@@ -181,18 +203,39 @@ void ExposureLabeller::extend_run(
   // A camera that was just opened may begin a run with an exposure of its own.
   const bool opened = known_.empty() && in_play_s_.size() > 1;
   if (run.since == number) {
-    if (!opened && without_lag(thumbnail).verdict != LabelVerdict::unknown) {
-      add(run.agreed_s, label_s);
-    }
+    run.first_seen = !opened && without_lag(thumbnail).verdict != LabelVerdict::unknown;
   } else if (run.moved_on || !opened) {
     add(run.labelled_s, label_s);
-    if (run.fit.fit == Fit::agrees) add(run.agreed_s, label_s);
+    if (run.fit.fit == Fit::agrees) {
+      if (run.agreed_s.empty()) {
+        run.cycles = 0;
+        run.labelled_s.clear();
+      }
+      add(run.agreed_s, label_s);
+      if (run.frames == 1 && run.first_seen && run.fit.near) add(run.agreed_s, run.first_s);
+    }
     if (std::ranges::all_of(in_play_s_, [&](double t) { return holds(run.labelled_s, t); })) {
       ++run.cycles;
       run.labelled_s.clear();
     }
   }
+  ++run.frames;
   run.light.take(thumbnail, label_s, number);
+}
+
+// Whether the known light tells what is wrong with a frame that contradicts it: mixed, or made by
+// another exposure in play. Then nothing is wrong with the light.
+bool ExposureLabeller::explains(const FitResult& fit,
+                                std::int64_t number,
+                                const Thumbnail& thumbnail,
+                                double label_s) const {
+  if (fit.in_part) return true;
+  return std::ranges::any_of(in_play_s_, [&](double exposure_s) {
+    if (same(exposure_s, label_s)) return false;
+    const FitResult other =
+        known_.check(thumbnail, number, tried(number, lags_.front(), exposure_s));
+    return other.fit == Fit::agrees;
+  });
 }
 
 void ExposureLabeller::extend_runs(std::int64_t number, const Thumbnail& thumbnail, double told_s) {
@@ -218,8 +261,8 @@ bool ExposureLabeller::complete(std::size_t lag) const {
   }
   // A frame gone wrong among black or saturated ones may hide where a wrong lag fails: not every
   // time.
-  const int cycles = known ? 1 : lags_.empty() ? 2 : 4;
-  return run.cycles >= cycles && run.agreed_s.size() >= 2;
+  const int cycles = known || lags_.empty() ? 1 : 4;
+  return run.cycles >= cycles && !run.agreed_s.empty();
 }
 
 std::optional<std::size_t> ExposureLabeller::believed_run() const {
@@ -242,6 +285,7 @@ std::optional<std::size_t> ExposureLabeller::believed_run() const {
 // From here on the lag is known: this one, and those that have foretold the same for a bracket.
 void ExposureLabeller::believe(std::size_t lag, std::int64_t number, double told_s) {
   known_ = runs_[lag].light;
+  contradictions_ = 0;
   searching_ = false;
   const std::int64_t first = number - static_cast<std::int64_t>(in_play_s_.size());
   lags_ = {static_cast<int>(lag)};
@@ -259,16 +303,16 @@ ExposureLabel ExposureLabeller::verdict_of(const FitResult& fit,
                                            const Thumbnail& thumbnail,
                                            double label_s) const {
   ExposureLabel label;
-  if (fit.fit == Fit::agrees) {
+  if (fit.fit == Fit::agrees && (fit.near || contradictions_ < most_contradictions)) {
     label.verdict = LabelVerdict::accepted;
     label.reason = LabelReason::none;
     label.exposure_s = label_s;
   } else {
     label = without_lag(thumbnail);
     if (label.verdict == LabelVerdict::rejected) {
-      label.reason = !fit.tells    ? LabelReason::unchecked
-                     : fit.in_part ? LabelReason::mixed
-                                   : LabelReason::mislabelled;
+      label.reason = !fit.tells || fit.fit == Fit::agrees ? LabelReason::unchecked
+                     : fit.in_part                        ? LabelReason::mixed
+                                                          : LabelReason::mislabelled;
     }
   }
   label.predicted_s = label_s;
@@ -300,6 +344,7 @@ ExposureLabel ExposureLabeller::label(std::int64_t number,
       (number <= *last_number_ || number - *last_number_ - 1 > settings_.most_lost)) {
     restart();
   }
+  before_sure_ = accepted_ == number - 1;
   last_number_ = number;
   if (repeats(thumbnail)) {
     ExposureLabel label;
@@ -309,10 +354,23 @@ ExposureLabel ExposureLabeller::label(std::int64_t number,
   last_ = thumbnail;
   double label_s = 0;
   const std::optional<FitResult> fit = check_known(number, thumbnail, told_s, label_s);
+  const bool contradicts = fit && fit->fit == Fit::contradicts;
+  const bool explained = contradicts && explains(*fit, number, thumbnail, label_s);
+  if (contradicts && !explained) ++contradictions_;
   ExposureLabel label = fit ? verdict_of(*fit, thumbnail, label_s) : without_lag(thumbnail);
   const bool accepted = label.verdict == LabelVerdict::accepted;
-  if (accepted) known_.take(thumbnail, label_s, number);
-  if (accepted && !searching_) return label;
+  if (accepted) {
+    known_.take(thumbnail, label_s, number);
+    accepted_ = number;
+    contradictions_ = 0;
+    if (same(explained_s_, label_s)) explained_s_ = 0;
+  }
+  // What explains one frame may be chance, but not that of the next one, or of the next that has
+  // the same label.
+  const bool once = explained && !explained_before_ && !same(explained_s_, label_s);
+  explained_before_ = explained;
+  if (explained) explained_s_ = label_s;
+  if (once || (accepted && !searching_)) return label;
 
   extend_runs(number, thumbnail, told_s);
   const std::optional<std::size_t> found = believed_run();
@@ -327,6 +385,7 @@ ExposureLabel ExposureLabeller::label(std::int64_t number,
     lags_.clear();
     return {};
   }
+  contradictions_ = 0;
   label = verdict_of(run.fit, thumbnail, run.current_s);
   believe(*found, number, told_s);
   return label;

@@ -53,15 +53,19 @@ struct LabelSettings {
 // doubted, a run of frames is kept for each possible lag, with the radiance that its labels tell.
 // Where a frame contradicts it, a run starts anew. A run is believed if it has agreeing frames with
 // the shortest and the longest exposure, or, where these tell nothing, has been through all
-// exposures (once if the lag was believed before, twice if none was, four times if another was),
-// and no run of another label is as old: no wrong lag can do that, since labels that are
-// wrong by a constant factor would need an exposure beyond the longest or shortest.
+// exposures since the first that told (four times if another lag was believed), and no run of
+// another label is as old: no wrong lag can do that, since labels that are wrong by a constant
+// factor would need an exposure beyond the longest or shortest. The first frame of a run agrees if
+// the next one does with it, finely: it may be the one that went wrong.
 //
 // With the lag known, a frame is accepted if the exposure that the lag foretells fits what accepted
 // frames before it told of the light. If not, it is rejected, and the lag is put in doubt: runs
 // begin, beside it. So all of a lag that changes, light that changes and a frame gone wrong are
 // rejected at first. They end differently: after a wrong frame the next one fits the known light
-// again; after the other two, a run of one bracket is believed.
+// again; after the other two, a run of one bracket is believed. A wrong frame that the known light
+// explains (mixed, or made by another exposure in play) begins no run, unless another follows.
+// After three frames in a row that it does not explain, the known light counts no more where it
+// tells but roughly.
 //
 // Lags that foretell the same (those a whole bracket apart, until a frame is lost) are kept
 // together, until one of them is contradicted.
@@ -73,7 +77,7 @@ struct LabelSettings {
 // - That a camera takes another gain or exposure than those in play, if it looks like light that
 //   drifts or was switched. So a camera that is opened anew must leave out more than most_lost
 //   frames, or be told of (restart).
-// - That part of a picture is of another exposure if fewer than 4 values there tell it.
+// - That part of a picture is of another exposure if no value there tells it.
 class ExposureLabeller {
  public:
   // Throws std::invalid_argument for settings below 0.
@@ -106,7 +110,9 @@ class ExposureLabeller {
     explicit Run(const LabelSettings& settings) : light(settings.noise, settings.light_drift) {}
     RadianceReference light;
     std::int64_t since = 0;
-    double first_s = 0;              // its first label
+    double first_s = 0;       // its first label
+    bool first_seen = false;  // its first frame was neither dark nor saturated
+    int frames = 0;
     bool moved_on = false;           // there were others
     int cycles = 0;                  // through all exposures in play
     std::vector<double> labelled_s;  // distinct labels since the last one
@@ -122,6 +128,10 @@ class ExposureLabeller {
                                        const Thumbnail& thumbnail,
                                        double told_s,
                                        double& label_s);
+  bool explains(const FitResult& fit,
+                std::int64_t number,
+                const Thumbnail& thumbnail,
+                double label_s) const;
   void extend_runs(std::int64_t number, const Thumbnail& thumbnail, double told_s);
   void extend_run(
       Run& run, int lag, std::int64_t number, const Thumbnail& thumbnail, double label_s);
@@ -139,7 +149,13 @@ class ExposureLabeller {
   RadianceReference known_;        // the light as accepted frames tell it
   std::vector<int> lags_;          // that are believed; empty = none yet
   bool searching_ = true;
-  std::vector<Run> runs_;  // by lag
+  int contradictions_ = 0;  // frames in a row that the known light does not explain
+  bool explained_before_ =
+      false;                  // the frame before: it was wrong, but its light was the known one
+  double explained_s_ = 0;    // the newest such label of which no frame was right since
+  std::vector<Run> runs_;     // by lag
+  bool before_sure_ = false;  // the exposure of the frame before is known
+  std::optional<std::int64_t> accepted_;
   std::optional<std::int64_t> last_number_;
   Thumbnail last_;
 };

@@ -7,44 +7,19 @@
 #include <vector>
 
 #include "capture/hdr.h"
-#include "capture/image.h"
+#include "capture/thumbnail.h"
 
 namespace capture {
-
-// A few linear values of a picture, (rows, columns, channels), 1 = saturated. The first and the
-// last row hold those of the picture, so that a picture that changes its exposure somewhere shows
-// it in one of them. Values that are not finite count as not taken.
-struct Thumbnail {
-  int rows = 0;
-  int columns = 0;
-  int channels = 3;
-  std::vector<float> values;
-
-  std::size_t row_size() const {
-    return static_cast<std::size_t>(columns) * static_cast<std::size_t>(channels);
-  }
-};
-
-// The means of rows x columns cells; fewer where the picture has fewer pixels. So dark pictures, in
-// which no pixel rises above the noise, tell their exposure all the same. A mean of saturated and
-// other pixels follows no exposure, and is no value (NaN). Throws std::invalid_argument for an
-// empty picture, or rows or columns below 1.
-Thumbnail thumbnail_of(const Image& image,
-                       int rows = 16,
-                       int columns = 16,
-                       double saturation = NoiseModel{}.saturation);
-// The noise of such values, where `noise` is that of the picture's pixels.
-NoiseModel noise_of_thumbnail(
-    const NoiseModel& noise, int width, int height, int rows = 16, int columns = 16);
 
 // An exposure that a frame may have had, and those it is to be told from.
 struct TriedExposure {
   double exposure_s = 0;
   double shorter_s = 0;  // the nearest in play; 0 = none
   double longer_s = 0;
-  // In effect shortly before or after, 0 = none: a picture that changes in the middle is made of
-  // the tried exposure and one of these.
-  std::array<double, 3> partners_s{};
+  // That may have been in effect before, in upper rows, or come into effect in lower ones; 0 =
+  // none.
+  std::array<double, 8> before_s{};
+  std::array<double, 8> after_s{};
 };
 
 enum class Fit {
@@ -56,6 +31,7 @@ enum class Fit {
 struct FitResult {
   Fit fit = Fit::silent;
   bool tells = false;    // the next shorter and longer exposures would look different
+  bool near = false;     // tells finely, too: values are those expected, not only nearest to them
   bool in_part = false;  // contradicts: other rows agree
   double agreeing = 0;   // the least share of values that do, over the exposures to tell it from
   int telling_least =
@@ -74,10 +50,16 @@ struct FitResult {
 // So a frame agrees if 60 % of at least 16 votes do, against every such exposure. Where fewer
 // values tell, those count against it that are off what is known by three deviations.
 //
+// Such votes are wide where exposures are far apart. So 40 % of the values with little noise must
+// also be within 10 % of what is expected (and 3 % for each frame since), wherever 16 or more are:
+// light that jumps is not taken for light as known.
+//
 // A picture that changes its exposure in the middle differs in rows that begin at the first one or
-// end at the last: it contradicts in part if at one end, in rows of 4 to 8 votes or more, at most a
-// quarter agrees, and those that do not have the values of an exposure in effect shortly before or
-// after (to 25 %); if they do not, something moved.
+// end at the last. Of the values there that tell the tried exposure from the other (three
+// deviations of both apart), those that are the other's and not the tried one's vote for the other:
+// twice if five deviations away. It contradicts in part if from one end on there are two votes or
+// more, and values as tried are at most an eighth of them. One value may be enough; so now and then
+// something that moved into the only value that tells is taken for it.
 class RadianceReference {
  public:
   // Light that changes by up to `light_drift` a frame (relative) everywhere is allowed for.
@@ -95,14 +77,23 @@ class RadianceReference {
  private:
   struct Limits;
   struct Votes;
+  struct Band;
+  struct Variance;
+  struct Nearness {
+    int telling = 0, agreeing = 0;
+  };
   Limits limits_of(const Thumbnail& thumbnail,
                    std::int64_t number,
                    const TriedExposure& tried) const;
-  bool made_by_partner(const Thumbnail& thumbnail,
+  bool made_in_part(double partner_s,
+                    const Thumbnail& thumbnail,
+                    const TriedExposure& tried,
+                    const Limits& limits,
+                    bool top) const;
+  Band band_of(std::size_t i, float exposure_s, const Limits& limits, const Variance& noise) const;
+  Nearness nearness_of(const Thumbnail& thumbnail,
                        const TriedExposure& tried,
-                       const Limits& limits,
-                       std::size_t rows,
-                       bool top) const;
+                       const Limits& limits) const;
   Votes votes_against(double other_s, const TriedExposure& tried, const Limits& limits) const;
 
   float read_, shot_, relative_squared_, saturation_;  // the noise model's
@@ -113,6 +104,7 @@ class RadianceReference {
   std::vector<float> radiance_;
   std::vector<float> variance_;         // of it; infinite = not known
   std::vector<std::int32_t> taken_at_;  // number of the frame less first_number_
+  std::vector<float> scale_;            // of the noise model's variance
 };
 
 }  // namespace capture

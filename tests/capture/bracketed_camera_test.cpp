@@ -20,19 +20,8 @@ namespace {
 
 using made::ExposureStream;
 using made::MadeFrame;
+using made::no_faults;
 using made::StreamFaults;
-
-constexpr StreamFaults no_faults{.dropped = 0,
-                                 .dropped_silently = 0,
-                                 .replaced = 0,
-                                 .inserted = 0,
-                                 .mixed = 0,
-                                 .ignored = 0,
-                                 .burst = 0,
-                                 .person = 0,
-                                 .lamp = 0,
-                                 .main_lamp = 0,
-                                 .reconnect = 0};
 
 // What the test sees of a camera that the bracket owns.
 struct Script {

@@ -1,5 +1,6 @@
-// A made camera that is told exposures from frame to frame: thumbnails of a made scene, with the
-// truth of which exposure made which row, and everything that goes wrong with such cameras.
+// A made camera that is told exposures from frame to frame: thumbnails of a made scene, or pictures
+// of it that they are taken of, with the truth of which exposure made which row, and everything
+// that goes wrong with such cameras.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +22,7 @@ namespace made {
 // Shares of frames, unless said otherwise.
 struct StreamFaults {
   double dropped = 0.01;            // numbers leave it out
-  double dropped_silently = 0.001;  // numbers do not
+  double dropped_silently = 0.002;  // numbers do not
   double replaced = 0.003;          // the picture before it comes again in its place
   double inserted = 0.001;          // the picture before it comes again, and then this one
   double mixed = 0.005;             // upper rows have the exposure before, or lower ones the next
@@ -30,8 +31,20 @@ struct StreamFaults {
   double person = 0.004;            // begins to walk through
   double lamp = 0.0003;             // switched: part of the picture
   double main_lamp = 0;             // switched: all of it, 1.2 to 6 times the light
-  double reconnect = 0.00025;       // after 4 to 40 lost frames, with another lag
+  double reconnect = 0.001;         // after 4 to 40 lost frames, with another lag
 };
+
+constexpr StreamFaults no_faults{.dropped = 0,
+                                 .dropped_silently = 0,
+                                 .replaced = 0,
+                                 .inserted = 0,
+                                 .mixed = 0,
+                                 .ignored = 0,
+                                 .burst = 0,
+                                 .person = 0,
+                                 .lamp = 0,
+                                 .main_lamp = 0,
+                                 .reconnect = 0};
 
 struct StreamPlan {
   std::vector<double> exposures_s;
@@ -42,15 +55,16 @@ struct StreamPlan {
   double key = 0;       // stops by which the scene's middle is off what the bracket's middle wants
   double drift = 0.03;  // the most that light changes from frame to frame
   int most_lag = 6;
+  int pixels = 1;  // along a cell's side; from 2 on thumbnails are taken of pictures
 };
 
 // What the camera sends, and what really made it.
 struct MadeFrame {
   std::int64_t number = 0;
   capture::Thumbnail thumbnail;
-  std::vector<double> row_exposure_s;
-  bool fresh = true;        // not a picture sent once more
-  int since_connected = 0;  // received frames since the camera came (back)
+  std::vector<double> row_exposure_s;  // of the picture's rows
+  bool fresh = true;                   // not a picture sent once more
+  int since_connected = 0;             // received frames since the camera came (back)
 };
 
 class ExposureStream {
@@ -68,7 +82,11 @@ class ExposureStream {
   }
 
   int lag() const { return lag_; }
+  // Of the thumbnails' values.
   capture::NoiseModel noise() const {
+    return capture::noise_of_thumbnail(pixel_noise(), columns * plan_.pixels, rows * plan_.pixels);
+  }
+  capture::NoiseModel pixel_noise() const {
     const double step = 1 / (std::exp2(plan_.bits) - 1);
     const double read = plan_.read_e / plan_.full_well_e;
     return {.read = read * read + step * step / 12, .shot = 1 / plan_.full_well_e};
@@ -104,9 +122,31 @@ class ExposureStream {
     }
   }
 
-  // The values that an exposure gives now, without noise.
-  double value_of(std::size_t i, double exposure_s) const { return radiance_now(i) * exposure_s; }
-  std::size_t size() const { return base_.size(); }
+  // The values that an exposure gives now, without noise; NaN where pixels saturate in part.
+  std::vector<float> values_of(double exposure_s) const {
+    std::vector<float> values;
+    if (plan_.pixels > 1) {
+      std::vector<double> row_exposure_s(row_exposure_s_.size(), exposure_s);
+      return capture::thumbnail_of(picture(row_exposure_s)).values;
+    }
+    for (std::size_t i = 0; i < base_.size(); ++i) {
+      values.push_back(static_cast<float>(radiance_now(i) * exposure_s));
+    }
+    return values;
+  }
+
+  // The exposure that made a row of values, 0 = two.
+  double made_by(const MadeFrame& frame, std::size_t row) const {
+    const auto n = static_cast<std::size_t>(plan_.pixels);
+    const auto& exposures_s = frame.row_exposure_s;
+    if (n == 1) return exposures_s[row];
+    if (row == 0) return exposures_s.front();
+    if (row == rows - 1) return exposures_s.back();
+    const std::size_t inner = rows * n - 2;
+    const std::size_t first = 1 + (row - 1) * inner / (rows - 2);
+    const std::size_t end = 1 + row * inner / (rows - 2);
+    return exposures_s[first] == exposures_s[end - 1] ? exposures_s[first] : 0;
+  }
 
   // For scripts.
   void set_light(double gain) { gain_ = gain; }
@@ -147,6 +187,57 @@ class ExposureStream {
     }
     people_.clear();
     log_gain_ = 0;
+    if (plan_.pixels == 1) return;
+    for (std::size_t i = 0; i < base_.size() * static_cast<std::size_t>(plan_.pixels); ++i) {
+      texture_.push_back(static_cast<float>(std::exp2(uniform(-0.5, 0.5))));
+    }
+    for (int i = 0; i < 1 << 16; ++i) {
+      deviates_.push_back(static_cast<float>(capture::normal_deviate(random_())));
+    }
+  }
+
+  // The picture without noise: cells of a common light, people at whole pixels, and a texture.
+  capture::Image picture(const std::vector<double>& row_exposure_s) const {
+    const int n = plan_.pixels;
+    capture::Image image = capture::make_image(rows * n, columns * n, channels);
+    const std::size_t row_size = image.index(1, 0);
+    std::size_t i = 0;
+    for (int y = 0; y < image.height; ++y) {
+      const double light = light_ * row_exposure_s[static_cast<std::size_t>(y)];
+      const float* texture = &texture_[static_cast<std::size_t>(y) * 31 % 16 * row_size];
+      for (int x = 0; x < image.width; ++x) {
+        const float* radiance = nullptr;
+        for (const Person& person : people_) {
+          const double at = (x + 0.5) / n;
+          if (y / n >= 3 && at >= person.x && at < person.x + person.width) {
+            radiance = &person.radiance[static_cast<std::size_t>(y / n * channels)];
+          }
+        }
+        const std::size_t cell =
+            static_cast<std::size_t>((y / n) * columns + x / n) * std::size_t{channels};
+        for (std::size_t c = 0; c < channels; ++c, ++i) {
+          const float own = radiance != nullptr ? radiance[c] : base_[cell + c] + lamp_[cell + c];
+          image.pixels[i] = own * *texture++ * static_cast<float>(light);
+        }
+      }
+    }
+    return image;
+  }
+
+  void add_noise(capture::Image& image) {
+    const capture::NoiseModel model = pixel_noise();
+    const auto levels = static_cast<float>(std::exp2(plan_.bits) - 1);
+    const auto read = static_cast<float>(std::pow(plan_.read_e / plan_.full_well_e, 2));
+    const auto shot = static_cast<float>(model.shot);
+    std::size_t at = 0;
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      if (i % 512 == 0) {
+        at = capture::mixed_bits(noise_key_ + ++noise_count_) % (deviates_.size() - 512);
+      }
+      const float mean = image.pixels[i];
+      const float noisy = mean + std::sqrt(read + shot * mean) * deviates_[at++];
+      image.pixels[i] = std::min(std::max(std::nearbyint(noisy * levels), -64.0F) / levels, 1.0F);
+    }
   }
 
   double radiance_now(std::size_t i) const {
@@ -228,11 +319,18 @@ class ExposureStream {
   }
 
   void take_picture() {
-    row_exposure_s_.assign(rows, stuck_s_.value_or(in_effect_s_));
+    const int picture_rows = rows * plan_.pixels;
+    row_exposure_s_.assign(static_cast<std::size_t>(picture_rows), stuck_s_.value_or(in_effect_s_));
     if (chance(faults_.mixed)) {
       // The upper rows still have the exposure before.
-      const auto border = static_cast<std::size_t>(uniform(1, rows));
+      const auto border = static_cast<std::size_t>(uniform(1, picture_rows));
       std::fill_n(row_exposure_s_.begin(), border, last_in_effect_s_);
+    }
+    if (plan_.pixels > 1) {
+      capture::Image image = picture(row_exposure_s_);
+      add_noise(image);
+      sent_ = capture::thumbnail_of(image);
+      return;
     }
     sent_ = {rows, columns, channels, {}};
     sent_.values.reserve(base_.size());
@@ -240,7 +338,7 @@ class ExposureStream {
     const capture::NoiseModel model{.read = std::pow(plan_.read_e / plan_.full_well_e, 2),
                                     .shot = 1 / plan_.full_well_e};
     for (std::size_t i = 0; i < base_.size(); ++i) {
-      const double mean = value_of(i, row_exposure_s_[i / (std::size_t{channels} * columns)]);
+      const double mean = radiance_now(i) * row_exposure_s_[i / (std::size_t{channels} * columns)];
       const double noisy =
           mean + std::sqrt(model.variance(mean)) *
                      capture::normal_deviate(capture::mixed_bits(noise_key_ + ++noise_count_));
@@ -261,6 +359,7 @@ class ExposureStream {
 
   double middle_radiance_ = 1;
   std::vector<float> base_, lamp_;
+  std::vector<float> texture_, deviates_;  // of pictures
   std::vector<Person> people_;
   bool lamp_on_ = false;
   double log_gain_ = 0, drift_ = 0, main_ = 1, gain_ = 1, light_ = 1;
