@@ -22,7 +22,7 @@ namespace made {
 // Shares of frames, unless said otherwise.
 struct StreamFaults {
   double dropped = 0.01;            // numbers leave it out
-  double dropped_silently = 0.002;  // numbers do not
+  double dropped_silently = 0.001;  // numbers do not
   double replaced = 0.003;          // the picture before it comes again in its place
   double inserted = 0.001;          // the picture before it comes again, and then this one
   double mixed = 0.005;             // upper rows have the exposure before, or lower ones the next
@@ -31,7 +31,7 @@ struct StreamFaults {
   double person = 0.004;            // begins to walk through
   double lamp = 0.0003;             // switched: part of the picture
   double main_lamp = 0;             // switched: all of it, 1.2 to 6 times the light
-  double reconnect = 0.001;         // after 4 to 40 lost frames, with another lag
+  double reconnect = 0.00025;       // after 4 to 40 lost frames, with another lag
 };
 
 constexpr StreamFaults no_faults{.dropped = 0,
