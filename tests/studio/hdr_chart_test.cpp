@@ -48,11 +48,12 @@ TEST(HdrChart, HasMergesThatErrNoMoreThanOpenCvsAndTellTheirDeviation) {
 
 // The worst sample of each says so: by its status, or by a deviation as large as its error.
 TEST(HdrChart, SaysWhereItFails) {
-  EXPECT_EQ(quick_chart().stressors.size(), 9U);
+  EXPECT_EQ(quick_chart().stressors.size(), 10U);
   for (const char* wrong : {"light, times what", "members missing, the shortest"}) {
     EXPECT_TRUE(stressor_of(wrong).samples.back().status.starts_with("lower bound")) << wrong;
   }
-  for (const char* wrong : {"light, times that", "label of", "wave on"}) {
+  for (const char* wrong :
+       {"light, times that", "label of", "wave on", "flicker of lamps before a rolling"}) {
     EXPECT_TRUE(stressor_of(wrong).samples.back().status.starts_with("inconsistent")) << wrong;
   }
   for (const char* dark : {"light, down to", "members missing, the longest"}) {
