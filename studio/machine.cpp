@@ -4,6 +4,7 @@
 #include <sched.h>
 
 #include <algorithm>
+#include <ctime>
 #include <fstream>
 
 namespace studio {
@@ -21,6 +22,12 @@ Machine this_machine() {
   CPU_ZERO(&allowed);
   if (sched_getaffinity(0, sizeof allowed, &allowed) == 0) machine.threads = CPU_COUNT(&allowed);
   return machine;
+}
+
+double cpu_ms_so_far() {
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
 }
 
 }  // namespace studio

@@ -13,4 +13,7 @@ struct Machine {
 
 Machine this_machine();
 
+// CPU time that the program has taken, of all threads.
+double cpu_ms_so_far();
+
 }  // namespace studio

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <ctime>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,13 +29,6 @@ constexpr int side = 1024;
 constexpr double exposures_s[] = {1e-4, 1.6e-3, 4e-4, 1.6e-2, 6.4e-3};
 constexpr capture::Rational rate{60, 1};
 constexpr int frames_of_pass = 40;
-
-// Of all threads.
-double cpu_ms_so_far() {
-  std::timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
 
 struct Format {
   const char* name;

@@ -1,7 +1,6 @@
 // platelight bench inputs: what a show spends on a frame before it is rendered.
 #include <algorithm>
 #include <array>
-#include <ctime>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,13 +14,6 @@
 
 namespace studio {
 namespace {
-
-// Of all threads.
-double cpu_ms_so_far() {
-  std::timespec now{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
 
 struct Pass {
   int frames = 0;
