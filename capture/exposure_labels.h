@@ -150,8 +150,8 @@ class ExposureLabeller {
   std::vector<int> lags_;          // that are believed; empty = none yet
   bool searching_ = true;
   int contradictions_ = 0;  // frames in a row that the known light does not explain
-  bool explained_before_ =
-      false;                  // the frame before: it was wrong, but its light was the known one
+  // The frame before was wrong, but its light was the known one.
+  bool explained_before_ = false;
   double explained_s_ = 0;    // the newest such label of which no frame was right since
   std::vector<Run> runs_;     // by lag
   bool before_sure_ = false;  // the exposure of the frame before is known

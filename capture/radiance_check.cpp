@@ -61,13 +61,25 @@ struct RadianceReference::Band {
   float surely_low, surely_high;  // noise alone does not reach beyond
 };
 
+// What an exposure would have given, and how far noise may take a value from it.
+struct RadianceReference::Expected {
+  float value, away;
+};
+
+RadianceReference::Expected RadianceReference::expect(std::size_t i,
+                                                      float exposure_s,
+                                                      const Limits& limits,
+                                                      const Variance& noise) const {
+  const float value = std::min(std::max(radiance_[i] * exposure_s, 0.0F), infinite);
+  return {value, certain * std::sqrt(scale_[i] * noise(std::min(value, saturation_)) +
+                                     limits.variance[i] * exposure_s * exposure_s)};
+}
+
 RadianceReference::Band RadianceReference::band_of(std::size_t i,
                                                    float exposure_s,
                                                    const Limits& limits,
                                                    const Variance& noise) const {
-  const float expected = std::min(std::max(radiance_[i] * exposure_s, 0.0F), infinite);
-  const float away = certain * std::sqrt(scale_[i] * noise(std::min(expected, saturation_)) +
-                                         limits.variance[i] * exposure_s * exposure_s);
+  const auto [expected, away] = expect(i, exposure_s, limits, noise);
   return {std::min(expected - away, saturation_), std::min(expected + away, saturation_),
           expected - surely * away, expected + surely * away};
 }
@@ -175,9 +187,7 @@ RadianceReference::Votes RadianceReference::votes_against(double other_s,
   std::int32_t agreeing = 0;
   std::int32_t surprising = 0;
   for (std::size_t i = 0; i < radiance_.size(); ++i) {
-    const float expected = std::min(std::max(radiance_[i] * t, 0.0F), infinite);
-    const float away = certain * std::sqrt(scale_[i] * noise(std::min(expected, saturation_)) +
-                                           limits.variance[i] * t * t);
+    const auto [expected, away] = expect(i, t, limits, noise);
     const bool tells = (longer ? std::min(expected - away, saturation_) >= limits.upper[i]
                                : expected + away <= limits.lower[i]) &
                        (limits.vote[i] != 2);
@@ -232,9 +242,7 @@ RadianceReference::Nearness RadianceReference::nearness_of(const Thumbnail& thum
   std::int32_t telling = 0;
   std::int32_t agreeing = 0;
   for (std::size_t i = 0; i < radiance_.size(); ++i) {
-    const float expected = std::min(std::max(radiance_[i] * t, 0.0F), infinite);
-    const float away = certain * std::sqrt(scale_[i] * noise(std::min(expected, saturation_)) +
-                                           limits.variance[i] * t * t);
+    const auto [expected, away] = expect(i, t, limits, noise);
     const float high = expected * near + away;
     const float low = expected / near - away;
     const float value = thumbnail.values[i];

@@ -78,6 +78,7 @@ class RadianceReference {
   struct Limits;
   struct Votes;
   struct Band;
+  struct Expected;
   struct Variance;
   struct Nearness {
     int telling = 0, agreeing = 0;
@@ -90,6 +91,10 @@ class RadianceReference {
                     const TriedExposure& tried,
                     const Limits& limits,
                     bool top) const;
+  Expected expect(std::size_t i,
+                  float exposure_s,
+                  const Limits& limits,
+                  const Variance& noise) const;
   Band band_of(std::size_t i, float exposure_s, const Limits& limits, const Variance& noise) const;
   Nearness nearness_of(const Thumbnail& thumbnail,
                        const TriedExposure& tried,

@@ -195,7 +195,7 @@ void ProbeSource::prime_live(std::size_t cycle) {
     if (frames.empty()) break;
     take(frames);
     // Exposures that follow the light may have become fewer.
-    cycle = std::min(cycle, camera_->statistics().exposures_s.size());
+    cycle = std::min(cycle, status_.exposures_s.size());
     if (!frames.back().note.empty()) why = frames.back().note;
   }
   if (bracket_->shots() == 0) {
@@ -225,7 +225,6 @@ bool ProbeSource::add(const capture::Frame& frame) {
 }
 
 void ProbeSource::merge(capture::Time time) {
-  note_camera();
   if (!status_.exposures_s.empty()) bracket_->set_cycle(status_.exposures_s);
   const std::shared_ptr<const capture::MergedFrame> merged = bracket_->merge();
   status_.shots = bracket_->shots();
@@ -254,6 +253,7 @@ void ProbeSource::note_camera() {
 }
 
 void ProbeSource::take(const std::vector<capture::Frame>& frames) {
+  note_camera();
   std::optional<capture::Time> fresh;
   for (const capture::Frame& frame : frames) {
     if (add(frame)) fresh = frame.time;
@@ -272,7 +272,6 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time) {
   if (camera_) {
     take(camera_->advance(time - offset_));
     status_.age = time - offset_ - newest_.time;
-    note_camera();
   }
   return newest_;
 }
