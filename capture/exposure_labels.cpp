@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace capture {
@@ -15,9 +16,20 @@ constexpr std::size_t kept_requests = 24;
 constexpr double same_ratio = 1.01;
 // Values that are neither black nor saturated, from which a picture is not featureless.
 constexpr int least_seen = 32;
+// Two pictures of the same light are not the same, value by value: even if the noise at black is
+// but that of rounding to the camera's codes, a value whose shot noise has a share s of its
+// variance changes in sqrt(s) / 3 of all cases or more. The sum of sqrt(s), at which chance is out.
+constexpr double least_noisy = 48;
 // Frames in a row that what is known does not explain, until it is held for true no longer where it
 // tells but roughly.
 constexpr int most_contradictions = 3;
+// The share of values that agree with the known light where a part of the picture does.
+constexpr double least_agreeing_in_part = 0.3;
+// Stands for an exposure that is not known, but stays the same.
+constexpr double unknown_s = 1;
+// The share of a picture's values that agree, where frames before it were wrong and it tells but
+// roughly.
+constexpr double least_agreeing_in_doubt = 0.8;
 // Deviations from black.
 constexpr double seen_deviations = 32;
 
@@ -56,7 +68,9 @@ const char* words_of(LabelReason reason) {
 }
 
 ExposureLabeller::ExposureLabeller(const LabelSettings& settings)
-    : settings_(settings), known_(settings.noise, settings.light_drift) {
+    : settings_(settings),
+      known_(settings.noise, settings.light_drift),
+      before_(settings.noise, settings.light_drift) {
   if (settings.most_lag < 0 || settings.most_lost < 0) {
     throw std::invalid_argument("the longest lag, and the most lost frames, are 0 or more");
   }
@@ -91,6 +105,7 @@ void ExposureLabeller::note_in_play() {
 void ExposureLabeller::restart() {
   requests_.clear();
   note_in_play();
+  if (!known_.empty()) before_ = known_;
   known_.clear();
   lags_.clear();
   searching_ = false;
@@ -145,10 +160,12 @@ TriedExposure ExposureLabeller::tried(std::int64_t number, int lag, double expos
 
 bool ExposureLabeller::repeats(const Thumbnail& thumbnail) const {
   if (thumbnail.values != last_.values) return false;
-  const double black = seen_deviations * std::sqrt(settings_.noise.read);
-  return std::ranges::count_if(thumbnail.values, [&](float value) {
-           return value > black && value < settings_.noise.saturation;
-         }) >= least_seen;
+  double noisy = 0;
+  for (const float value : thumbnail.values) {
+    if (!(value > 0) || value >= settings_.noise.saturation) continue;
+    noisy += std::sqrt(std::min(settings_.noise.shot * value / settings_.noise.read, 1.0));
+  }
+  return noisy >= least_noisy;
 }
 
 // Tries what the believed lags foretell. Where they foretell several exposures and one of them
@@ -180,15 +197,27 @@ std::optional<FitResult> ExposureLabeller::check_known(std::int64_t number,
 
 void ExposureLabeller::extend_run(
     Run& run, int lag, std::int64_t number, const Thumbnail& thumbnail, double label_s) {
+  // Before the first request acts, the camera keeps some exposure of its own.
+  const bool foretold = label_s > 0;
+  if (foretold && run.current_s <= 0) run.light.clear();
   run.current_s = label_s;
   run.fit = {};
-  if (label_s <= 0) {
-    run.light.clear();
-    return;
-  }
   if (!run.light.empty()) {
-    run.fit = run.light.check(thumbnail, number, tried(number, lag, label_s));
-    if (run.fit.fit == Fit::contradicts) run.light.clear();
+    run.fit = run.light.check(
+        thumbnail, number,
+        foretold ? tried(number, lag, label_s) : TriedExposure{.exposure_s = unknown_s});
+    if (run.fit.fit == Fit::contradicts) {
+      run.light.clear();
+      run.failed.push_back(number);
+    }
+  }
+  const auto bracket = static_cast<std::int64_t>(in_play_s_.size());
+  while (!run.failed.empty() && number - run.failed.front() > 2 * bracket + settings_.most_lag) {
+    run.failed.pop_front();
+  }
+  if (!foretold) {
+    run.light.take(thumbnail, unknown_s, number);
+    return;
   }
   if (run.light.empty()) {
     run.since = number;
@@ -207,6 +236,7 @@ void ExposureLabeller::extend_run(
   } else if (run.moved_on || !opened) {
     add(run.labelled_s, label_s);
     if (run.fit.fit == Fit::agrees) {
+      ++run.agreed;
       if (run.agreed_s.empty()) {
         run.cycles = 0;
         run.labelled_s.clear();
@@ -240,7 +270,11 @@ bool ExposureLabeller::explains(const FitResult& fit,
 
 void ExposureLabeller::extend_runs(std::int64_t number, const Thumbnail& thumbnail, double told_s) {
   if (!searching_) {
-    for (Run& run : runs_) run.light.clear();
+    for (Run& run : runs_) {
+      run.light.clear();
+      run.failed.clear();
+      run.agreed = 0;
+    }
     searching_ = true;
   }
   for (std::size_t lag = 0; lag < runs_.size(); ++lag) {
@@ -250,10 +284,31 @@ void ExposureLabeller::extend_runs(std::int64_t number, const Thumbnail& thumbna
   }
 }
 
+// Whether no other run that is as likely has failed as seldom.
+bool ExposureLabeller::fails_least(std::size_t lag) const {
+  const Run& run = runs_[lag];
+  return std::ranges::none_of(runs_, [&](const Run& other) {
+    return other.current_s > 0 && !same(other.current_s, run.current_s) && other.agreed > 1 &&
+           other.failed.size() <= run.failed.size();
+  });
+}
+
+// Whether the light is that which was known before the camera was opened anew, rather than that of
+// a label beside the true one. Where nothing tells, it is.
+bool ExposureLabeller::as_before(const Run& run) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < in_play_s_.size(); ++i) {
+    least = std::min(least, in_play_s_[i + 1] / in_play_s_[i]);
+  }
+  const double ratio = run.light.brighter_than(before_);
+  return ratio * ratio < least && 1 < ratio * ratio * least;
+}
+
 bool ExposureLabeller::complete(std::size_t lag) const {
   const Run& run = runs_[lag];
-  if (run.light.empty() || in_play_s_.empty()) return false;
+  if (run.light.empty() || run.current_s <= 0 || in_play_s_.empty()) return false;
   const bool known = std::ranges::find(lags_, static_cast<int>(lag)) != lags_.end();
+  if (!known && !fails_least(lag)) return false;
   // Frames lost or repeated without being counted shift labels for as many frames as the lag.
   if (!known && !lags_.empty() && *last_number_ - run.since <= settings_.most_lag) return false;
   if (holds(run.agreed_s, in_play_s_.front()) && holds(run.agreed_s, in_play_s_.back())) {
@@ -261,20 +316,24 @@ bool ExposureLabeller::complete(std::size_t lag) const {
   }
   // A frame gone wrong among black or saturated ones may hide where a wrong lag fails: not every
   // time.
-  const int cycles = known || lags_.empty() ? 1 : 4;
+  const bool better = std::ranges::all_of(lags_, [&](int believed) {
+    return runs_[static_cast<std::size_t>(believed)].failed.size() >= run.failed.size() + 2;
+  });
+  const int cycles = known || better ? (lags_.empty() && !as_before(run) ? 2 : 1) : 4;
   return run.cycles >= cycles && !run.agreed_s.empty();
 }
 
 std::optional<std::size_t> ExposureLabeller::believed_run() const {
   std::optional<std::size_t> oldest;
   for (std::size_t lag = 0; lag < runs_.size(); ++lag) {
-    if (!runs_[lag].light.empty() && (!oldest || runs_[lag].since < runs_[*oldest].since)) {
+    if (!runs_[lag].light.empty() && runs_[lag].current_s > 0 &&
+        (!oldest || runs_[lag].since < runs_[*oldest].since)) {
       oldest = lag;
     }
   }
   if (!oldest || !complete(*oldest)) return std::nullopt;
   for (const Run& run : runs_) {
-    if (!run.light.empty() && run.since == runs_[*oldest].since &&
+    if (!run.light.empty() && run.current_s > 0 && run.since == runs_[*oldest].since &&
         !same(run.current_s, runs_[*oldest].current_s)) {
       return std::nullopt;
     }
@@ -303,11 +362,19 @@ ExposureLabel ExposureLabeller::verdict_of(const FitResult& fit,
                                            const Thumbnail& thumbnail,
                                            double label_s) const {
   ExposureLabel label;
-  if (fit.fit == Fit::agrees && (fit.near || contradictions_ < most_contradictions)) {
+  // Where the frame before was wrong, more is asked of a picture that tells but roughly; and much
+  // more if its light was unknown.
+  const bool surely = fit.agreeing >= least_agreeing_in_doubt;
+  const bool coarse_enough = contradictions_ == 0
+                                 ? surely || !explained_before_
+                                 : surely && contradictions_ < most_contradictions &&
+                                       without_lag(thumbnail).verdict != LabelVerdict::unknown;
+  if (fit.fit == Fit::agrees && (fit.near || coarse_enough)) {
     label.verdict = LabelVerdict::accepted;
     label.reason = LabelReason::none;
     label.exposure_s = label_s;
   } else {
+    // A picture nearly black or saturated may tell all the same that it is not as foretold.
     label = without_lag(thumbnail);
     if (label.verdict == LabelVerdict::rejected) {
       label.reason = !fit.tells || fit.fit == Fit::agrees ? LabelReason::unchecked
@@ -385,6 +452,8 @@ ExposureLabel ExposureLabeller::label(std::int64_t number,
     lags_.clear();
     return {};
   }
+  // Two frames in a row, wrong in the same part, explain each other.
+  if (run.frames < 3 && fit && fit->agreeing > least_agreeing_in_part) return label;
   contradictions_ = 0;
   label = verdict_of(run.fit, thumbnail, run.current_s);
   believe(*found, number, told_s);

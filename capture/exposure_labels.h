@@ -53,10 +53,17 @@ struct LabelSettings {
 // doubted, a run of frames is kept for each possible lag, with the radiance that its labels tell.
 // Where a frame contradicts it, a run starts anew. A run is believed if it has agreeing frames with
 // the shortest and the longest exposure, or, where these tell nothing, has been through all
-// exposures since the first that told (four times if another lag was believed), and no run of
-// another label is as old: no wrong lag can do that, since labels that are wrong by a constant
-// factor would need an exposure beyond the longest or shortest. The first frame of a run agrees if
-// the next one does with it, finely: it may be the one that went wrong.
+// exposures since the first that told, and no run of another label is as old: no wrong lag can do
+// that, since labels that are wrong by a constant factor would need an exposure beyond the longest
+// or shortest. The first frame of a run agrees if the next one does with it, finely: it may be the
+// one that went wrong.
+//
+// But one frame that goes wrong can hide where a wrong lag fails. So more is asked of a lag than a
+// run: that it has failed in fewer frames than every other lag that agreed with some (before its
+// first request acts, a lag says that the exposure stays, and fails where the light shows that it
+// does not). Where the camera was opened anew, and the light is not what it was, by more than half
+// the way to the next exposure, a run must have gone twice through all exposures. A lag other than
+// the one believed must have failed two times less, or gone through them four times.
 //
 // With the lag known, a frame is accepted if the exposure that the lag foretells fits what accepted
 // frames before it told of the light. If not, it is rejected, and the lag is put in doubt: runs
@@ -64,8 +71,9 @@ struct LabelSettings {
 // rejected at first. They end differently: after a wrong frame the next one fits the known light
 // again; after the other two, a run of one bracket is believed. A wrong frame that the known light
 // explains (mixed, or made by another exposure in play) begins no run, unless another follows.
-// After three frames in a row that it does not explain, the known light counts no more where it
-// tells but roughly.
+// After a wrong frame, 80 % of the values must agree where the known light tells but roughly; after
+// one that it does not explain, the picture must also be neither dark nor saturated; after three of
+// these, such light counts no more.
 //
 // Lags that foretell the same (those a whole bracket apart, until a frame is lost) are kept
 // together, until one of them is contradicted.
@@ -119,6 +127,9 @@ class ExposureLabeller {
     std::vector<double> agreed_s;    // of those that told and agreed
     double current_s = 0;            // of the newest frame
     FitResult fit;
+    // Of earlier runs, too, since the search began:
+    std::deque<std::int64_t> failed;  // frames of late that contradicted
+    int agreed = 0;                   // frames
   };
 
   double predicted(std::int64_t number, int lag) const;
@@ -136,6 +147,8 @@ class ExposureLabeller {
   void extend_run(
       Run& run, int lag, std::int64_t number, const Thumbnail& thumbnail, double label_s);
   bool complete(std::size_t lag) const;
+  bool fails_least(std::size_t lag) const;
+  bool as_before(const Run& run) const;
   std::optional<std::size_t> believed_run() const;
   void believe(std::size_t lag, std::int64_t number, double told_s);
   ExposureLabel verdict_of(const FitResult& fit, const Thumbnail& thumbnail, double label_s) const;
@@ -147,6 +160,7 @@ class ExposureLabeller {
   std::deque<Request> requests_;
   std::vector<double> in_play_s_;  // in order of length
   RadianceReference known_;        // the light as accepted frames tell it
+  RadianceReference before_;       // the same before the camera was opened anew
   std::vector<int> lags_;          // that are believed; empty = none yet
   bool searching_ = true;
   int contradictions_ = 0;  // frames in a row that the known light does not explain

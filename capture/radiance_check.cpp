@@ -19,6 +19,9 @@ constexpr float surely = 5 / certain;
 constexpr double drift_limit = 3;
 constexpr int least_votes = 16;
 constexpr int votes_of_stretch = 8;
+// The votes of a value, of those for the tried exposure, that is what it should be; one that should
+// be saturated has a single one, since whatever is bright looks so.
+constexpr int votes_of_value = 4;
 constexpr int votes_of_end = 2;
 constexpr double most_agreeing_of_end = 0.25;
 constexpr double least_share = 0.6;
@@ -30,6 +33,14 @@ constexpr double beyond = 4;
 constexpr float near = 1.1F;
 // Noise of values that tell whether it is.
 constexpr float finest = 0.25F;
+// Noise of values that tell how far all light has drifted (three deviations, as all here).
+constexpr float finest_of_drift = 0.1F;
+// The share of drift that is not of all light alike.
+constexpr float uneven = 0.25F;
+// Values of one age that tell it, at least.
+constexpr std::size_t least_followed = 8;
+// Older light than this many frames is not followed.
+constexpr std::size_t longest_followed = 32;
 
 bool enough(int agreeing, int telling) { return agreeing >= least_share * telling; }
 
@@ -45,7 +56,9 @@ struct RadianceReference::Variance {
 struct RadianceReference::Limits {
   explicit Limits(std::size_t size) : lower(size), upper(size), variance(size), vote(size) {}
   std::vector<float> lower, upper;
-  std::vector<float> variance;     // of the radiance
+  std::vector<float> variance;  // of the radiance
+  // The radiance and its variance, where the frame itself tells how all light has drifted.
+  std::vector<float> followed, followed_variance;
   std::vector<std::int32_t> vote;  // -1 below, 0 between, 1 above; 2 = no value
 };
 
@@ -79,7 +92,9 @@ RadianceReference::Band RadianceReference::band_of(std::size_t i,
                                                    float exposure_s,
                                                    const Limits& limits,
                                                    const Variance& noise) const {
-  const auto [expected, away] = expect(i, exposure_s, limits, noise);
+  const float expected = std::min(std::max(limits.followed[i] * exposure_s, 0.0F), infinite);
+  const float away = certain * std::sqrt(scale_[i] * noise(std::min(expected, saturation_)) +
+                                         limits.followed_variance[i] * exposure_s * exposure_s);
   return {std::min(expected - away, saturation_), std::min(expected + away, saturation_),
           expected - surely * away, expected + surely * away};
 }
@@ -199,6 +214,53 @@ RadianceReference::Votes RadianceReference::votes_against(double other_s,
   return {telling, agreeing, surprising};
 }
 
+// All light drifts alike, but for a part of it: light that was seen as long ago as others has
+// drifted as much as they have. So how much is the median of values that tell it finely.
+void RadianceReference::follow_drift(const Thumbnail& thumbnail,
+                                     std::int64_t number,
+                                     float exposure_s,
+                                     Limits& limits) const {
+  const Variance noise{read_, shot_, relative_squared_};
+  const auto now = static_cast<std::int32_t>(number - first_number_);
+  std::array<std::vector<float>, longest_followed> ratios;  // by age
+  const auto age_of = [&](std::size_t i) { return static_cast<std::size_t>(now - taken_at_[i]); };
+  for (std::size_t i = 0; i < radiance_.size(); ++i) {
+    const std::size_t age = age_of(i);
+    const float value = thumbnail.values[i];
+    if (age == 0 || age >= longest_followed || !(value < saturation_)) continue;
+    const float expected = radiance_[i] * exposure_s;
+    const float away = certain * std::sqrt(scale_[i] * noise(std::max(expected, 0.0F)) +
+                                           variance_[i] * exposure_s * exposure_s);
+    const float drift = certain * std::sqrt(drift_squared_) * static_cast<float>(age) * expected;
+    if (away < finest_of_drift * expected && std::abs(value - expected) <= away + drift) {
+      ratios[age].push_back(value / expected);
+    }
+  }
+  std::array<float, longest_followed> drifted{};  // 0 = not known
+  for (std::size_t age = 0; age < longest_followed; ++age) {
+    std::vector<float>& of_age = ratios[age];
+    if (of_age.size() < least_followed) continue;
+    const auto middle = of_age.begin() + static_cast<std::ptrdiff_t>(of_age.size() / 2);
+    std::ranges::nth_element(of_age, middle);
+    const float median = *middle;
+    const float apart = finest_of_drift / 2 +
+                        uneven * certain * std::sqrt(drift_squared_) * static_cast<float>(age);
+    const auto alike = std::ranges::count_if(
+        of_age, [&](float ratio) { return std::abs(ratio - median) <= apart; });
+    if (enough(static_cast<int>(alike), static_cast<int>(of_age.size()))) drifted[age] = median;
+  }
+  limits.followed = radiance_;
+  limits.followed_variance = limits.variance;
+  for (std::size_t i = 0; i < radiance_.size(); ++i) {
+    const std::size_t age = age_of(i);
+    if (age >= longest_followed || drifted[age] == 0) continue;
+    const auto frames = static_cast<float>(age);
+    limits.followed[i] *= drifted[age];
+    limits.followed_variance[i] = variance_[i] + uneven * uneven * frames * frames *
+                                                     drift_squared_ * radiance_[i] * radiance_[i];
+  }
+}
+
 // Whether rows that begin at one end have the values of another exposure: those that it would have
 // changed, and that were not changed by something that moved.
 bool RadianceReference::made_in_part(double partner_s,
@@ -211,7 +273,7 @@ bool RadianceReference::made_in_part(double partner_s,
   const auto p = static_cast<float>(partner_s);
   int as_tried = 0;
   int as_partner = 0;  // twice for what noise alone cannot be
-  for (int i = 0; i < rows_ && as_tried < votes_of_stretch; ++i) {
+  for (int i = 0; i < rows_ && as_tried < votes_of_stretch * votes_of_value; ++i) {
     const auto row = static_cast<std::size_t>(top ? i : rows_ - 1 - i);
     std::int32_t of_tried = 0;
     std::int32_t of_partner = 0;
@@ -221,12 +283,14 @@ bool RadianceReference::made_in_part(double partner_s,
       const float value = std::min(thumbnail.values[j], saturation_);
       const bool tells = (own.high < other.low) | (other.high < own.low);
       const bool surely_other = (value < own.surely_low) | (value > own.surely_high);
-      of_tried += tells & (value >= own.low) & (value <= own.high);
+      const int votes = own.low < saturation_ ? votes_of_value : 1;
+      of_tried += (tells & (value >= own.low) & (value <= own.high)) * votes;
       of_partner += (tells & (value >= other.low) & (value <= other.high)) * (1 + surely_other);
     }
     as_tried += of_tried;
     as_partner += of_partner;
-    if (as_partner >= votes_of_end && 2 * as_tried <= most_agreeing_of_end * as_partner)
+    if (as_partner >= votes_of_end &&
+        2 * as_tried <= most_agreeing_of_end * votes_of_value * as_partner)
       return true;
   }
   return false;
@@ -253,6 +317,20 @@ RadianceReference::Nearness RadianceReference::nearness_of(const Thumbnail& thum
   return {telling, agreeing};
 }
 
+double RadianceReference::brighter_than(const RadianceReference& other) const {
+  const auto fine = [](const RadianceReference& light, std::size_t i) {
+    return certain * std::sqrt(light.variance_[i]) < finest_of_drift * light.radiance_[i];
+  };
+  std::vector<float> ratios;
+  for (std::size_t i = 0; i < std::min(radiance_.size(), other.radiance_.size()); ++i) {
+    if (fine(*this, i) && fine(other, i)) ratios.push_back(radiance_[i] / other.radiance_[i]);
+  }
+  if (ratios.size() < least_votes) return 1;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::ranges::nth_element(ratios, middle);
+  return *middle;
+}
+
 FitResult RadianceReference::check(const Thumbnail& thumbnail,
                                    std::int64_t number,
                                    const TriedExposure& tried) const {
@@ -261,7 +339,7 @@ FitResult RadianceReference::check(const Thumbnail& thumbnail,
       thumbnail.values.size() != radiance_.size()) {
     throw std::invalid_argument("thumbnails of one camera have one size");
   }
-  const Limits limits = limits_of(thumbnail, number, tried);
+  Limits limits = limits_of(thumbnail, number, tried);
   struct Other {
     double exposure_s;
     bool needed;  // must be told from
@@ -290,6 +368,7 @@ FitResult RadianceReference::check(const Thumbnail& thumbnail,
     const int all = votes.telling + (votes.telling < least_votes ? votes.surprising : 0);
     contradicted |= all >= least_votes && !enough(votes.agreeing, all);
   }
+  follow_drift(thumbnail, number, static_cast<float>(t), limits);
   for (const bool top : {true, false}) {
     for (const double partner_s : top ? tried.before_s : tried.after_s) {
       result.in_part |= partner_s > 0 && made_in_part(partner_s, thumbnail, tried, limits, top);

@@ -58,8 +58,13 @@ struct FitResult {
 // end at the last. Of the values there that tell the tried exposure from the other (three
 // deviations of both apart), those that are the other's and not the tried one's vote for the other:
 // twice if five deviations away. It contradicts in part if from one end on there are two votes or
-// more, and values as tried are at most an eighth of them. One value may be enough; so now and then
+// more, and values as tried are at most an eighth of them; a value that is saturated, as it should
+// be, counts a quarter, since all that is bright looks so. One value may be enough; so now and then
 // something that moved into the only value that tells is taken for it.
+//
+// Light seen long ago may have drifted far, too far to tell what is nearly saturated from what is.
+// But drift is of all light: the median of eight values or more that were seen as long ago, of
+// little noise, tells it, and leaves a quarter of its uncertainty.
 class RadianceReference {
  public:
   // Light that changes by up to `light_drift` a frame (relative) everywhere is allowed for.
@@ -69,6 +74,9 @@ class RadianceReference {
   void clear();
   // Takes what the frame says, where it says more than is known, or something else.
   void take(const Thumbnail& thumbnail, double exposure_s, std::int64_t number);
+  // How many times as bright this light is as the other, in the median of values that both know to
+  // 10 %; 1 where fewer than 16 are.
+  double brighter_than(const RadianceReference& other) const;
   // Thumbnails have the size of the first one since it was empty: std::invalid_argument if not.
   FitResult check(const Thumbnail& thumbnail,
                   std::int64_t number,
@@ -86,6 +94,10 @@ class RadianceReference {
   Limits limits_of(const Thumbnail& thumbnail,
                    std::int64_t number,
                    const TriedExposure& tried) const;
+  void follow_drift(const Thumbnail& thumbnail,
+                    std::int64_t number,
+                    float exposure_s,
+                    Limits& limits) const;
   bool made_in_part(double partner_s,
                     const Thumbnail& thumbnail,
                     const TriedExposure& tried,

@@ -48,6 +48,22 @@ TEST(ExposureLabeller, AcceptsNoWrongLabelOfPictures) {
                            .pixels = 8}));
 }
 
+// While the lag is looked for, a write that is ignored or a frame lost uncounted may hide where a
+// wrong lag fails.
+TEST(ExposureLabeller, BelievesNoWrongLagWhereTheFirstFramesGoWrong) {
+  StreamFaults faults = no_faults;
+  faults.ignored = 0.03;
+  faults.dropped_silently = 0.01;
+  std::mt19937_64 random(5);
+  LabelCounts counts;
+  for (int connection = 0; connection < (PLATELIGHT_FULL_TESTS ? 6000 : 600); ++connection) {
+    const StreamPlan plan = made::random_plan(random);
+    LabelTrial(plan, faults, random()).run(40, counts);
+  }
+  EXPECT_EQ(counts.wrong, 0) << words(counts);
+  EXPECT_GT(counts.accepted, counts.frames / 2);
+}
+
 // A bright enough scene for a bracket of three.
 StreamPlan plain_plan() { return {.exposures_s = {1e-3, 4e-3, 16e-3}, .stops = 6, .drift = 0}; }
 
