@@ -29,7 +29,7 @@ constexpr double least_agreeing_in_part = 0.3;
 constexpr double unknown_s = 1;
 // The share of a picture's values that agree, where frames before it were wrong and it tells but
 // roughly.
-constexpr double least_agreeing_in_doubt = 0.8;
+constexpr double least_agreeing_in_doubt = 0.66;
 // Deviations from black.
 constexpr double seen_deviations = 32;
 
@@ -284,15 +284,6 @@ void ExposureLabeller::extend_runs(std::int64_t number, const Thumbnail& thumbna
   }
 }
 
-// Whether no other run that is as likely has failed as seldom.
-bool ExposureLabeller::fails_least(std::size_t lag) const {
-  const Run& run = runs_[lag];
-  return std::ranges::none_of(runs_, [&](const Run& other) {
-    return other.current_s > 0 && !same(other.current_s, run.current_s) && other.agreed > 1 &&
-           other.failed.size() <= run.failed.size();
-  });
-}
-
 // Whether the light is that which was known before the camera was opened anew, rather than that of
 // a label beside the true one. Where nothing tells, it is.
 bool ExposureLabeller::as_before(const Run& run) const {
@@ -302,6 +293,17 @@ bool ExposureLabeller::as_before(const Run& run) const {
   }
   const double ratio = run.light.brighter_than(before_);
   return ratio * ratio < least && 1 < ratio * ratio * least;
+}
+
+// Whether no other run has failed as seldom, of those that agreed with frames, and with the light
+// before as well as this one.
+bool ExposureLabeller::fails_least(std::size_t lag) const {
+  const Run& run = runs_[lag];
+  const bool known_light = as_before(run);
+  return std::ranges::none_of(runs_, [&](const Run& other) {
+    return other.current_s > 0 && !same(other.current_s, run.current_s) && other.agreed > 1 &&
+           other.failed.size() <= run.failed.size() && (!known_light || as_before(other));
+  });
 }
 
 bool ExposureLabeller::complete(std::size_t lag) const {
@@ -433,8 +435,9 @@ ExposureLabel ExposureLabeller::label(std::int64_t number,
     if (same(explained_s_, label_s)) explained_s_ = 0;
   }
   // What explains one frame may be chance, but not that of the next one, or of the next that has
-  // the same label.
-  const bool once = explained && !explained_before_ && !same(explained_s_, label_s);
+  // the same label. Where the known light is in doubt, what it explains counts for nothing.
+  const bool once =
+      explained && contradictions_ == 0 && !explained_before_ && !same(explained_s_, label_s);
   explained_before_ = explained;
   if (explained) explained_s_ = label_s;
   if (once || (accepted && !searching_)) return label;
@@ -444,11 +447,12 @@ ExposureLabel ExposureLabeller::label(std::int64_t number,
   if (!found) return label;
   const Run& run = runs_[*found];
   if (accepted) {
-    searching_ = false;
     if (same(run.current_s, label_s)) {
-      believe(*found, number, told_s);  // its light also has what rejected frames saw
+      // Its light also has what rejected frames saw; one such frame may have been mixed.
+      if (run.frames > 2 || !fit->near) believe(*found, number, told_s);
       return label;
     }
+    searching_ = false;
     lags_.clear();
     return {};
   }

@@ -71,9 +71,9 @@ struct LabelSettings {
 // rejected at first. They end differently: after a wrong frame the next one fits the known light
 // again; after the other two, a run of one bracket is believed. A wrong frame that the known light
 // explains (mixed, or made by another exposure in play) begins no run, unless another follows.
-// After a wrong frame, 80 % of the values must agree where the known light tells but roughly; after
-// one that it does not explain, the picture must also be neither dark nor saturated; after three of
-// these, such light counts no more.
+// After a wrong frame, two thirds of the values must agree where the known light tells but roughly;
+// after one that it does not explain, the picture must also be neither dark nor saturated; after
+// three of these, such light counts no more.
 //
 // Lags that foretell the same (those a whole bracket apart, until a frame is lost) are kept
 // together, until one of them is contradicted.

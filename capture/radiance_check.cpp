@@ -14,7 +14,7 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 // Deviations that noise does not reach.
 constexpr float certain = 3;
 // Of those, that it does not reach in one value of many.
-constexpr float surely = 5 / certain;
+constexpr float surely = 5.5F / certain;
 // Drifting light reaches its limit at this many of its deviations.
 constexpr double drift_limit = 3;
 constexpr int least_votes = 16;

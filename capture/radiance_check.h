@@ -57,7 +57,7 @@ struct FitResult {
 // A picture that changes its exposure in the middle differs in rows that begin at the first one or
 // end at the last. Of the values there that tell the tried exposure from the other (three
 // deviations of both apart), those that are the other's and not the tried one's vote for the other:
-// twice if five deviations away. It contradicts in part if from one end on there are two votes or
+// twice if 5.5 deviations away. It contradicts in part if from one end on there are two votes or
 // more, and values as tried are at most an eighth of them; a value that is saturated, as it should
 // be, counts a quarter, since all that is bright looks so. One value may be enough; so now and then
 // something that moved into the only value that tells is taken for it.

@@ -90,7 +90,7 @@ TEST(ExposureLabeller, TakesAnotherLightForNoOtherExposure) {
   EXPECT_EQ(counts.wrong, 0) << words(counts);
   // About a bracket each time.
   EXPECT_LE(static_cast<double>(counts.good_rejected),
-            0.005 * 6 * static_cast<double>(counts.good));
+            0.005 * 4 * static_cast<double>(counts.good));
 }
 
 TEST(ExposureLabeller, SaysDarkOrSaturatedWhereAllExposuresLookAlike) {
