@@ -324,7 +324,9 @@ TEST_F(AravisCameraTest, ReturnsWithItsSettingsAfterItWasUnplugged) {
   EXPECT_EQ(frame.image->width, 32);
   // The pattern tells nothing of exposure here: the whole sensor's first pixels are outside.
   EXPECT_EQ(camera->statistics().delivered - 1, frame.number);
-  RecordProperty("frames_to_return", static_cast<int>(frame.number - number_at_return));
+  const auto frames_to_return = static_cast<int>(frame.number - number_at_return);
+  RecordProperty("frames_to_return", frames_to_return);
+  EXPECT_LE(frames_to_return, 60) << "2 s";
   EXPECT_NEAR(camera->set_exposure(0.001), 0.001, 1e-9);
 }
 
@@ -497,7 +499,12 @@ TEST(AravisCameraSoak, NeitherLeaksNorStallsWhilePacketsAreLost) {
     if (i == frames / 5) before = resident_bytes();
   }
   const CameraStatistics counts = camera->statistics();
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  // Sanitizers keep what was freed, and tell what leaks themselves.
   EXPECT_LT(resident_bytes() - before, 4 << 20) << "memory grows";
+#else
+  (void)before;
+#endif
   EXPECT_GT(made.counts().lost_packets, frames / 20);
   EXPECT_GT(counts.delivered - counts.lost - counts.damaged, frames / 2);
   RecordProperty("lost", static_cast<int>(counts.lost));
