@@ -321,7 +321,9 @@ bool ExposureLabeller::complete(std::size_t lag) const {
   const bool better = std::ranges::all_of(lags_, [&](int believed) {
     return runs_[static_cast<std::size_t>(believed)].failed.size() >= run.failed.size() + 2;
   });
-  const int cycles = known || better ? (lags_.empty() && !as_before(run) ? 2 : 1) : 4;
+  int cycles = 1;
+  if (!known && !better) cycles = 4;
+  if (lags_.empty() && !as_before(run)) cycles = 2;
   return run.cycles >= cycles && !run.agreed_s.empty();
 }
 
@@ -376,7 +378,6 @@ ExposureLabel ExposureLabeller::verdict_of(const FitResult& fit,
     label.reason = LabelReason::none;
     label.exposure_s = label_s;
   } else {
-    // A picture nearly black or saturated may tell all the same that it is not as foretold.
     label = without_lag(thumbnail);
     if (label.verdict == LabelVerdict::rejected) {
       label.reason = !fit.tells || fit.fit == Fit::agrees ? LabelReason::unchecked

@@ -62,8 +62,9 @@ struct LabelSettings {
 // run: that it has failed in fewer frames than every other lag that agreed with some (before its
 // first request acts, a lag says that the exposure stays, and fails where the light shows that it
 // does not). Where the camera was opened anew, and the light is not what it was, by more than half
-// the way to the next exposure, a run must have gone twice through all exposures. A lag other than
-// the one believed must have failed two times less, or gone through them four times.
+// the way to the next exposure, a run in which the shortest and the longest exposure do not both
+// tell must have gone twice through all exposures; if its lag is another than the one believed,
+// four times, unless it has failed in two frames less.
 //
 // With the lag known, a frame is accepted if the exposure that the lag foretells fits what accepted
 // frames before it told of the light. If not, it is rejected, and the lag is put in doubt: runs

@@ -44,6 +44,13 @@ constexpr std::size_t longest_followed = 32;
 
 bool enough(int agreeing, int telling) { return agreeing >= least_share * telling; }
 
+// Of one or more; changes their order.
+float median_of(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
 }  // namespace
 
 // The variance of a value by the noise model's terms.
@@ -79,22 +86,19 @@ struct RadianceReference::Expected {
   float value, away;
 };
 
-RadianceReference::Expected RadianceReference::expect(std::size_t i,
-                                                      float exposure_s,
-                                                      const Limits& limits,
-                                                      const Variance& noise) const {
-  const float value = std::min(std::max(radiance_[i] * exposure_s, 0.0F), infinite);
-  return {value, certain * std::sqrt(scale_[i] * noise(std::min(value, saturation_)) +
-                                     limits.variance[i] * exposure_s * exposure_s)};
+RadianceReference::Expected RadianceReference::expect(
+    float radiance, float variance, float scale, float exposure_s, const Variance& noise) const {
+  const float value = std::min(std::max(radiance * exposure_s, 0.0F), infinite);
+  return {value, certain * std::sqrt(scale * noise(std::min(value, saturation_)) +
+                                     variance * exposure_s * exposure_s)};
 }
 
 RadianceReference::Band RadianceReference::band_of(std::size_t i,
                                                    float exposure_s,
                                                    const Limits& limits,
                                                    const Variance& noise) const {
-  const float expected = std::min(std::max(limits.followed[i] * exposure_s, 0.0F), infinite);
-  const float away = certain * std::sqrt(scale_[i] * noise(std::min(expected, saturation_)) +
-                                         limits.followed_variance[i] * exposure_s * exposure_s);
+  const auto [expected, away] =
+      expect(limits.followed[i], limits.followed_variance[i], scale_[i], exposure_s, noise);
   return {std::min(expected - away, saturation_), std::min(expected + away, saturation_),
           expected - surely * away, expected + surely * away};
 }
@@ -202,7 +206,7 @@ RadianceReference::Votes RadianceReference::votes_against(double other_s,
   std::int32_t agreeing = 0;
   std::int32_t surprising = 0;
   for (std::size_t i = 0; i < radiance_.size(); ++i) {
-    const auto [expected, away] = expect(i, t, limits, noise);
+    const auto [expected, away] = expect(radiance_[i], limits.variance[i], scale_[i], t, noise);
     const bool tells = (longer ? std::min(expected - away, saturation_) >= limits.upper[i]
                                : expected + away <= limits.lower[i]) &
                        (limits.vote[i] != 2);
@@ -240,9 +244,7 @@ void RadianceReference::follow_drift(const Thumbnail& thumbnail,
   for (std::size_t age = 0; age < longest_followed; ++age) {
     std::vector<float>& of_age = ratios[age];
     if (of_age.size() < least_followed) continue;
-    const auto middle = of_age.begin() + static_cast<std::ptrdiff_t>(of_age.size() / 2);
-    std::ranges::nth_element(of_age, middle);
-    const float median = *middle;
+    const float median = median_of(of_age);
     const float apart = finest_of_drift / 2 +
                         uneven * certain * std::sqrt(drift_squared_) * static_cast<float>(age);
     const auto alike = std::ranges::count_if(
@@ -306,7 +308,7 @@ RadianceReference::Nearness RadianceReference::nearness_of(const Thumbnail& thum
   std::int32_t telling = 0;
   std::int32_t agreeing = 0;
   for (std::size_t i = 0; i < radiance_.size(); ++i) {
-    const auto [expected, away] = expect(i, t, limits, noise);
+    const auto [expected, away] = expect(radiance_[i], limits.variance[i], scale_[i], t, noise);
     const float high = expected * near + away;
     const float low = expected / near - away;
     const float value = thumbnail.values[i];
@@ -326,9 +328,7 @@ double RadianceReference::brighter_than(const RadianceReference& other) const {
     if (fine(*this, i) && fine(other, i)) ratios.push_back(radiance_[i] / other.radiance_[i]);
   }
   if (ratios.size() < least_votes) return 1;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::ranges::nth_element(ratios, middle);
-  return *middle;
+  return median_of(ratios);
 }
 
 FitResult RadianceReference::check(const Thumbnail& thumbnail,
@@ -368,7 +368,9 @@ FitResult RadianceReference::check(const Thumbnail& thumbnail,
     const int all = votes.telling + (votes.telling < least_votes ? votes.surprising : 0);
     contradicted |= all >= least_votes && !enough(votes.agreeing, all);
   }
-  follow_drift(thumbnail, number, static_cast<float>(t), limits);
+  if (tried.before_s[0] > 0 || tried.after_s[0] > 0) {
+    follow_drift(thumbnail, number, static_cast<float>(t), limits);
+  }
   for (const bool top : {true, false}) {
     for (const double partner_s : top ? tried.before_s : tried.after_s) {
       result.in_part |= partner_s > 0 && made_in_part(partner_s, thumbnail, tried, limits, top);

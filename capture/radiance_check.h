@@ -103,10 +103,8 @@ class RadianceReference {
                     const TriedExposure& tried,
                     const Limits& limits,
                     bool top) const;
-  Expected expect(std::size_t i,
-                  float exposure_s,
-                  const Limits& limits,
-                  const Variance& noise) const;
+  Expected expect(
+      float radiance, float variance, float scale, float exposure_s, const Variance& noise) const;
   Band band_of(std::size_t i, float exposure_s, const Limits& limits, const Variance& noise) const;
   Nearness nearness_of(const Thumbnail& thumbnail,
                        const TriedExposure& tried,
