@@ -16,6 +16,7 @@
 #include "capture/coded_picture.h"
 #include "capture/live_reader.h"
 #include "capture/made_gige.h"
+#include "tests/capture/telling_shot.h"
 
 namespace capture {
 namespace {
@@ -29,19 +30,7 @@ constexpr int width = 64;
 constexpr int height = 48;
 constexpr auto patience = 120s;  // far beyond what any machine needs
 
-// Codes that tell the shot: its number in the first pixel, its exposure in units of 10 us in the
-// second, the gain in the third, and a pattern behind them.
-MadeShot telling_shot(const MadeGigeShot& shot) {
-  MadeShot made{width, height, 1, 12, std::vector<std::uint16_t>(width * height)};
-  for (std::size_t i = 0; i < made.codes.size(); ++i) {
-    made.codes[i] =
-        static_cast<std::uint16_t>((i * 37 + static_cast<std::size_t>(shot.number)) % 4096);
-  }
-  made.codes[0] = static_cast<std::uint16_t>(shot.number % 4096);
-  made.codes[1] = static_cast<std::uint16_t>(std::lround(shot.exposure_s * 1e5));
-  made.codes[2] = static_cast<std::uint16_t>(std::lround(shot.gain * 100));
-  return made;
-}
+MadeShot telling_shot(const MadeGigeShot& shot) { return made::telling_shot(shot, width, height); }
 
 MadeGigeSettings small() {
   MadeGigeSettings settings;

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "tests/capture/gige_client.h"
+#include "tests/capture/telling_shot.h"
 
 namespace capture {
 namespace {
@@ -24,18 +25,7 @@ using gige::Status;
 constexpr int width = 40;
 constexpr int height = 20;
 
-// Codes that tell the shot: its number in the first pixel, its exposure in units of 10 us in the
-// second, a pattern behind them.
-MadeShot telling_shot(const MadeGigeShot& shot) {
-  MadeShot made{width, height, 1, 12, std::vector<std::uint16_t>(width * height)};
-  for (std::size_t i = 0; i < made.codes.size(); ++i) {
-    made.codes[i] =
-        static_cast<std::uint16_t>((i * 37 + static_cast<std::size_t>(shot.number)) % 4096);
-  }
-  made.codes[0] = static_cast<std::uint16_t>(shot.number % 4096);
-  made.codes[1] = static_cast<std::uint16_t>(std::lround(shot.exposure_s * 1e5));
-  return made;
-}
+MadeShot telling_shot(const MadeGigeShot& shot) { return made::telling_shot(shot, width, height); }
 
 MadeGigeSettings small() {
   MadeGigeSettings settings;
