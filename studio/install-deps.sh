@@ -8,7 +8,7 @@ packages=(
   libaravis-dev libavcodec-dev libavformat-dev libavutil-dev libswresample-dev libswscale-dev
   libeigen3-dev libexif-dev libimath-dev libopenexr-dev libusb-1.0-0-dev
   # calibrate
-  libmrcal-dev libtomlplusplus-dev
+  libceres-dev libmrcal-dev libopencv-contrib-dev libtomlplusplus-dev
   # render
   libassimp-dev libembree-dev libtbb-dev
   # compositing
