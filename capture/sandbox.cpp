@@ -110,10 +110,10 @@ void confine_this_process(const SandboxLimits& limits) {
 
 std::string helper_path(const std::string& name) {
   namespace fs = std::filesystem;
-  if (const char* chosen = std::getenv("PLATELIGHT_DECODER"); chosen != nullptr && *chosen != 0) {
-    return chosen;
-  }
   std::error_code error;
+  if (const char* folder = std::getenv("PLATELIGHT_HELPERS"); folder != nullptr && *folder != 0) {
+    return (fs::path(folder) / name).string();
+  }
   const fs::path beside = fs::read_symlink("/proc/self/exe", error).parent_path();
   const std::array places{beside / name, beside / ".." / "libexec" / "platelight" / name,
                           fs::path(PLATELIGHT_HELPER_DIR) / name};
@@ -123,7 +123,7 @@ std::string helper_path(const std::string& name) {
     searched += "\n  " + place.string();
   }
   throw std::runtime_error("the helper program " + name + " is missing; looked for" + searched +
-                           "\nReinstall Platelight, or set PLATELIGHT_DECODER to its path.");
+                           "\nReinstall Platelight, or set PLATELIGHT_HELPERS to its folder.");
 }
 
 SandboxedChild::SandboxedChild(const std::string& program,
@@ -220,10 +220,10 @@ std::string SandboxedChild::ending() {
     if (signal == SIGXCPU) return "it takes too long";
     if (signal == SIGKILL) return "it takes too much time or memory";
     const char* name = sigabbrev_np(signal);
-    return std::string("the decoder crashed on it (SIG") + (name != nullptr ? name : "?") + ")";
+    return std::string("the helper program crashed (SIG") + (name != nullptr ? name : "?") + ")";
   }
   const int code = WEXITSTATUS(status_);
-  return code == 0 ? "" : "the decoder ended with status " + std::to_string(code);
+  return code == 0 ? "" : "the helper program ended with status " + std::to_string(code);
 }
 
 }  // namespace capture

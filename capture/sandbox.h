@@ -19,9 +19,9 @@ struct SandboxLimits {
 // Throws std::runtime_error if the system refuses a limit; a kernel without seccomp is accepted.
 void confine_this_process(const SandboxLimits& limits);
 
-// Where a helper program is: the path in the environment's PLATELIGHT_DECODER, beside this
-// executable, in ../libexec/platelight, or in the build tree. Throws std::runtime_error naming the
-// places if it is in none.
+// Where a helper program is: in the folder of the environment's PLATELIGHT_HELPERS, or else beside
+// this executable, in ../libexec/platelight, or in the build tree. Throws std::runtime_error naming
+// the places if it is in none.
 std::string helper_path(const std::string& name);
 
 // A helper at work. Its standard input is a file of ours, its standard output a pipe to us; it

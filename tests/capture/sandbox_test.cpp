@@ -56,9 +56,9 @@ TEST(SandboxedChild, ReadsTheFileItIsGiven) {
 TEST(SandboxedChild, TellsACrashFromAFailure) {
   const NoInput input;
   SandboxedChild failed(script("exit 3"), input.fd, milliseconds(10'000));
-  EXPECT_EQ(failed.ending(), "the decoder ended with status 3");
+  EXPECT_EQ(failed.ending(), "the helper program ended with status 3");
   SandboxedChild crashed(script("kill -SEGV $$"), input.fd, milliseconds(10'000));
-  EXPECT_EQ(crashed.ending(), "the decoder crashed on it (SIGSEGV)");
+  EXPECT_EQ(crashed.ending(), "the helper program crashed (SIGSEGV)");
   std::array<std::byte, 1> byte{};
   EXPECT_FALSE(crashed.read(byte));
 }
