@@ -20,6 +20,9 @@ constexpr double min_contrast = 6;  // codes, root mean square
 // Of the patch with itself, turned by 180 and by 90 degrees.
 constexpr double min_half_turn = 0.5;
 constexpr double max_quarter_turn = 0.3;
+// Where edges are blurred over more than this, those of the next corners mix in.
+constexpr double max_edge_windows = 3.4;
+constexpr double min_max_edge_px = 16;
 constexpr double min_conditioning = 0.02;  // smaller by larger eigenvalue of the edges' directions
 
 // A square of samples around a point, row by row.
@@ -45,10 +48,33 @@ bool is_inside(const GreyPicture& picture, Vec2 q) {
   return q.x >= 0 && q.y >= 0 && q.x <= picture.width - 1 && q.y <= picture.height - 1;
 }
 
+double code_range(const Patch& patch, double window) {
+  const int reach = static_cast<int>(window);
+  float low = HUGE_VALF;
+  float high = -HUGE_VALF;
+  for (int y = -reach; y <= reach; ++y) {
+    for (int x = -reach; x <= reach; ++x) {
+      if (x * x + y * y > window * window) continue;
+      low = std::min(low, patch.at(y, x));
+      high = std::max(high, patch.at(y, x));
+    }
+  }
+  return high - low;
+}
+
+// Over how many pixels the more blurred of two edges through the middle of a window goes from black
+// to white: an even edge of that width has `energy`, the weighted sum of its squared slopes.
+double edge_width(double energy, double range, double window) {
+  constexpr double weighted_length = 16.0 / 15;  // of a line through a window of radius 1
+  return weighted_length * window * range * range / energy;
+}
+
 // The saddle in a patch relative to its middle, or nothing.
 std::optional<Vec2> find_saddle(const Patch& patch, double window) {
   const int reach = patch.reach - 1;
+  const double range = code_range(patch, window);
   Vec2 q{0, 0};
+  double blur_px = 0;
   for (int step = 0; step < max_steps; ++step) {
     double xx = 0, xy = 0, yy = 0, bx = 0, by = 0;
     for (int y = -reach; y <= reach; ++y) {
@@ -69,12 +95,15 @@ std::optional<Vec2> find_saddle(const Patch& patch, double window) {
     const double trace = xx + yy;
     // Of the eigenvalues' ratio r: determinant / trace^2 = r / (1 + r)^2.
     if (!(determinant > min_conditioning * trace * trace) || trace <= 0) return std::nullopt;
+    const double smaller = trace / 2 - std::sqrt(std::max(trace * trace / 4 - determinant, 0.0));
+    blur_px = edge_width(smaller, range, window);
     const Vec2 next{(yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant};
     const double moved = hypotenuse(next.x - q.x, next.y - q.y);
     q = next;
     if (!(hypotenuse(q.x, q.y) <= window)) return std::nullopt;
     if (moved < still_px) break;
   }
+  if (blur_px > std::max(max_edge_windows * window, min_max_edge_px)) return std::nullopt;
   return q;
 }
 
