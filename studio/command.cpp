@@ -69,6 +69,7 @@ std::span<const Command> commands() {
       devices_command(),
       calibrate_response_command(),
       calibrate_vignetting_command(),
+      calibrate_board_command(),
   };
   return all;
 }

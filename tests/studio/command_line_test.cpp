@@ -442,5 +442,38 @@ TEST_F(CommandLine, CalibratesVignettingFromAnEvenField) {
   expect_one_line(other.err);
 }
 
+TEST_F(CommandLine, DrawsABoard) {
+  const std::string out = (dir_ / "board.pdf").string();
+  const std::string json = (dir_ / "board.json").string();
+  const std::string board = "calibrate board --board 10x7 --square 0.025 ";
+  const Outcome outcome = run(board + "--charuco --marker 0.018 --dictionary DICT_4X4_50 --pdf " +
+                              out + " --json " + json);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("10x7 inner corners, squares of 25 mm, markers of 18 mm"));
+  EXPECT_THAT(content_of(out), testing::StartsWith("%PDF-1.4"));
+  const auto figures = nlohmann::json::parse(content_of(json));
+  EXPECT_EQ(figures["kind"], "charuco");
+  EXPECT_EQ(figures["columns"], 10);
+  EXPECT_EQ(figures["paper_mm"][0], 297);
+  const std::string svg = (dir_ / "board.svg").string();
+  EXPECT_EQ(run(board + "--paper 400x300 -o " + svg).status, 0);
+  EXPECT_THAT(content_of(svg), HasSubstr("width=\"400mm\""));
+
+  const Outcome large = run("calibrate board --board 10x7 --square 0.04 -o " + out);
+  EXPECT_EQ(large.status, 1);
+  EXPECT_THAT(large.err, HasSubstr("it needs A2"));
+  expect_one_line(large.err);
+  for (const char* words :
+       {"", "-o a.txt", "--pdf a --out a.svg", "--board 10 --pdf a", "--board 2x2 --pdf a",
+        "--board 10x7x --pdf a", "--board -3x5 --pdf a", "--marker 0.01 --pdf a",
+        "--paper A9 --pdf a", "--charuco --dictionary DICT_1 --pdf a",
+        "--charuco --marker 0.03 --pdf a",
+        "--charuco --dictionary DICT_4X4_50 --board 40x30 --square 0.01 --paper A2 --pdf a"}) {
+    const Outcome wrong = run(board.substr(0, 15) + " " + words);
+    EXPECT_EQ(wrong.status, 2) << words;
+    expect_one_line(wrong.err);
+  }
+}
+
 }  // namespace
 }  // namespace studio
