@@ -1,4 +1,4 @@
-// Our own lens models: symmetric about the optical axis.
+// Our own lens models: symmetric about the optical axis, but for decentring.
 #include "calibrate/axial_lens.h"
 
 #include <algorithm>
@@ -23,6 +23,7 @@ std::optional<AxialLens::Kind> AxialLens::kind_of(std::string_view model) {
   if (model == "pinhole") return Kind::pinhole;
   if (model == "equisolid") return Kind::equisolid;
   if (model == "kannala_brandt") return Kind::kannala_brandt;
+  if (model == "decentred_kannala_brandt") return Kind::decentred_kannala_brandt;
   return std::nullopt;
 }
 
@@ -34,7 +35,8 @@ AxialLens::AxialLens(const Lens& lens) : kind_(kind_of(lens.model).value()) {
   } else {
     focal_px_ = {p[0], p[1]};
     centre_ = {p[2], p[3]};
-    std::copy(p.begin() + 4, p.end(), k_.begin());
+    if (decentred()) decentring_ = {p[4], p[5]};
+    std::copy(p.begin() + (decentred() ? 6 : 4), p.end(), k_.begin());
   }
   max_angle_rad_ = kind_ == Kind::pinhole ? std::min(lens.max_angle_rad, pinhole_max_angle_rad)
                                           : fold_angle(lens.max_angle_rad);
@@ -49,6 +51,7 @@ double AxialLens::radius(double angle_rad) const {
     case Kind::equisolid:
       return 2 * std::sin(angle_rad / 2);
     case Kind::kannala_brandt:
+    case Kind::decentred_kannala_brandt:
       break;
   }
   const double t2 = angle_rad * angle_rad;
@@ -63,7 +66,7 @@ double AxialLens::radius_slope(double angle_rad) const {
 
 // The angle at which the radius stops growing, or max_angle_rad if it grows up to there.
 double AxialLens::fold_angle(double max_angle_rad) const {
-  if (kind_ != Kind::kannala_brandt) return max_angle_rad;
+  if (kind_ != Kind::kannala_brandt && !decentred()) return max_angle_rad;
   if (std::ranges::all_of(k_, [](double k) { return k >= 0; })) return max_angle_rad;
   constexpr int steps = 256;
   double below = 0;
@@ -88,6 +91,7 @@ double AxialLens::angle(double radius_wanted) const {
     case Kind::equisolid:
       return 2 * std::asin(std::min(radius_wanted / 2, 1.0));
     case Kind::kannala_brandt:
+    case Kind::decentred_kannala_brandt:
       break;
   }
   // Newton's steps, and bisection where one would leave the bracket; the radius grows inside it.
@@ -127,7 +131,38 @@ std::optional<Vec2> AxialLens::project(Vec3 v) const {
   const std::optional<double> scale =
       kind_ == Kind::equisolid ? equisolid_scale(v, l) : scale_by_angle(v, l);
   if (!scale) return std::nullopt;
-  return Vec2{focal_px_.x * v.x * *scale + centre_.x, focal_px_.y * v.y * *scale + centre_.y};
+  const Vec2 u = decentre({v.x * *scale, v.y * *scale});
+  return Vec2{focal_px_.x * u.x + centre_.x, focal_px_.y * u.y + centre_.y};
+}
+
+Vec2 AxialLens::decentre(Vec2 s) const {
+  if (!decentred()) return s;
+  const auto [p1, p2] = decentring_;
+  const double r2 = s.x * s.x + s.y * s.y;
+  const double twice_xy = 2 * s.x * s.y;
+  return {s.x + p1 * twice_xy + p2 * (r2 + 2 * s.x * s.x),
+          s.y + p1 * (r2 + 2 * s.y * s.y) + p2 * twice_xy};
+}
+
+// By Newton's method; nothing where the decentring has folded the picture.
+std::optional<Vec2> AxialLens::recentre(Vec2 d) const {
+  if (!decentred()) return d;
+  const auto [p1, p2] = decentring_;
+  Vec2 s = d;
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    const Vec2 at = decentre(s);
+    const Vec2 miss{d.x - at.x, d.y - at.y};
+    const double xx = 1 + 2 * p1 * s.y + 6 * p2 * s.x;
+    const double xy = 2 * p1 * s.x + 2 * p2 * s.y;
+    const double yy = 1 + 6 * p1 * s.y + 2 * p2 * s.x;
+    const double determinant = xx * yy - xy * xy;
+    if (!(determinant > 0.1)) return std::nullopt;
+    const Vec2 move{(yy * miss.x - xy * miss.y) / determinant,
+                    (xx * miss.y - xy * miss.x) / determinant};
+    s = {s.x + move.x, s.y + move.y};
+    if (hypotenuse(move.x, move.y) < 1e-14 * (1 + hypotenuse(s.x, s.y))) return s;
+  }
+  return std::nullopt;
 }
 
 // The picture radius over the distance from the axis; nothing beyond the largest angle.
@@ -148,8 +183,10 @@ std::optional<double> AxialLens::equisolid_scale(Vec3 v, double l) const {
 }
 
 std::optional<Vec3> AxialLens::unproject(Vec2 q) const {
-  const double x = (q.x - centre_.x) / focal_px_.x;
-  const double y = (q.y - centre_.y) / focal_px_.y;
+  const auto symmetric =
+      recentre({(q.x - centre_.x) / focal_px_.x, (q.y - centre_.y) / focal_px_.y});
+  if (!symmetric) return std::nullopt;
+  const auto [x, y] = *symmetric;
   const double r = std::hypot(x, y);
   if (!(r <= max_radius_ * (1 + radius_slack))) return std::nullopt;
   const Vec2 ray = ray_of_radius(std::min(r, max_radius_));

@@ -124,20 +124,22 @@ void fill_axial(const Lens& lens, DirectionTable& table) {
     case AxialLens::Kind::equisolid:
       fill_rows([](double u) { return Vec2{std::sqrt(std::max(1 - u / 4, 0.0)), 1 - u / 2}; });
       break;
+    case AxialLens::Kind::decentred_kannala_brandt:  // is asked for every pixel
     case AxialLens::Kind::kannala_brandt:
       fill_rows([&tabulated](double u) { return tabulated(u); });
       break;
   }
 }
 
-void fill_by_mrcal(const Lens& lens, DirectionTable& table) {
+// Asks the lens for every pixel.
+void fill_by_pixel(const Lens& lens, DirectionTable& table) {
   tbb::parallel_for(tbb::blocked_range<int>(-1, lens.height + 1), [&](const auto& rows) {
     std::vector<Vec2> pixels(static_cast<std::size_t>(lens.width) + 2);
     for (int y = rows.begin(); y != rows.end(); ++y) {
       for (std::size_t i = 0; i < pixels.size(); ++i) {
         pixels[i] = {static_cast<double>(i) - 1, static_cast<double>(y)};
       }
-      const auto directions = unproject_by_mrcal(lens, pixels);
+      const auto directions = unproject_all(lens, pixels);
       const std::size_t begin = table.index(y, -1);
       for (std::size_t i = 0; i < pixels.size(); ++i) {
         const Vec3f v = to_float(directions[i].value_or(Vec3{}));
@@ -158,8 +160,8 @@ DirectionTable make_direction_table(const Lens& lens) {
   table.x.resize(entries);
   table.y.resize(entries);
   table.z.resize(entries);
-  if (is_mrcal_model(lens.model)) {
-    fill_by_mrcal(lens, table);
+  if (is_mrcal_model(lens.model) || AxialLens(lens).decentred()) {
+    fill_by_pixel(lens, table);
   } else {
     fill_axial(lens, table);
   }

@@ -28,7 +28,8 @@ Range parameter_counts(const std::string& model) {
   const auto kind = AxialLens::kind_of(model);
   if (!kind) {
     throw std::invalid_argument("unknown lens model \"" + model +
-                                "\"; known are pinhole, equisolid, kannala_brandt and mrcal's "
+                                "\"; known are pinhole, equisolid, kannala_brandt, "
+                                "decentred_kannala_brandt and mrcal's "
                                 "LENSMODEL_...");
   }
   switch (*kind) {
@@ -36,6 +37,8 @@ Range parameter_counts(const std::string& model) {
       return {4, 4};
     case AxialLens::Kind::equisolid:
       return {3, 3};
+    case AxialLens::Kind::decentred_kannala_brandt:
+      return {6, 10};
     case AxialLens::Kind::kannala_brandt:
       break;
   }

@@ -15,6 +15,7 @@ namespace calibrate {
 //   "pinhole"          fx fy cx cy
 //   "equisolid"        f cx cy                       r = 2 f sin(theta/2)
 //   "kannala_brandt"   fx fy cx cy k1..k4 (0 to 4)   r = theta (1 + k1 theta^2 + k2 theta^4 + ...)
+//   "decentred_kannala_brandt"  fx fy cx cy p1 p2 k1..k4: the same, then shifted by Brown's terms
 //   mrcal's own names  LENSMODEL_OPENCV4, LENSMODEL_SPLINED_STEREOGRAPHIC_..., parameters as
 //   mrcal's
 // Pixels are mrcal's: (0, 0) is the centre of the top-left pixel.

@@ -126,6 +126,8 @@ ParameterNames names_of(AxialLens::Kind kind) {
       return {{"fx", "fy", "cx", "cy"}};
     case AxialLens::Kind::equisolid:
       return {{"f", "cx", "cy"}};
+    case AxialLens::Kind::decentred_kannala_brandt:
+      return {{"fx", "fy", "cx", "cy", "p1", "p2", "k1", "k2", "k3", "k4"}, 4};
     case AxialLens::Kind::kannala_brandt:
       break;
   }

@@ -33,7 +33,9 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
   lens.width = size[0];
   lens.height = size[1];
   const bool has_model = table.text("model", lens.model);
-  table.need("model", "pinhole, equisolid, kannala_brandt, or one of mrcal's LENSMODEL_...");
+  table.need("model",
+             "pinhole, equisolid, kannala_brandt, decentred_kannala_brandt, or one of mrcal's "
+             "LENSMODEL_...");
   if (double max_angle_deg = 180; table.number("max_angle", max_angle_deg, {0.01, 180})) {
     lens.max_angle_rad = std::min(max_angle_deg * std::numbers::pi / 180, std::numbers::pi);
   }
@@ -52,11 +54,17 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
     std::vector<double> terms;
     const std::vector<double> focal = read_focal(table);
     table.numbers("centre", centre, {2}, centre_range);
-    if (lens.model == "kannala_brandt") table.numbers("k", terms, {0, 1, 2, 3, 4}, term_range);
+    const bool decentred = lens.model == "decentred_kannala_brandt";
+    std::vector<double> decentring(decentred ? 2 : 0);
+    if (decentred) table.numbers("p", decentring, {2}, term_range);
+    if (decentred || lens.model == "kannala_brandt") {
+      table.numbers("k", terms, {0, 1, 2, 3, 4}, term_range);
+    }
     if (focal.empty()) return std::nullopt;
     lens.parameters = focal;
     if (lens.model == "equisolid") lens.parameters.pop_back();
     lens.parameters.insert(lens.parameters.end(), centre.begin(), centre.end());
+    lens.parameters.insert(lens.parameters.end(), decentring.begin(), decentring.end());
     lens.parameters.insert(lens.parameters.end(), terms.begin(), terms.end());
   }
   if (!has_model || lens.parameters.empty() || lens.width < 1) return std::nullopt;

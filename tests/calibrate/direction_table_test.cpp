@@ -35,6 +35,8 @@ TEST(MakeDirectionTable, HoldsWhatUnprojectGivesForEveryPixelAndTheBorder) {
   expect_table_of({"equisolid", 301, 200, {66.5, 151, 99.5}, 93 * degree}, 1);
   expect_table_of({"equisolid", 300, 300, {70, 149.5, 149.5}}, 1);
   expect_table_of({"kannala_brandt", 256, 256, {83, 82, 128.3, 127.1, -.02, .003}, 1.6}, 1);
+  expect_table_of(
+      {"decentred_kannala_brandt", 256, 256, {83, 82, 128.3, 127.1, .002, -.001, -.02}, 1.6}, 1);
   expect_table_of({"kannala_brandt", 640, 360, {600, 600, 320, 180, .1, -.05, .01, .002}}, 1);
 }
 

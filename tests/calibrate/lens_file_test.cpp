@@ -16,6 +16,7 @@ TEST(WriteLens, IsUndoneByReadLens) {
       {"equisolid", 2808, 1872, {622.4, 1412.5, 932.0}, 1.62},
       {"kannala_brandt", 1024, 1024, {331, 332, 513.3, 509.1, -.02, .003}, 1.5},
       {"kannala_brandt", 1024, 1024, {331, 332, 513.3, 509.1}},
+      {"decentred_kannala_brandt", 640, 480, {200, 201, 320, 240, 1e-4, 2e-4, -.02}, 1.4},
       {"LENSMODEL_OPENCV4", 768, 576, {1184.97, 1194.57, 324.222, 282.566, -.15662, .06178, 0, 0}},
   };
   for (const Lens& lens : lenses) {

@@ -28,6 +28,11 @@ std::vector<Sample> samples() {
   const Lens kb2{"kannala_brandt", 1024, 1024, {331, 331, 513.3, 509.1, -.02, .003}, pi / 2};
   const Lens kb4{
       "kannala_brandt", 1024, 1024, {331, 330, 513.3, 509.1, -.0417, 5.2e-4, 1e-5, -1e-6}, 1.7};
+  const Lens decentred{"decentred_kannala_brandt",
+                       1024,
+                       1024,
+                       {331.3, 331, 513.3, 509.1, 2e-4, -3e-3, -.02, .003},
+                       pi / 2};
   const Lens equidistant{"kannala_brandt", 640, 640, {200, 200, 319.5, 319.5}, pi};
   const Lens street{
       "LENSMODEL_OPENCV4", 768, 576, {1184.97, 1194.57, 324.222, 282.566, -.15662, .06178, 0, 0}};
@@ -36,7 +41,7 @@ std::vector<Sample> samples() {
   return {{pinhole, 80 * degree},       {narrow, 30 * degree}, {fisheye, 93 * degree},
           {whole_sphere, 179 * degree}, {kb2, pi / 2},         {kb4, 1.7},
           {equidistant, 3.1},           {street, 40 * degree}, {stereographic, 2.5},
-          {lonlat, 85 * degree}};
+          {lonlat, 85 * degree},        {decentred, pi / 2}};
 }
 
 Vec3 at_angle(double off_axis_rad, double around_rad) {
