@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibrate/mrcal_lens.h"
+#include "calibrate/rotation_vector.h"
 #include "calibrate/text_file.h"
 
 namespace calibrate {
@@ -199,39 +200,6 @@ Contents read_contents(Reader& reader) {
   return contents;
 }
 
-// Rodrigues's formula, as mrcal's rt transforms have it: rotation vector, then translation.
-Pose pose_from_rt(const std::vector<double>& rt) {
-  const Vec3 r{rt[0], rt[1], rt[2]};
-  const double angle_rad = length(r);
-  Mat3 R;
-  if (angle_rad > 0) {
-    const Vec3 a = r / angle_rad;
-    const double c = std::cos(angle_rad);
-    const double s = std::sin(angle_rad);
-    const double d = 1 - c;
-    R = {{c + a.x * a.x * d, a.x * a.y * d - a.z * s, a.x * a.z * d + a.y * s,
-          a.y * a.x * d + a.z * s, c + a.y * a.y * d, a.y * a.z * d - a.x * s,
-          a.z * a.x * d - a.y * s, a.z * a.y * d + a.x * s, c + a.z * a.z * d}};
-  }
-  return {R, {rt[3], rt[4], rt[5]}};
-}
-
-Vec3 rotation_vector(const Mat3& R) {
-  const Vec3 twice_sine_axis{R.m[7] - R.m[5], R.m[2] - R.m[6], R.m[3] - R.m[1]};
-  const double sine = length(twice_sine_axis) / 2;
-  const double cosine = (R.m[0] + R.m[4] + R.m[8] - 1) / 2;
-  const double angle_rad = std::atan2(sine, cosine);
-  if (sine > 1e-6) return twice_sine_axis * (angle_rad / (2 * sine));
-  if (cosine > 0) return twice_sine_axis / 2;
-  // Half a turn: R + I is twice the axis's outer product; its longest column shows the axis.
-  Vec3 axis;
-  for (std::size_t j = 0; j < 3; ++j) {
-    const Vec3 column{R.m[j] + (j == 0), R.m[3 + j] + (j == 1), R.m[6 + j] + (j == 2)};
-    if (length(column) > length(axis)) axis = column;
-  }
-  return normalize(axis) * angle_rad;
-}
-
 bool is_picture_size(double x) { return x >= 1 && x <= 65536 && x == std::floor(x); }
 
 std::string list(const std::vector<double>& values) {
@@ -277,7 +245,8 @@ CameraModel read_camera_model(const std::string& path) {
     if (contents.extrinsics->value.size() != 6) {
       reader.fail_at(contents.extrinsics->line, "'extrinsics' must be 6 numbers");
     }
-    model.cam_from_ref = pose_from_rt(contents.extrinsics->value);
+    const std::vector<double>& rt = contents.extrinsics->value;
+    model.cam_from_ref = Pose{rotation_of({rt[0], rt[1], rt[2]}), {rt[3], rt[4], rt[5]}};
   }
   return model;
 }

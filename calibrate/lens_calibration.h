@@ -1,0 +1,59 @@
+// A camera's lens from pictures of a board: the whole way, with what it knows of its own error.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calibrate/lens_selection.h"
+#include "calibrate/lens_solve.h"
+#include "calibrate/overlay_error.h"
+
+namespace calibrate {
+
+struct LensCalibrationOptions {
+  // Models that may be chosen: those that fit into a .cameramodel, those by angle, or what the
+  // pictures ask for.
+  enum class Models { any, perspective, angular };
+  Models models = Models::any;
+  // Chooses this form without asking the held-out corners; they are still measured.
+  std::optional<LensForm> form;
+};
+
+// What became of one picture.
+struct ViewReport {
+  std::string name;
+  std::size_t seen = 0;  // corners
+  std::size_t used = 0;  // of them
+  double rms_px = 0;     // of those in use
+  std::string rejected;  // why it was; empty = it was not
+  std::optional<Pose> cam_from_board;
+};
+
+struct LensCalibration {
+  Lens lens;
+  LensForm form;
+  Vec2 warp_m;  // of the board; see Bundle
+  double sigma_px = 0;
+  double train_rms_px = 0;
+  double heldout_rms_px = 0;  // infinite: nothing could be left out
+  double coverage_deg = 0;    // off the axis, of the farthest corner in use
+  std::vector<ViewReport> views;
+  LensSelection selection;
+  std::vector<std::string> warnings;
+  double time_ms = 0;
+
+  // For residuals and pictures of the error: the problem's corners and the chosen solve.
+  LensStart start;
+  std::optional<OverlayError> overlay;
+  const LensSolve& solve() const { return *selection.candidates[selection.chosen].solve; }
+};
+
+// Calibrates. Views that tell nothing, or something else (a mirrored board, the same picture again,
+// more than half of the corners wrong) are left out and named. Throws std::invalid_argument as
+// start_lens(); std::runtime_error, with what to do, if no view is left, or if the corners are not
+// those of this board.
+LensCalibration calibrate_lens(const LensProblem& problem,
+                               const LensCalibrationOptions& options = {});
+
+}  // namespace calibrate

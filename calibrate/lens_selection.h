@@ -1,0 +1,54 @@
+// The smallest lens form that suffices, by corners that took no part in its solve.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calibrate/lens_solve.h"
+
+namespace calibrate {
+
+// One form that was tried.
+struct LensCandidate {
+  LensForm form;
+  std::size_t parameters = 0;
+  std::optional<LensSolve> solve;       // nothing: the form cannot see what is in the pictures
+  double heldout_rms_px = 0;            // over all views, each left out once
+  std::vector<double> heldout_squares;  // per view: sum of squared distances, pixels^2
+  double time_ms = 0;
+};
+
+struct LensSelection {
+  std::vector<LensCandidate> candidates;  // by rising number of parameters
+  std::size_t chosen = 0;
+  std::size_t best = 0;  // of the least held-out error
+  std::size_t folds = 0;
+};
+
+// Fish-eyes and other lenses by angle: Kannala and Brandt's, from none to four terms, with and
+// without decentring and a second focal length.
+std::vector<LensForm> angular_forms();
+// What fits into a .cameramodel: mrcal's PINHOLE and OPENCV4, 5 and 8, with one focal length or
+// two.
+std::vector<LensForm> perspective_forms();
+
+// Solves each form from `start` over the corners in use there, and judges it by cross-validation:
+// the views are dealt into five groups; each in turn is left out of the solve, its poses are found
+// from every other of their corners, and the corners between them are compared. Of fewer than five
+// views, each quarter of the board is left out in turn. Chosen is the form with the fewest
+// parameters whose error is within a standard error (over the views, paired) and 5 % of the best's.
+//
+// Stone, "Cross-Validatory Choice and Assessment of Statistical Predictions", J. R. Stat. Soc. B
+// 36(2), 1974; the rule of one standard error is of Breiman et al., "Classification and Regression
+// Trees", 1984, section 3.4.3; we take that of the difference.
+//
+// Throws std::runtime_error if no form can be solved, std::invalid_argument for no forms.
+LensSelection select_lens(const LensProblem& problem,
+                          const LensStart& start,
+                          std::span<const LensForm> forms,
+                          bool warp);
+
+}  // namespace calibrate

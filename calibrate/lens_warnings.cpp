@@ -1,0 +1,168 @@
+// What an operator should know of a lens calibration, in plain words.
+#include "calibrate/lens_warnings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <optional>
+
+namespace calibrate {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+// From these on, something is said.
+constexpr double scatter_px = 1;
+constexpr double agreement = 0.25;  // correlation of neighbours' residuals
+constexpr double bend_m = 0.0005;
+constexpr double outlier_share = 0.05;
+constexpr std::size_t few_views = 5;
+constexpr double tilt_rad = 8 * degree;
+constexpr double unseen_share = 0.25;  // of the picture that the lens sees
+constexpr double large_error_px = 3;
+
+template <class... T>
+std::string text(const char* format, T... values) {
+  char buffer[400];
+  std::snprintf(buffer, sizeof buffer, format, values...);
+  return buffer;
+}
+
+void warn_of_corners(const LensProblem& problem,
+                     const LensCalibration& c,
+                     std::vector<std::string>& warnings) {
+  std::size_t seen = 0;
+  std::size_t used = 0;
+  for (const ViewReport& view : c.views) {
+    if (!view.rejected.empty()) {
+      warnings.push_back(view.name + ": left out: " + view.rejected);
+      continue;
+    }
+    seen += view.seen;
+    used += view.used;
+  }
+  if (c.start.not_finite > 0) {
+    warnings.push_back(text("%zu corners are no numbers or far outside of the picture; left out",
+                            c.start.not_finite));
+  }
+  if (static_cast<double>(seen - used) > outlier_share * static_cast<double>(seen)) {
+    warnings.push_back(text("%.0f %% of the corners do not fit: check how they were found",
+                            100 * static_cast<double>(seen - used) / static_cast<double>(seen)));
+  }
+  if (c.sigma_px > scatter_px) {
+    warnings.push_back(
+        text("corners scatter by %.1f px: blurred or moving pictures, or a board that is not flat",
+             c.sigma_px));
+  }
+  if (hypotenuse(c.warp_m.x, c.warp_m.y) > bend_m) {
+    warnings.push_back(text("the board is bent by %.1f mm; that is taken into account",
+                            1000 * hypotenuse(c.warp_m.x, c.warp_m.y)));
+  }
+  // Noise differs from corner to corner; what is left of a wrong model does not.
+  const LensSolve& solve = c.solve();
+  const auto missed = residuals(solve.bundle, problem.board, c.start.corners);
+  const auto columns = static_cast<std::size_t>(problem.board.columns);
+  double together = 0;
+  double alone = 0;
+  for (std::size_t i = 0; i + 1 < missed.size(); ++i) {
+    const SeenCorner& a = c.start.corners[i];
+    const SeenCorner& b = c.start.corners[i + 1];
+    const bool neighbours = a.view == b.view && b.index == a.index + 1 && b.index % columns != 0;
+    if (!neighbours || solve.used[i] == 0 || solve.used[i + 1] == 0) continue;
+    together += missed[i]->x * missed[i + 1]->x + missed[i]->y * missed[i + 1]->y;
+    alone += 0.5 * (missed[i]->x * missed[i]->x + missed[i]->y * missed[i]->y +
+                    missed[i + 1]->x * missed[i + 1]->x + missed[i + 1]->y * missed[i + 1]->y);
+  }
+  if (together > agreement * alone) {
+    warnings.push_back(
+        text("residuals of neighbouring corners agree (correlation %.2f): something is not in the "
+             "model, such as a rolling shutter, a moving board or one that is bent in another way",
+             together / alone));
+  }
+}
+
+void warn_of_views(const LensCalibration& c, std::vector<std::string>& warnings) {
+  std::size_t used = 0;
+  double most_tilt = 0;
+  for (const ViewReport& view : c.views) {
+    if (!view.cam_from_board) continue;
+    ++used;
+    const Mat3& R = view.cam_from_board->R;
+    const Vec3 normal{R.m[2], R.m[5], R.m[8]};
+    // How far the boards are turned against each other, not against the line of sight: boards in
+    // one plane tell nothing wherever they are.
+    for (const ViewReport& other : c.views) {
+      if (!other.cam_from_board) continue;
+      const Mat3& S = other.cam_from_board->R;
+      const Vec3 theirs{S.m[2], S.m[5], S.m[8]};
+      most_tilt =
+          std::max(most_tilt, std::atan2(length(cross(normal, theirs)), dot(normal, theirs)));
+    }
+  }
+  if (used < few_views) {
+    warnings.push_back(
+        text("only %zu pictures could be used: take 10 or more, over the whole picture", used));
+  }
+  if (used > 1 && most_tilt < tilt_rad) {
+    warnings.push_back(
+        text("all boards face the same way (within %.0f degrees): the focal length and the "
+             "distance cannot be told apart; tilt the board by 30 degrees and more",
+             most_tilt / degree));
+  }
+}
+
+void warn_of_coverage(const LensProblem& problem,
+                      const LensCalibration& c,
+                      std::vector<std::string>& warnings) {
+  constexpr int columns = 48;
+  const int rows = std::max(1, columns * problem.height / problem.width);
+  std::size_t seen = 0;
+  std::size_t unknown = 0;
+  double farthest_rad = 0;
+  std::vector<double> errors;
+  // Up to where the lens shows anything; its polynomial has no say on that.
+  Lens whole = c.lens;
+  whole.max_angle_rad = std::numbers::pi;
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const Vec2 q{(x + 0.5) * problem.width / columns, (y + 0.5) * problem.height / rows};
+      const auto v = unproject(whole, q);
+      if (!v) continue;
+      ++seen;
+      farthest_rad = std::max(farthest_rad, std::atan2(hypotenuse(v->x, v->y), v->z));
+      const auto error = c.overlay->at(q);
+      if (error) errors.push_back(*error);
+      if (!error) ++unknown;
+    }
+  }
+  if (static_cast<double>(unknown) > unseen_share * static_cast<double>(seen)) {
+    warnings.push_back(text("no corners in %.0f %% of the picture: the lens is a guess there",
+                            100 * static_cast<double>(unknown) / static_cast<double>(seen)));
+  }
+  if (farthest_rad > 1.1 * c.coverage_deg * degree) {
+    warnings.push_back(
+        text("no corners beyond %.0f degrees off the axis: the rim is a guess", c.coverage_deg));
+  }
+  if (errors.empty()) return;
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  if (*middle > large_error_px) {
+    warnings.push_back(
+        text("a virtual object may be off by %.0f px in half of the picture: take more pictures, "
+             "tilted in all directions",
+             *middle));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> warnings_of(const LensProblem& problem,
+                                     const LensCalibration& calibration) {
+  std::vector<std::string> warnings;
+  warn_of_corners(problem, calibration, warnings);
+  warn_of_views(calibration, warnings);
+  warn_of_coverage(problem, calibration, warnings);
+  return warnings;
+}
+
+}  // namespace calibrate

@@ -1,0 +1,167 @@
+// Boards before made cameras, with known truth.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+#include "calibrate/lens.h"
+#include "calibrate/lens_bundle.h"
+#include "calibrate/lens_solve.h"
+#include "calibrate/rotation_vector.h"
+
+namespace calibrate {
+
+constexpr double degree = std::numbers::pi / 180;
+
+// A lens of the family, or just outside of it: the angle off the axis has a ripple.
+struct MadeLens {
+  Lens lens;
+  double ripple_rad = 0;  // of five times the angle
+  double sees_rad = 0;    // corners beyond are not in the picture
+
+  Vec2 project(Vec3 v) const {
+    const double off = hypotenuse(v.x, v.y);
+    const double angle = std::atan2(off, v.z);
+    const double shown = angle + ripple_rad * std::sin(5 * angle);
+    const double s = off > 0 ? std::sin(shown) / off : 0;
+    return calibrate::project(lens, {v.x * s, v.y * s, std::cos(shown)}).value();
+  }
+};
+
+inline MadeLens made_fisheye(double ripple_rad = 0) {
+  // Sees a little beyond 90 degrees, as such lenses do.
+  return {
+      {"decentred_kannala_brandt", 1024, 1024,
+       ripple_rad == 0 ? std::vector<double>{331, 331, 513.3, 509.1, 0, 0, -.02, .003}
+                       : std::vector<double>{331.3, 331, 513.3, 509.1, 2e-4, -3e-4, -.02, .003}},
+      ripple_rad,
+      90 * degree};
+}
+
+inline MadeLens made_normal() {
+  return {{"LENSMODEL_OPENCV5",
+           1280,
+           720,
+           {1108.5, 1108.5, 641.7, 357.2, -.12, .05, 5e-4, -3e-4, -.01}},
+          0,
+          60 * degree};
+}
+
+struct MadeOptions {
+  std::size_t views = 30;
+  double noise_px = 0.3;
+  double outliers = 0;     // share of the corners
+  double centre_deg = 78;  // boards' middles lie up to here off the axis
+  double tilt_deg = 40;
+  double least_m = 0.28, most_m = 0.6;  // distance
+  Vec2 warp_m;
+  bool fronto = false;    // all boards face the camera
+  double sees_deg = 180;  // corners beyond are hidden
+  unsigned seed = 1;
+};
+
+inline Board made_board() { return {Board::Kind::chessboard, 10, 10, .04, 0, ""}; }
+
+inline Mat3 turn(Vec3 from, Vec3 to) {
+  const Vec3 axis = cross(normalize(from), normalize(to));
+  const double sine = length(axis);
+  const double angle = std::atan2(sine, dot(normalize(from), normalize(to)));
+  return sine > 0 ? rotation_of(axis * (angle / sine)) : Mat3{};
+}
+
+inline LensProblem made_problem(const MadeLens& truth, const MadeOptions& options) {
+  LensProblem problem{made_board(), truth.lens.width, truth.lens.height, {}};
+  const Board& board = problem.board;
+  std::mt19937 random(options.seed);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> normal;
+  const double sees = std::min(truth.sees_rad, options.sees_deg * degree);
+  for (int attempt = 0; attempt < 100000 && problem.views.size() < options.views; ++attempt) {
+    const double share = (static_cast<double>(problem.views.size()) + uniform(random)) /
+                         static_cast<double>(options.views);
+    const double off = options.centre_deg * degree * std::sqrt(share);
+    const double around =
+        2 * std::numbers::pi *
+        (0.618034 * static_cast<double>(problem.views.size()) + 0.05 * uniform(random));
+    const double distance = options.least_m + (options.most_m - options.least_m) * uniform(random);
+    const Vec3 towards{std::sin(off) * std::cos(around), std::sin(off) * std::sin(around),
+                       std::cos(off)};
+    const double tilt = options.tilt_deg * degree * uniform(random);
+    const double tilt_around = 2 * std::numbers::pi * uniform(random);
+    const double roll = (uniform(random) - 0.5) * std::numbers::pi;
+    Pose pose;
+    const Vec3 middle{0.5 * board.square_m * (board.columns - 1),
+                      0.5 * board.square_m * (board.rows - 1), 0};
+    if (options.fronto) {
+      pose.t = towards * (distance / std::max(towards.z, 0.3)) - middle;
+    } else {
+      pose.R = turn({0, 0, 1}, towards) *
+               rotation_of({tilt * std::cos(tilt_around), tilt * std::sin(tilt_around), 0}) *
+               rotation_of({0, 0, roll});
+      pose.t = towards * distance - pose.R * middle;
+    }
+    BoardView view{"view" + std::to_string(problem.views.size()), {}};
+    for (std::size_t i = 0; i < board.corner_count(); ++i) {
+      const Vec3 p = pose * corner_of(board, options.warp_m, i);
+      view.corners.emplace_back();
+      if (std::atan2(hypotenuse(p.x, p.y), p.z) >= sees) continue;
+      const Vec2 q = truth.project(p);
+      if (q.x < 1 || q.y < 1 || q.x > problem.width - 2 || q.y > problem.height - 2) continue;
+      view.corners.back() =
+          Vec2{q.x + options.noise_px * normal(random), q.y + options.noise_px * normal(random)};
+      if (uniform(random) < options.outliers) {
+        const double size = 5 + 15 * uniform(random);
+        const double way = 2 * std::numbers::pi * uniform(random);
+        view.corners.back()->x += size * std::cos(way);
+        view.corners.back()->y += size * std::sin(way);
+      }
+    }
+    if (count_corners(view) * 2 >= board.corner_count()) problem.views.push_back(view);
+  }
+  return problem;
+}
+
+// RMS angle in milliradians between true and solved directions of the pixels that the lens shows up
+// to an angle off the axis, evenly over the sphere, once the best rotation between the two cameras
+// is taken out (no picture of boards can tell that).
+inline double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg) {
+  std::vector<Eigen::Vector3d> expected, found;
+  for (double off = 1; off <= max_deg; off += 2) {
+    const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
+    for (int i = 0; i < around; ++i) {
+      const double a = 2 * std::numbers::pi * (i + 0.5) / around;
+      const Vec3 v{std::sin(off * degree) * std::cos(a), std::sin(off * degree) * std::sin(a),
+                   std::cos(off * degree)};
+      const Vec2 q = truth.project(v);
+      if (q.x < 0 || q.y < 0 || q.x > truth.lens.width - 1 || q.y > truth.lens.height - 1) continue;
+      const auto u = unproject(solved, q);
+      if (!u) return HUGE_VAL;
+      expected.emplace_back(v.x, v.y, v.z);
+      found.emplace_back(u->x, u->y, u->z);
+    }
+  }
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < found.size(); ++i) H += expected[i] * found[i].transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
+  const Eigen::Matrix3d R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  double sum = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Eigen::Vector3d turned = R * found[i];
+    const double angle = std::atan2(turned.cross(expected[i]).norm(), turned.dot(expected[i]));
+    sum += angle * angle;
+  }
+  return 1000 * std::sqrt(sum / static_cast<double>(found.size()));
+}
+
+}  // namespace calibrate
