@@ -198,9 +198,9 @@ bool is_bent(const LensProblem& problem, const Robust& robust) {
   return sigmas > bend_sigmas;
 }
 
-// The other forms with their shares of belief, by Akaike's weights: exp(-AIC / 2), where the noise
-// is that of the form that fits best.
-std::vector<OverlayError::OtherLens> others_of(const LensSelection& selection) {
+// The chosen form first, then the others, with their shares of belief by Akaike's weights:
+// exp(-AIC / 2), where the noise is that of the form that fits best.
+std::vector<BelievedSolve> believed(const LensSelection& selection) {
   const LensCandidate* finest = nullptr;
   for (const LensCandidate& c : selection.candidates) {
     if (c.solve && (finest == nullptr || c.solve->sigma_px < finest->solve->sigma_px)) finest = &c;
@@ -219,14 +219,15 @@ std::vector<OverlayError::OtherLens> others_of(const LensSelection& selection) {
   const double least = *std::ranges::min_element(criterion);
   double sum = 0;
   for (const double c : criterion) sum += std::exp(0.5 * (least - c));
-  std::vector<OverlayError::OtherLens> others;
+  std::vector<BelievedSolve> solves{{&*selection.candidates[selection.chosen].solve,
+                                     std::exp(0.5 * (least - criterion[selection.chosen])) / sum}};
   for (std::size_t i = 0; i < criterion.size(); ++i) {
     const double share = std::exp(0.5 * (least - criterion[i])) / sum;
     constexpr double negligible = 1e-3;
     if (i == selection.chosen || !(share > negligible)) continue;
-    others.push_back({selection.candidates[i].solve->lens, share});
+    solves.push_back({&*selection.candidates[i].solve, share});
   }
-  return others;
+  return solves;
 }
 
 void fill_reports(const LensProblem& problem, LensCalibration& result) {
@@ -322,8 +323,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   if (std::isfinite(chosen.heldout_rms_px)) {
     result.sigma_px = std::max(result.sigma_px, chosen.heldout_rms_px / std::numbers::sqrt2);
   }
-  result.overlay.emplace(OverlayError::Inputs{&problem, &result.start, &*chosen.solve,
-                                              result.sigma_px, others_of(result.selection)});
+  result.overlay.emplace(problem, result.start, believed(result.selection), result.sigma_px);
   result.coverage_deg = result.overlay->max_angle_rad() / degree;
   result.lens = chosen.solve->lens;
   if (!is_mrcal_model(result.lens.model)) {

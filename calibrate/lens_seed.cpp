@@ -195,9 +195,9 @@ std::optional<LensSeed> seed_lens(const LensForm& form,
     }
   };
   for (double focal = least_focal; focal < most_focal; focal *= focal_step) consider(focal);
+  if (!std::isfinite(best_error)) return std::nullopt;
   const double coarse = best_focal;
   for (const double factor : {1 / fine_step, fine_step}) consider(coarse * factor);
-  if (!std::isfinite(best_error)) return std::nullopt;
 
   LensSeed seed;
   seed.error_px = best_error;

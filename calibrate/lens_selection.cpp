@@ -13,6 +13,14 @@ namespace {
 
 constexpr std::size_t most_folds = 5;
 constexpr double most_worse = 1.05;  // whatever chance may explain
+// Sum of squares that chance may explain, in variances of a coordinate: three standard deviations.
+constexpr double tolerance = 9;
+
+double sum_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum;
+}
 
 // Which corners are left out together.
 struct Folds {
@@ -104,8 +112,7 @@ LensCandidate judge(const LensProblem& problem,
     judged = judge_group(problem, start, *candidate.solve, folds, fold, candidate.heldout_squares);
   }
   if (judged) {
-    double sum = 0;
-    for (const double square : candidate.heldout_squares) sum += square;
+    const double sum = sum_of(candidate.heldout_squares);
     const auto corners = static_cast<double>(std::ranges::count(start.used, std::uint8_t{1}));
     candidate.heldout_rms_px = std::sqrt(sum / corners);
     if (!std::isfinite(sum)) candidate.heldout_rms_px = HUGE_VAL;
@@ -115,21 +122,11 @@ LensCandidate judge(const LensProblem& problem,
   return candidate;
 }
 
+// Against the best one, whose corners miss by noise alone.
 bool suffices(const LensCandidate& candidate, const LensCandidate& best) {
   if (!(candidate.heldout_rms_px <= most_worse * best.heldout_rms_px)) return false;
-  double sum = 0;
-  double squares = 0;
-  double views = 0;
-  for (std::size_t view = 0; view < best.heldout_squares.size(); ++view) {
-    if (best.heldout_squares[view] == 0) continue;  // took no part
-    const double worse = candidate.heldout_squares[view] - best.heldout_squares[view];
-    sum += worse;
-    squares += worse * worse;
-    ++views;
-  }
-  // Of the sum over the views.
-  const double variance = (squares - sum * sum / views) * views / std::max(views - 1, 1.0);
-  return sum <= std::sqrt(std::max(variance, 0.0));
+  const double variance = 0.5 * best.heldout_rms_px * best.heldout_rms_px;  // of a coordinate
+  return sum_of(candidate.heldout_squares) - sum_of(best.heldout_squares) <= tolerance * variance;
 }
 
 }  // namespace

@@ -39,11 +39,13 @@ std::vector<LensForm> perspective_forms();
 // the views are dealt into five groups; each in turn is left out of the solve, its poses are found
 // from every other of their corners, and the corners between them are compared. Of fewer than five
 // views, each quarter of the board is left out in turn. Chosen is the form with the fewest
-// parameters whose error is within a standard error (over the views, paired) and 5 % of the best's.
+// parameters whose sum of squared distances is within nine variances of the best's, and within 5 %
+// of it: a term that moves all held-out corners together by three standard deviations is kept.
 //
 // Stone, "Cross-Validatory Choice and Assessment of Statistical Predictions", J. R. Stat. Soc. B
-// 36(2), 1974; the rule of one standard error is of Breiman et al., "Classification and Regression
-// Trees", 1984, section 3.4.3; we take that of the difference.
+// 36(2), 1974. We do not take the spread of the differences over the views for tolerance (Breiman
+// et al., "Classification and Regression Trees", 1984, section 3.4.3): of a real term it grows with
+// the term, which would be missed up to twice that size.
 //
 // Throws std::runtime_error if no form can be solved, std::invalid_argument for no forms.
 LensSelection select_lens(const LensProblem& problem,

@@ -81,22 +81,54 @@ Mat3 best_rotation(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return result;
 }
 
+// A square root of the covariance of a solve's free parameters.
+RowMatrix root_of(const LensProblem& problem,
+                  const LensStart& start,
+                  const LensSolve& solve,
+                  double sigma_px) {
+  const auto n = static_cast<Eigen::Index>(solve.bundle.free.size());
+  const std::vector<double> told =
+      information(solve.bundle, problem.board, start.corners, solve.used, solve.warp);
+  RowMatrix info = Eigen::Map<const RowMatrix>(told.data(), n + 2, n + 2) / (sigma_px * sigma_px);
+  info.topLeftCorner(n, n).diagonal() +=
+      prior_information(solve.bundle.form, solve.lens, solve.bundle.free.size());
+  // A board bends by less than its square.
+  const double bend = 1 / (problem.board.square_m * problem.board.square_m);
+  info.bottomRightCorner(2, 2).diagonal() += Eigen::Vector2d(bend, bend);
+  // Scaled to ones on the diagonal, so that numbers of all sizes live together.
+  const Eigen::VectorXd scale = info.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * info *
+                                                             scale.asDiagonal());
+  const Eigen::VectorXd spread = eigen.eigenvalues().cwiseMax(1e-15).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd whole = scale.asDiagonal() * eigen.eigenvectors() * spread.asDiagonal();
+  return whole.topRows(n);
+}
+
+// The turn of the camera that goes with a change of a solve's free parameters (3 x n): least
+// squares in pixels over some directions.
+RowMatrix turn_of(const LensSolve& solve, std::span<const std::optional<Vec3>> directions) {
+  const LensFunction function(solve.bundle.form);
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Identity() * 1e-9;
+  RowMatrix moved = RowMatrix::Zero(3, static_cast<Eigen::Index>(solve.bundle.free.size()));
+  RowMatrix by_free;
+  Eigen::Matrix<double, 2, 3> by_turn;
+  for (const auto& v : directions) {
+    if (!v || !derivatives(function, solve.bundle.free, *v, by_free, by_turn)) continue;
+    turns += by_turn.transpose() * by_turn;
+    moved += by_turn.transpose() * by_free;
+  }
+  return -turns.ldlt().solve(moved);
+}
+
 }  // namespace
 
-OverlayError::OverlayError(const Inputs& inputs)
-    : form_(inputs.solve->bundle.form),
-      lens_(inputs.solve->lens),
-      free_(inputs.solve->bundle.free) {
-  const LensProblem& problem = *inputs.problem;
-  const LensStart& start = *inputs.start;
-  const LensSolve& solve = *inputs.solve;
-
-  // Coverage.
-  cell_px_ = std::hypot(lens_.width, lens_.height) / cells_of_diagonal;
-  cells_x_ = static_cast<int>(lens_.width / cell_px_) + 1;
-  cells_y_ = static_cast<int>(lens_.height / cell_px_) + 1;
+void OverlayError::cover(const LensProblem& problem,
+                         const LensStart& start,
+                         const LensSolve& solve) {
+  cell_px_ = std::hypot(problem.width, problem.height) / cells_of_diagonal;
+  cells_x_ = static_cast<int>(problem.width / cell_px_) + 1;
+  cells_y_ = static_cast<int>(problem.height / cell_px_) + 1;
   covered_.assign(static_cast<std::size_t>(cells_x_ * cells_y_), 0);
-  bool any = false;
   for (std::size_t i = 0; i < start.corners.size(); ++i) {
     if (solve.used[i] == 0) continue;
     const SeenCorner& corner = start.corners[i];
@@ -111,60 +143,39 @@ OverlayError::OverlayError(const Inputs& inputs)
         covered_[static_cast<std::size_t>((y + dy) * cells_x_ + x + dx)] = 1;
       }
     }
-    any = true;
   }
-  if (!any) throw std::invalid_argument("no corner is in use");
+}
 
-  // Covariance of the free parameters.
-  const auto n = static_cast<Eigen::Index>(free_.size());
-  const double sigma_px = inputs.sigma_px > 0 ? inputs.sigma_px : solve.sigma_px;
-  const std::vector<double> told =
-      information(solve.bundle, problem.board, start.corners, solve.used, solve.warp);
-  RowMatrix info = Eigen::Map<const RowMatrix>(told.data(), n + 2, n + 2) / (sigma_px * sigma_px);
-  info.topLeftCorner(n, n).diagonal() += prior_information(form_, lens_, free_.size());
-  // A board bends by less than its square.
-  const double bend = 1 / (problem.board.square_m * problem.board.square_m);
-  info.bottomRightCorner(2, 2).diagonal() += Eigen::Vector2d(bend, bend);
-  // In units of the priors, so that numbers of all sizes live together.
-  const Eigen::VectorXd scale = info.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * info *
-                                                             scale.asDiagonal());
-  const Eigen::VectorXd spread = eigen.eigenvalues().cwiseMax(1e-15).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd whole = scale.asDiagonal() * eigen.eigenvectors() * spread.asDiagonal();
-  const RowMatrix root = whole.topRows(n);
-  root_.assign(root.data(), root.data() + root.size());
-
-  // The turn that goes with a change: least squares in pixels over the covered picture.
-  const LensFunction function(form_);
+OverlayError::OverlayError(const LensProblem& problem,
+                           const LensStart& start,
+                           std::span<const BelievedSolve> solves,
+                           double sigma_px) {
+  if (solves.empty()) throw std::invalid_argument("there is no solve to predict the error of");
+  cover(problem, start, *solves.front().solve);
+  if (!(max_angle_rad_ > 0)) throw std::invalid_argument("no corner is in use");
   std::vector<Vec2> pixels;
   for (int y = 0; y < cells_y_; ++y) {
     for (int x = 0; x < cells_x_; ++x) {
       const Vec2 q{(x + 0.5) * cell_px_, (y + 0.5) * cell_px_};
-      if (covered(q)) pixels.push_back(q);
+      if (covered_[cell_of(q)] != 0) pixels.push_back(q);
     }
   }
-  const auto directions = unproject_all(lens_, pixels);
-  Eigen::Matrix3d turns = Eigen::Matrix3d::Identity() * 1e-9;
-  RowMatrix moved = RowMatrix::Zero(3, n);
-  RowMatrix by_free;
-  Eigen::Matrix<double, 2, 3> by_turn;
-  for (const auto& v : directions) {
-    if (!v || !derivatives(function, free_, *v, by_free, by_turn)) continue;
-    turns += by_turn.transpose() * by_turn;
-    moved += by_turn.transpose() * by_free;
-  }
-  const RowMatrix turn = -turns.ldlt().solve(moved);
-  turn_.assign(turn.data(), turn.data() + turn.size());
-
-  for (const OtherLens& other : inputs.others) {
-    const auto theirs = unproject_all(other.lens, pixels);
+  const auto ours = unproject_all(solves.front().solve->lens, pixels);
+  for (const auto& [solve, share] : solves) {
+    Member member{solve->bundle.form, solve->lens, solve->bundle.free, {}, {}, share, {}};
+    const RowMatrix root = root_of(problem, start, *solve, sigma_px);
+    member.root.assign(root.data(), root.data() + root.size());
+    const auto theirs = unproject_all(member.lens, pixels);
+    const RowMatrix turn = turn_of(*solve, theirs);
+    member.turn.assign(turn.data(), turn.data() + turn.size());
     std::vector<Vec3> a, b;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
-      if (!directions[i] || !theirs[i]) continue;
-      a.push_back(*directions[i]);
+      if (!ours[i] || !theirs[i]) continue;
+      a.push_back(*ours[i]);
       b.push_back(*theirs[i]);
     }
-    if (a.size() > 2) others_.push_back({other, best_rotation(a, b)});
+    member.from_ours = best_rotation(a, b);
+    members_.push_back(std::move(member));
   }
 }
 
@@ -174,42 +185,60 @@ std::size_t OverlayError::cell_of(Vec2 q) const {
 }
 
 bool OverlayError::covered(Vec2 q) const {
-  const bool inside = q.x >= 0 && q.y >= 0 && q.x <= lens_.width && q.y <= lens_.height;
+  const Lens& lens = members_.front().lens;
+  const bool inside = q.x >= 0 && q.y >= 0 && q.x <= lens.width && q.y <= lens.height;
   if (!inside || covered_[cell_of(q)] == 0) return false;
-  const auto v = unproject(lens_, q);
+  const auto v = unproject(lens, q);
   return v && std::atan2(hypotenuse(v->x, v->y), v->z) <= max_angle_rad_;
 }
 
-std::optional<OverlayError::Covariance> OverlayError::noise(Vec2 q) const {
-  const auto v = unproject(lens_, q);
-  if (!v) return std::nullopt;
+std::optional<OverlayError::Covariance> OverlayError::noise_of(const Member& member, Vec3 v) {
   RowMatrix by_free;
   Eigen::Matrix<double, 2, 3> by_turn;
-  if (!derivatives(LensFunction(form_), free_, *v, by_free, by_turn)) return std::nullopt;
-  const auto n = static_cast<Eigen::Index>(free_.size());
-  const Eigen::Map<const RowMatrix> turn(turn_.data(), 3, n);
-  const Eigen::Map<const RowMatrix> root(root_.data(), n,
-                                         static_cast<Eigen::Index>(root_.size()) / n);
+  if (!derivatives(LensFunction(member.form), member.free, v, by_free, by_turn)) {
+    return std::nullopt;
+  }
+  const auto n = static_cast<Eigen::Index>(member.free.size());
+  const Eigen::Map<const RowMatrix> turn(member.turn.data(), 3, n);
+  const Eigen::Map<const RowMatrix> root(member.root.data(), n,
+                                         static_cast<Eigen::Index>(member.root.size()) / n);
   const RowMatrix shown = (by_free + by_turn * turn) * root;
   const Eigen::Matrix2d c = shown * shown.transpose();
   if (!c.allFinite()) return std::nullopt;
   return Covariance{c(0, 0), c(0, 1), c(1, 1)};
 }
 
+std::optional<OverlayError::Covariance> OverlayError::noise(Vec2 q) const {
+  const auto v = unproject(members_.front().lens, q);
+  return v ? noise_of(members_.front(), *v) : std::nullopt;
+}
+
 std::optional<double> OverlayError::at(Vec2 q) const {
   if (!covered(q)) return std::nullopt;
-  auto error = noise(q);
-  const auto v = unproject(lens_, q);
-  if (!error || !v) return std::nullopt;
-  for (const auto& [other, from_ours] : others_) {
-    const auto there = project(other.lens, from_ours * *v);
-    if (!there) continue;
+  const auto v = unproject(members_.front().lens, q);
+  if (!v) return std::nullopt;
+  const auto ours = noise_of(members_.front(), *v);
+  if (!ours) return std::nullopt;
+  Covariance sum;
+  double shares = 0;
+  for (const Member& member : members_) {
+    const Vec3 theirs = member.from_ours * *v;
+    const auto there = project(member.lens, theirs);
+    const auto own = noise_of(member, theirs);
+    if (!there || !own) continue;
+    // What a form with more parameters may be off by is both its own noise and its distance from
+    // ours; one would count twice.
     const Vec2 away{there->x - q.x, there->y - q.y};
-    error->xx += other.share * away.x * away.x;
-    error->xy += other.share * away.x * away.y;
-    error->yy += other.share * away.y * away.y;
+    const Covariance apart{ours->xx + away.x * away.x, ours->xy + away.x * away.y,
+                           ours->yy + away.y * away.y};
+    const Covariance& larger = apart.xx + apart.yy > own->xx + own->yy ? apart : *own;
+    sum.xx += member.share * larger.xx;
+    sum.xy += member.share * larger.xy;
+    sum.yy += member.share * larger.yy;
+    shares += member.share;
   }
-  return length_95(*error);
+  if (!(shares > 0)) return std::nullopt;
+  return length_95({sum.xx / shares, sum.xy / shares, sum.yy / shares});
 }
 
 }  // namespace calibrate

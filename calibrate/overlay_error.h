@@ -10,6 +10,12 @@
 
 namespace calibrate {
 
+// A lens form's solve of the corners, and its share of belief.
+struct BelievedSolve {
+  const LensSolve* solve = nullptr;
+  double share = 1;  // of all forms'; they add up to 1
+};
+
 // The predicted error at each pixel: the distance in pixels that 95 of 100 calibrations like this
 // one stay below, once the camera's pose has been found through the same lens (a turn of the camera
 // is part of its pose, not of the lens's error).
@@ -17,26 +23,19 @@ namespace calibrate {
 // Three things go into it. The corners' noise, carried from residuals through the solve to the
 // pixel: after mrcal's projection uncertainty (mrcal.secretsauce.net/uncertainty.html), but that we
 // take the turn out by least squares over the covered picture instead of averaging over the boards.
-// What other lens forms make of the same corners, each by its share of belief: Burnham and
-// Anderson, "Model Selection and Multimodel Inference", 2002, section 4.3. And the held-out
-// residuals: if corners that took no part are missed by more than the solve's own, so is the rest.
+// What other lens forms make of the same corners, each with its own noise, by its share of belief:
+// Burnham and Anderson, "Model Selection and Multimodel Inference", 2002, section 4.3. And the
+// held-out residuals: if corners that took no part are missed by more than the solve's own, so is
+// the rest.
 class OverlayError {
  public:
-  // A lens of another form for the same corners, and its share of belief: all shares, ours too, add
-  // up to 1.
-  struct OtherLens {
-    Lens lens;
-    double share = 0;
-  };
-  struct Inputs {
-    const LensProblem* problem = nullptr;
-    const LensStart* start = nullptr;  // of the corners
-    const LensSolve* solve = nullptr;
-    double sigma_px = 0;                 // of a corner's coordinates; 0 = the solve's own
-    std::vector<OtherLens> others = {};  // of other forms
-  };
-  // Throws std::invalid_argument if no corner is in use.
-  explicit OverlayError(const Inputs& inputs);
+  // `solves` are over the same corners, of `start`; the first is the one whose lens is used.
+  // `sigma_px` is of a corner's coordinates. Throws std::invalid_argument if there is no solve, or
+  // no corner is in use.
+  OverlayError(const LensProblem& problem,
+               const LensStart& start,
+               std::span<const BelievedSolve> solves,
+               double sigma_px);
 
   // Whether corners were seen about there, and at such angles. The picture is divided into cells
   // of a 24th of its diagonal; a cell counts if a corner lies in it or in one of its neighbours.
@@ -55,22 +54,25 @@ class OverlayError {
   double max_angle_rad() const { return max_angle_rad_; }  // off the axis, of a corner
 
  private:
-  std::size_t cell_of(Vec2 q) const;
+  struct Member {
+    LensForm form;
+    Lens lens;
+    std::vector<double> free;
+    std::vector<double> root;  // n x m: root root^T is the covariance of the free parameters
+    std::vector<double> turn;  // 3 x n: the turn that goes with a change of them
+    double share = 1;
+    Mat3 from_ours;  // turns directions of the first lens to this one's
+  };
+  static std::optional<Covariance> noise_of(const Member& member, Vec3 v);
 
-  LensForm form_;
-  Lens lens_;
-  std::vector<double> free_;
+  std::size_t cell_of(Vec2 q) const;
+  void cover(const LensProblem& problem, const LensStart& start, const LensSolve& solve);
+
   int cells_x_ = 0, cells_y_ = 0;
   double cell_px_ = 1;
   std::vector<std::uint8_t> covered_;
   double max_angle_rad_ = 0;
-  std::vector<double> root_;  // n x n: root root^T is the covariance of the free parameters
-  std::vector<double> turn_;  // 3 x n: the turn that goes with a change of them
-  struct TurnedLens {
-    OtherLens other;
-    Mat3 from_ours;  // turns our directions to its
-  };
-  std::vector<TurnedLens> others_;
+  std::vector<Member> members_;
 };
 
 }  // namespace calibrate

@@ -70,6 +70,15 @@ struct MadeOptions {
   unsigned seed = 1;
 };
 
+// Of a normal lens: boards farther away, over its narrower picture.
+inline MadeOptions normal_options() {
+  MadeOptions options;
+  options.centre_deg = 18;
+  options.least_m = 0.5;
+  options.most_m = 1.1;
+  return options;
+}
+
 inline Board made_board() { return {Board::Kind::chessboard, 10, 10, .04, 0, ""}; }
 
 inline Mat3 turn(Vec3 from, Vec3 to) {

@@ -1,0 +1,213 @@
+// Lenses from made boards, against their truth.
+#include "calibrate/lens_calibration.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/calibrate/made_boards.h"
+
+namespace calibrate {
+namespace {
+
+using ::testing::AnyOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double off_family_rad = 0.0008;
+
+struct Case {
+  MadeLens truth;
+  MadeOptions options;
+  double max_deg;
+};
+
+// RMS ray error over seeds, in milliradians; and what the noise of the corners foretells.
+struct RayErrors {
+  double found_mrad = 0;
+  double foretold_mrad = 0;
+};
+
+// The noise covariance at the pixels of the ray error, turned from pixels to angles.
+double foretold_mrad(const MadeLens& truth, const LensCalibration& c, double max_deg) {
+  double sum = 0;
+  double count = 0;
+  for (double off = 1; off <= max_deg; off += 2) {
+    const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
+    for (int i = 0; i < around; ++i) {
+      const double a = 2 * std::numbers::pi * (i + 0.5) / around;
+      const Vec3 v{std::sin(off * degree) * std::cos(a), std::sin(off * degree) * std::sin(a),
+                   std::cos(off * degree)};
+      const Vec2 q = truth.project(v);
+      if (q.x < 0 || q.y < 0 || q.x > truth.lens.width - 1 || q.y > truth.lens.height - 1) continue;
+      const auto noise = c.overlay->noise(q);
+      const auto here = unproject(c.lens, q);
+      const auto right = unproject(c.lens, {q.x + 0.1, q.y});
+      const auto below = unproject(c.lens, {q.x, q.y + 0.1});
+      if (!noise || !here || !right || !below) continue;
+      const Vec3 by_x = (*right - *here) / 0.1;
+      const Vec3 by_y = (*below - *here) / 0.1;
+      sum += noise->xx * dot(by_x, by_x) + 2 * noise->xy * dot(by_x, by_y) +
+             noise->yy * dot(by_y, by_y);
+      ++count;
+    }
+  }
+  return 1000 * std::sqrt(sum / count);
+}
+
+RayErrors ray_errors(const Case& c, unsigned seeds) {
+  double found = 0;
+  double foretold = 0;
+  for (unsigned seed = 1; seed <= seeds; ++seed) {
+    MadeOptions options = c.options;
+    options.seed = seed;
+    const LensCalibration calibration = calibrate_lens(made_problem(c.truth, options));
+    found += std::pow(ray_error_mrad(c.truth, calibration.lens, c.max_deg), 2) / seeds;
+    foretold += std::pow(foretold_mrad(c.truth, calibration, c.max_deg), 2) / seeds;
+  }
+  return {std::sqrt(found), std::sqrt(foretold)};
+}
+
+constexpr unsigned few_seeds = PLATELIGHT_FULL_TESTS ? 40 : 4;
+
+TEST(CalibrateLens, FindsAFisheyeToThePrecisionOfItsCorners) {
+  const RayErrors errors = ray_errors({made_fisheye(), {}, 89}, few_seeds);
+  EXPECT_LE(errors.found_mrad, 0.6);
+  EXPECT_LE(errors.found_mrad, 1.15 * errors.foretold_mrad);
+}
+
+TEST(CalibrateLens, FindsAFisheyeThatNoModelDescribesExactly) {
+  const RayErrors errors = ray_errors({made_fisheye(off_family_rad), {}, 89}, few_seeds);
+  EXPECT_LE(errors.found_mrad, 0.6);
+  EXPECT_LE(errors.found_mrad, 1.15 * errors.foretold_mrad);
+}
+
+TEST(CalibrateLens, FindsAFisheyeThoughCornersAreWrong) {
+  MadeOptions options;
+  options.outliers = 0.15;
+  EXPECT_LE(ray_errors({made_fisheye(), options, 89}, few_seeds).found_mrad, 1);
+  EXPECT_LE(ray_errors({made_fisheye(off_family_rad), options, 89}, few_seeds).found_mrad, 1);
+}
+
+TEST(CalibrateLens, FindsAFisheyeThoughTheBoardIsBent) {
+  MadeOptions options;
+  options.warp_m = {.002, .001};
+  EXPECT_LE(ray_errors({made_fisheye(), options, 89}, few_seeds).found_mrad, 1);
+  options.warp_m = {.005, 0};
+  const LensCalibration bent = calibrate_lens(made_problem(made_fisheye(), options));
+  EXPECT_NEAR(bent.warp_m.x, .005, 2e-4);
+  EXPECT_NEAR(bent.warp_m.y, 0, 2e-4);
+  EXPECT_THAT(bent.warnings, Contains(HasSubstr("bent")));
+  EXPECT_LE(ray_error_mrad(made_fisheye(), bent.lens, 89), 1);
+}
+
+TEST(CalibrateLens, FindsANormalLens) {
+  EXPECT_LE(ray_errors({made_normal(), normal_options(), 28}, few_seeds).found_mrad, 0.25);
+  MadeOptions bent = normal_options();
+  bent.warp_m = {.002, 0};
+  EXPECT_LE(ray_errors({made_normal(), bent, 28}, few_seeds).found_mrad, 0.35);
+}
+
+TEST(CalibrateLens, ChoosesWhatFitsIntoACameraModelIfItIsAskedTo) {
+  const LensCalibration c =
+      calibrate_lens(made_problem(made_normal(), normal_options()),
+                     {.models = LensCalibrationOptions::Models::perspective, .form = {}});
+  EXPECT_THAT(c.lens.model, HasSubstr("LENSMODEL_OPENCV"));
+  EXPECT_LE(ray_error_mrad(made_normal(), c.lens, 28), 0.4);
+}
+
+TEST(CalibrateLens, TellsWhatItSawAndWhatItDidNot) {
+  MadeOptions options;
+  options.sees_deg = 60;
+  options.centre_deg = 45;
+  const LensCalibration c = calibrate_lens(made_problem(made_fisheye(), options));
+  EXPECT_NEAR(c.coverage_deg, 60, 2);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("degrees off the axis: the rim is a guess")));
+  EXPECT_TRUE(c.overlay->at({513, 509}));
+  EXPECT_FALSE(c.overlay->at({513 + 331 * 1.4, 509})) << "80 degrees off the axis";
+  EXPECT_FALSE(c.overlay->at({-5, 509}));
+  EXPECT_FALSE(c.overlay->at({std::nan(""), 509}));
+}
+
+LensProblem good_problem() {
+  MadeOptions options;
+  options.views = 12;
+  return made_problem(made_fisheye(), options);
+}
+
+TEST(CalibrateLens, LeavesOutPicturesThatTellSomethingElse) {
+  LensProblem problem = good_problem();
+  problem.views[3] = problem.views[2];  // the same picture again
+  problem.views[3].name = "again";
+  BoardView& mirrored = problem.views[5];  // rows the other way round
+  for (std::size_t row = 0; row < 10; ++row) {
+    std::reverse(mirrored.corners.begin() + static_cast<std::ptrdiff_t>(10 * row),
+                 mirrored.corners.begin() + static_cast<std::ptrdiff_t>(10 * row + 10));
+  }
+  BoardView& moved = problem.views[7];  // half the board somewhere else
+  for (std::size_t i = 0; i < 60; ++i) {
+    if (moved.corners[i]) moved.corners[i]->x += 15 + static_cast<double>(i * i % 17);
+  }
+  problem.views[9].corners.assign(100, std::nullopt);
+  const LensCalibration c = calibrate_lens(problem);
+  EXPECT_THAT(c.views[3].rejected, HasSubstr("where view2 does"));
+  EXPECT_THAT(c.views[5].rejected, HasSubstr("mirrored"));
+  EXPECT_THAT(c.views[7].rejected, HasSubstr("do not fit"));
+  EXPECT_THAT(c.views[9].rejected, HasSubstr("no corner"));
+  EXPECT_LE(ray_error_mrad(made_fisheye(), c.lens, 89), 1.5);
+  std::size_t used = 0;
+  for (const ViewReport& view : c.views) used += view.rejected.empty();
+  EXPECT_EQ(used, 8u);
+}
+
+TEST(CalibrateLens, LeavesOutCornersThatAreNoNumbers) {
+  LensProblem problem = good_problem();
+  problem.views[0].corners[4] = Vec2{std::nan(""), 3};
+  problem.views[1].corners[7] = Vec2{std::numeric_limits<double>::infinity(), 3};
+  problem.views[2].corners[9] = Vec2{1e300, -1e300};
+  const LensCalibration c = calibrate_lens(problem);
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("3 corners are no numbers")));
+  EXPECT_LE(ray_error_mrad(made_fisheye(), c.lens, 89), 1.5);
+}
+
+TEST(CalibrateLens, RefusesWhatIsNoPictureOfTheBoard) {
+  LensProblem problem = good_problem();
+  problem.views[0].corners.pop_back();
+  EXPECT_THROW(calibrate_lens(problem), std::invalid_argument);
+  problem = good_problem();
+  problem.views.clear();
+  EXPECT_THROW(calibrate_lens(problem), std::runtime_error);
+  problem = good_problem();
+  problem.width = 0;
+  EXPECT_THROW(calibrate_lens(problem), std::invalid_argument);
+  problem = good_problem();
+  for (BoardView& view : problem.views) view.corners.assign(100, Vec2{200, 300});
+  EXPECT_THROW(calibrate_lens(problem), std::runtime_error);
+}
+
+TEST(CalibrateLens, RefusesCornersCountedOnAnotherBoard) {
+  // 10 x 10 corners read as rows of 20.
+  LensProblem problem = good_problem();
+  problem.board.columns = 20;
+  problem.board.rows = 5;
+  try {
+    const LensCalibration c = calibrate_lens(problem);
+    EXPECT_THAT(c.warnings, Contains(AnyOf(HasSubstr("do not fit"), HasSubstr("scatter"))));
+    ADD_FAILURE() << "found " << name_of(c.form) << " with noise of " << c.sigma_px << " px";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), AnyOf(HasSubstr("not corners of this board"),
+                                    HasSubstr("no lens model can be fitted")));
+  }
+}
+
+TEST(CalibrateLens, GivesTheSameLensEveryTime) {
+  const LensCalibration a = calibrate_lens(good_problem());
+  const LensCalibration b = calibrate_lens(good_problem());
+  EXPECT_EQ(a.lens, b.lens);
+}
+
+}  // namespace
+}  // namespace calibrate
