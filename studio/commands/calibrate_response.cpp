@@ -295,7 +295,7 @@ Command calibrate_response_command() {
             arguments.option("--compare", o->compare, "also judge this .rsp or .toml file");
             return [o](Console& console) { calibrate_response(*o, console); };
           },
-          "Measure cameras: response, noise, vignetting; print boards"};
+          "Measure cameras: how they see, where they stand, how they follow light"};
 }
 
 }  // namespace studio

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "calibrate/camera_model.h"
+#include "calibrate/pose_file.h"
 #include "calibrate/vignetting_fit.h"
 #include "capture/camera.h"
 #include "studio/commands/commands.h"
@@ -59,12 +59,6 @@ std::vector<std::string> split(const std::string& list) {
   return words;
 }
 
-calibrate::Pose read_pose(const std::string& path) {
-  const calibrate::CameraModel model = calibrate::read_camera_model(path);
-  if (!model.cam_from_ref) throw std::runtime_error(path + ": has no extrinsics");
-  return *model.cam_from_ref;
-}
-
 // A scene in several orientations if there are poses, else an even field each.
 std::vector<calibrate::VignettingSample> samples_of(const VignettingOptions& options,
                                                     const calibrate::Lens& lens) {
@@ -87,7 +81,7 @@ std::vector<calibrate::VignettingSample> samples_of(const VignettingOptions& opt
     std::vector<calibrate::TurnedShot> turned;
     double saturation = HUGE_VAL;
     for (std::size_t i = 0; i < shots.size(); ++i) {
-      turned.push_back({shots[i].radiance.get(), read_pose(poses[i])});
+      turned.push_back({shots[i].radiance.get(), calibrate::read_pose(poses[i])});
       saturation = std::min(saturation, shots[i].saturation);
     }
     return calibrate::turned_samples(turned, lens, saturation);
@@ -151,8 +145,9 @@ Command calibrate_vignetting_command() {
                                   "pictures of even fields; or of one scene, the camera turned");
             arguments.option("--lens", o->lens, "the lens: a .toml or .cameramodel file");
             arguments.required("--lens");
-            arguments.option("--poses", o->poses,
-                             ".cameramodel files with the pose of each shot, joined by commas");
+            arguments.option(
+                "--poses", o->poses,
+                ".toml or .cameramodel files with the pose of each shot, joined by commas");
             arguments.option("--response", o->response,
                              ".rsp or .toml file of calibrate response, for pictures of codes");
             return [o](Console& console) { calibrate_vignetting(*o, console); };

@@ -1,0 +1,38 @@
+// What the commands that find poses read, write and say alike.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "calibrate/lens.h"
+#include "calibrate/markers.h"
+#include "calibrate/pose.h"
+#include "studio/console.h"
+
+namespace studio {
+
+// Throws UsageError unless a pose can be written to a file of that name.
+void check_pose_file_name(const std::string& path);
+
+// As calibrate::write_pose; what the lens does not fit into is a std::runtime_error that says so.
+void write_pose_file(const std::string& path,
+                     const calibrate::Pose& cam_from_set,
+                     const calibrate::Lens& lens,
+                     const std::string& comment);
+
+// The markers of one picture of a file, or of its only one. Throws std::runtime_error with the
+// path.
+std::vector<calibrate::Marker> read_markers_of(const std::string& path, const std::string& picture);
+
+// position_m, rotation, axis and roll_deg.
+nlohmann::ordered_json pose_json(const calibrate::Pose& cam_from_set);
+
+// Where the camera is and looks; `sigma_mm` 0 = the position was given.
+void say_pose(const calibrate::Pose& cam_from_set,
+              double sigma_deg,
+              double sigma_mm,
+              Console& console);
+
+}  // namespace studio
