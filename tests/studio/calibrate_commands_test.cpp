@@ -11,6 +11,8 @@
 #include "calibrate/camera_model.h"
 #include "calibrate/lens.h"
 #include "calibrate/pose_file.h"
+#include "capture/exr.h"
+#include "tests/calibrate/made_lamps.h"
 #include "tests/calibrate/made_markers.h"
 #include "tests/studio/command_line.h"
 
@@ -101,6 +103,58 @@ TEST_F(CalibrateCommands, PoseSaysWhatIsMissing) {
   EXPECT_EQ(outcome.status, 1);
   expect_one_line(outcome.err);
   EXPECT_THAT(outcome.err, HasSubstr("add a fourth"));
+}
+
+TEST_F(CalibrateCommands, ProbeIsTurnedByMarkersFromAKnownPosition) {
+  const calibrate::Pose truth = calibrate::pose_from_axis({0.4, -0.3, 1.2}, {0.1, 0.2, 1}, 0.6);
+  calibrate::write_lens(path("lens.toml"), made::fish_eye());
+  const std::string few = write("few.toml", markers_text(made::fish_eye(), truth, 3, "probe"));
+  const std::string many = write("many.toml", markers_text(made::fish_eye(), truth, 9, "probe"));
+  const std::string command =
+      "calibrate probe --lens " + path("lens.toml") + " -o " + path("pose.toml") + " --markers ";
+  const auto error_deg = [&] {
+    return made::error_of(calibrate::read_pose(path("pose.toml")), truth).turn_rad / made::degree;
+  };
+  ASSERT_EQ(run_with_figures(command + few + " --position 0.4,-0.3,1.2").status, 0);
+  EXPECT_LT(error_deg(), 4 * double{figures()["sigma_deg"]});
+  EXPECT_FALSE(figures().contains("sigma_mm"));
+  ASSERT_EQ(run_with_figures(command + many).status, 0);
+  EXPECT_LT(error_deg(), 4 * double{figures()["sigma_deg"]});
+  EXPECT_GT(figures()["sigma_mm"], 0);
+
+  const Outcome too_few = run(command + few);
+  EXPECT_EQ(too_few.status, 1);
+  EXPECT_THAT(too_few.err, HasSubstr("--position needs only two"));
+  EXPECT_EQ(run(command + few + " --position 0.4,-0.3").status, 2);
+  EXPECT_EQ(run(command + few + " --position 0.4,-0.3,x").status, 2);
+}
+
+TEST_F(CalibrateCommands, ProbeIsTurnedByLampsThatTheSceneCameraSeesToo) {
+  const made::LampWorld world{{{calibrate::normalize(calibrate::Vec3{-0.4, 1, 0.2})},
+                               {calibrate::normalize(calibrate::Vec3{0.1, 1, 0.3}), 0.03, 8},
+                               {calibrate::normalize(calibrate::Vec3{0.45, 1, -0.1}), 0.015, 300}}};
+  const calibrate::Pose plate_pose = calibrate::look_at({0, -4, 1}, {0, 0, 1}, 0.02);
+  const calibrate::Pose truth = calibrate::pose_from_axis({}, {0.1, 0.7, 1}, 2);
+  made::Random random(4);
+  capture::write_exr(path("plate.exr"),
+                     made::photograph(world, made::scene_lens(), plate_pose.R, 1, 0.02, random));
+  capture::write_exr(path("light.exr"),
+                     made::photograph(world, made::probe_lens(), truth.R, 1e4, 0.02, random));
+  calibrate::write_lens(path("plate.toml"), made::scene_lens());
+  calibrate::write_lens(path("light.toml"), made::probe_lens());
+  calibrate::write_pose(path("plate_pose.toml"), plate_pose, made::scene_lens(), "made");
+  const std::string command = "calibrate probe --lens " + path("light.toml") + " --light " +
+                              path("light.exr") + " --plate " + path("plate.exr") +
+                              " --plate-lens " + path("plate.toml") + " -o " + path("pose.toml");
+  const Outcome outcome =
+      run_with_figures(command + " --plate-pose " + path("plate_pose.toml") + " --position 0,0,1");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_EQ(figures()["sources"].size(), 3U);
+  const made::PoseError error = made::error_of(calibrate::read_pose(path("pose.toml")), truth);
+  EXPECT_LT(error.turn_rad / made::degree, 0.3);
+  EXPECT_LT(error.turn_rad / made::degree, 4 * double{figures()["sigma_deg"]});
+  EXPECT_EQ(run(command).status, 2);
 }
 
 }  // namespace
