@@ -72,6 +72,7 @@ std::span<const Command> commands() {
       calibrate_board_command(),
       calibrate_pose_command(),
       calibrate_probe_command(),
+      calibrate_offset_command(),
   };
   return all;
 }
