@@ -14,7 +14,7 @@
 namespace calibrate {
 namespace {
 
-constexpr double cells_of_diagonal = 24;
+constexpr double cells_of_diagonal = 32;
 // 95 % of a normal error's length: in one direction only, and of one alike in all directions.
 constexpr double line_95 = 1.9600;
 constexpr double round_95 = 2.4477;

@@ -38,7 +38,7 @@ class OverlayError {
                double sigma_px);
 
   // Whether corners were seen about there, and at such angles. The picture is divided into cells
-  // of a 24th of its diagonal; a cell counts if a corner lies in it or in one of its neighbours.
+  // of a 32nd of its diagonal; a cell counts if a corner lies in it or in one of its neighbours.
   bool covered(Vec2 q) const;
 
   // 95 % error in pixels; nothing where it is unknown: outside of coverage.

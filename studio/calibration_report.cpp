@@ -137,7 +137,7 @@ std::string candidate_figure(const LensCalibration& c) {
     most = std::max(most, static_cast<double>(candidate.parameters));
   }
   const Axis y = log_axis(errors, height - 46, 12);
-  const Axis x{0, most + 1, false, 70, figure_width - 12, false};
+  const Axis x{0, most + 1, false, 84, figure_width - 12, false};
   draw_axes(svg, x, y, "free parameters of the lens", "RMS distance, px", 12);
   for (std::size_t i = 0; i < c.selection.candidates.size(); ++i) {
     const auto& candidate = c.selection.candidates[i];

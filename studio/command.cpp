@@ -70,6 +70,7 @@ std::span<const Command> commands() {
       calibrate_response_command(),
       calibrate_vignetting_command(),
       calibrate_board_command(),
+      calibrate_lens_command(),
       calibrate_pose_command(),
       calibrate_probe_command(),
       calibrate_offset_command(),
