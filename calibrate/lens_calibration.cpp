@@ -323,6 +323,10 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   if (std::isfinite(chosen.heldout_rms_px)) {
     result.sigma_px = std::max(result.sigma_px, chosen.heldout_rms_px / std::numbers::sqrt2);
   }
+  // A few views show less of what differs from view to view than there is.
+  double views = 0;
+  for (const ViewReport& view : result.views) views += view.rejected.empty() ? 1 : 0;
+  result.sigma_px *= std::sqrt(views > 1 ? views / (views - 1) : 4.0);
   result.overlay.emplace(problem, result.start, believed(result.selection), result.sigma_px);
   result.coverage_deg = result.overlay->max_angle_rad() / degree;
   result.lens = chosen.solve->lens;

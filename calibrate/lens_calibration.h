@@ -34,6 +34,8 @@ struct LensCalibration {
   Lens lens;
   LensForm form;
   Vec2 warp_m;  // of the board; see Bundle
+  // Of each coordinate of a corner: the larger of residuals and held-out ones, and larger yet if
+  // the pictures are few.
   double sigma_px = 0;
   double train_rms_px = 0;
   double heldout_rms_px = 0;  // infinite: nothing could be left out

@@ -36,6 +36,17 @@ struct MadeLens {
     const double s = off > 0 ? std::sin(shown) / off : 0;
     return calibrate::project(lens, {v.x * s, v.y * s, std::cos(shown)}).value();
   }
+
+  std::optional<Vec3> unproject(Vec2 q) const {
+    const auto v = calibrate::unproject(lens, q);
+    if (!v) return std::nullopt;
+    const double off = hypotenuse(v->x, v->y);
+    const double shown = std::atan2(off, v->z);
+    double angle = shown;
+    for (int i = 0; i < 50; ++i) angle = shown - ripple_rad * std::sin(5 * angle);
+    const double s = off > 0 ? std::sin(angle) / off : 0;
+    return Vec3{v->x * s, v->y * s, std::cos(angle)};
+  }
 };
 
 inline MadeLens made_fisheye(double ripple_rad = 0) {
@@ -81,7 +92,7 @@ inline MadeOptions normal_options() {
 
 inline Board made_board() { return {Board::Kind::chessboard, 10, 10, .04, 0, ""}; }
 
-inline Mat3 turn(Vec3 from, Vec3 to) {
+inline Mat3 turn_between(Vec3 from, Vec3 to) {
   const Vec3 axis = cross(normalize(from), normalize(to));
   const double sine = length(axis);
   const double angle = std::atan2(sine, dot(normalize(from), normalize(to)));
@@ -114,7 +125,7 @@ inline LensProblem made_problem(const MadeLens& truth, const MadeOptions& option
     if (options.fronto) {
       pose.t = towards * (distance / std::max(towards.z, 0.3)) - middle;
     } else {
-      pose.R = turn({0, 0, 1}, towards) *
+      pose.R = turn_between({0, 0, 1}, towards) *
                rotation_of({tilt * std::cos(tilt_around), tilt * std::sin(tilt_around), 0}) *
                rotation_of({0, 0, roll});
       pose.t = towards * distance - pose.R * middle;
@@ -140,11 +151,27 @@ inline LensProblem made_problem(const MadeLens& truth, const MadeOptions& option
   return problem;
 }
 
+// The rotation that best turns directions a into directions b.
+inline Mat3 best_turn(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    H += Eigen::Vector3d(b[i].x, b[i].y, b[i].z) *
+         Eigen::Vector3d(a[i].x, a[i].y, a[i].z).transpose();
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  const Eigen::Matrix3d R =
+      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
+  Mat3 turn;
+  for (int i = 0; i < 9; ++i) turn.m[static_cast<std::size_t>(i)] = R(i / 3, i % 3);
+  return turn;
+}
+
 // RMS angle in milliradians between true and solved directions of the pixels that the lens shows up
 // to an angle off the axis, evenly over the sphere, once the best rotation between the two cameras
 // is taken out (no picture of boards can tell that).
 inline double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg) {
-  std::vector<Eigen::Vector3d> expected, found;
+  std::vector<Vec3> expected, found;
   for (double off = 1; off <= max_deg; off += 2) {
     const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
     for (int i = 0; i < around; ++i) {
@@ -155,19 +182,15 @@ inline double ray_error_mrad(const MadeLens& truth, const Lens& solved, double m
       if (q.x < 0 || q.y < 0 || q.x > truth.lens.width - 1 || q.y > truth.lens.height - 1) continue;
       const auto u = unproject(solved, q);
       if (!u) return HUGE_VAL;
-      expected.emplace_back(v.x, v.y, v.z);
-      found.emplace_back(u->x, u->y, u->z);
+      expected.push_back(v);
+      found.push_back(*u);
     }
   }
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < found.size(); ++i) H += expected[i] * found[i].transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs(1, 1, (svd.matrixU() * svd.matrixV().transpose()).determinant());
-  const Eigen::Matrix3d R = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  const Mat3 turn = best_turn(found, expected);
   double sum = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const Eigen::Vector3d turned = R * found[i];
-    const double angle = std::atan2(turned.cross(expected[i]).norm(), turned.dot(expected[i]));
+    const Vec3 turned = turn * found[i];
+    const double angle = std::atan2(length(cross(turned, expected[i])), dot(turned, expected[i]));
     sum += angle * angle;
   }
   return 1000 * std::sqrt(sum / static_cast<double>(found.size()));
