@@ -83,7 +83,7 @@ struct Found {
   std::vector<std::int32_t> ids;  // of markers, one for each four points
 };
 
-// Nothing if the helper ended before it answered.
+// Nothing if the helper ended before it answered, or answers what cannot be.
 std::optional<Found> receive(capture::SandboxedChild& child, wire::Finder finder) {
   wire::Reply reply;
   if (!child.read(std::as_writable_bytes(std::span(&reply, 1)))) return std::nullopt;
@@ -91,6 +91,9 @@ std::optional<Found> receive(capture::SandboxedChild& child, wire::Finder finder
   Found found;
   found.points.resize(reply.points);
   if (!child.read(std::as_writable_bytes(std::span(found.points)))) return std::nullopt;
+  for (const Vec2& q : found.points) {
+    if (!std::isfinite(q.x) || !std::isfinite(q.y)) return std::nullopt;
+  }
   if (finder == wire::Finder::markers) {
     found.ids.resize(reply.points / 4);
     if (!child.read(std::as_writable_bytes(std::span(found.ids)))) return std::nullopt;

@@ -31,8 +31,8 @@ struct BoardDetection {
 // share of the time; one that crashes or takes too long is ended and the next one tried. Corners
 // are in the order of Board, never mirrored, refined without regard to the lens: refine_corners()
 // does better once it is known. What is found but cannot be the board (uneven, a part of a larger
-// board) is refused. Throws std::invalid_argument if picture, board or options cannot be, and
-// std::runtime_error if the helper cannot be run.
+// board) is refused. Thread-safe. Throws std::invalid_argument if picture, board or options cannot
+// be, and std::runtime_error if the helper cannot be run.
 BoardDetection detect_board(const GreyPicture& picture,
                             const Board& board,
                             const DetectionOptions& options = {});
