@@ -141,6 +141,7 @@ class Search {
 
   bool try_whole(const char* name, wire::Finder finder, const GreyPicture& picture, double share);
   bool try_views(const char* name, wire::Finder finder);
+  bool try_markers(bool bent);
   bool try_pictures(const char* name,
                     wire::Finder finder,
                     std::span<const GreyPicture* const> pictures,
@@ -203,8 +204,9 @@ std::string Search::accept(const Found& found,
   if (const std::string fault = grid_fault(picture_, board_, refined); !fault.empty()) {
     return "found what is no such board (" + fault + ")";
   }
-  if (board_.kind == Board::Kind::chessboard && goes_on(picture_, board_, refined)) {
-    return "found a part of a larger board";
+  if (board_.kind == Board::Kind::chessboard) {
+    if (ends_early(board_, refined)) return "found a smaller board";
+    if (goes_on(picture_, board_, refined)) return "found a part of a larger board";
   }
   result_.view = std::move(refined);
   return "";
@@ -285,13 +287,30 @@ bool Search::try_views(const char* name, wire::Finder finder) {
       [&](std::size_t i, Vec2 q) { return project(*lens_, views[i].ray(q)); }, &*lens_);
 }
 
+// Of few markers the larger picture may show more; the better of both is kept.
+bool Search::try_markers(bool bent) {
+  const bool found = try_whole("detectMarkers", wire::Finder::markers, picture_, 0.4);
+  if (!found || 2 * count_corners(*result_.view) < board_.corner_count()) {
+    const BoardDetection first = result_;
+    const bool small = std::max(picture_.width, picture_.height) <= usual_side / 2;
+    const GreyPicture clear =
+        small ? stretched(resized(picture_, 2 * picture_.width, 2 * picture_.height))
+              : stretched(picture_);
+    try_whole(
+        small ? "detectMarkers after stretching and enlarging" : "detectMarkers after stretching",
+        wire::Finder::markers, clear, bent ? 0.6 : 1);
+    if (first.view && count_corners(*first.view) >= count_corners(*result_.view)) result_ = first;
+  }
+  return result_.view ||
+         (bent && try_views("detectMarkers in straightened views", wire::Finder::markers));
+}
+
 BoardDetection Search::run() {
   // Shares of the time that is left, so that what one finder does not use goes to the next ones.
   const bool bent = lens_ && lens_->model != "pinhole";
   const auto found = [&] {
     if (board_.kind == Board::Kind::charuco) {
-      return try_whole("detectMarkers", wire::Finder::markers, picture_, bent ? 0.6 : 1) ||
-             (bent && try_views("detectMarkers in straightened views", wire::Finder::markers));
+      return try_markers(bent);
     }
     return try_whole("findChessboardCorners", wire::Finder::chessboard,
                      limited(picture_, quick_side), 0.1) ||

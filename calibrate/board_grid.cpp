@@ -4,10 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
-
-#include "calibrate/corner_refinement.h"
 
 namespace calibrate {
 namespace {
@@ -16,7 +13,9 @@ namespace {
 // shrink quickly.
 constexpr double max_jump = 0.6;
 constexpr double min_alternating = 0.9;  // share of neighbouring squares
-constexpr double min_going_on = 0.6;     // share of a side's corners that have one beyond
+// Of the squares beyond a side: how many neighbours alternate, and how much they do.
+constexpr double min_going_on = 0.8;
+constexpr double min_contrast_beyond = 0.2;
 
 // Corners by column and row.
 class Grid {
@@ -127,6 +126,22 @@ double first_dark_share(const GreyPicture& picture, const Grid& grid) {
   return pairs == 0 ? 0 : static_cast<double>(dark) / pairs;
 }
 
+// Between neighbouring squares, codes.
+double contrast_of(const GreyPicture& picture, const Grid& grid) {
+  double sum = 0;
+  int pairs = 0;
+  for (int row = 0; row + 1 < grid.rows; ++row) {
+    for (int column = 0; column + 2 < grid.columns; ++column) {
+      const auto here = square_code(picture, grid, column, row);
+      const auto next = square_code(picture, grid, column + 1, row);
+      if (!here || !next) continue;
+      sum += std::abs(*here - *next);
+      ++pairs;
+    }
+  }
+  return pairs == 0 ? 0 : sum / pairs;
+}
+
 bool first_is_dark(const GreyPicture& picture, const Board& board, const BoardView& view) {
   return first_dark_share(picture, Grid(board, view)) > 0.5;
 }
@@ -182,45 +197,75 @@ std::string grid_fault(const GreyPicture& picture, const Board& board, const Boa
   return "";
 }
 
-bool goes_on(const GreyPicture& picture, const Board& board, const BoardView& view) {
+bool ends_early(const Board& board, const BoardView& view) {
   const Grid grid(board, view);
-  Board wider = board;
-  wider.columns += 2;
-  wider.rows += 2;
-  BoardView ringed{"", std::vector<std::optional<Vec2>>(wider.corner_count())};
-  const auto place = [&](int column, int row) -> std::optional<Vec2>& {
-    return ringed.corners[static_cast<std::size_t>((row + 1) * wider.columns + column + 1)];
+  const auto is_missing = [&](int column, int row, int dx, int dy, int count) {
+    int seen = 0;
+    for (int i = 0; i < count; ++i) seen += grid.at(column + i * dx, row + i * dy) ? 1 : 0;
+    return 2 * seen < count;
   };
-  const auto beyond = [](const std::optional<Vec2>& end, const std::optional<Vec2>& second,
-                         const std::optional<Vec2>& third) -> std::optional<Vec2> {
-    if (!end || !second || !third) return std::nullopt;
-    return Vec2{3 * (end->x - second->x) + third->x, 3 * (end->y - second->y) + third->y};
+  return is_missing(0, 0, 0, 1, grid.rows) || is_missing(grid.columns - 1, 0, 0, 1, grid.rows) ||
+         is_missing(0, 0, 1, 0, grid.columns) || is_missing(0, grid.rows - 1, 1, 0, grid.columns);
+}
+
+bool goes_on(const GreyPicture& picture, const Board& board, const BoardView& view) {
+  constexpr int rings = 2;  // of corners beyond, by parabolas through the last three
+  Board wider = board;
+  wider.columns += 2 * rings;
+  wider.rows += 2 * rings;
+  BoardView ringed{"", std::vector<std::optional<Vec2>>(wider.corner_count())};
+  const Grid grid(board, view);
+  const auto place = [&](int column, int row) -> std::optional<Vec2>& {
+    return ringed.corners[static_cast<std::size_t>((row + rings) * wider.columns + column + rings)];
   };
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
       place(column, row) = grid.at(column, row);
     }
   }
+  const auto extend = [&](int column, int row, int dx, int dy) {
+    const auto& last = grid.at(column, row);
+    const auto& second = grid.at(column - dx, row - dy);
+    const auto& third = grid.at(column - 2 * dx, row - 2 * dy);
+    if (!last || !second || !third) return;
+    const auto mix = [&](double a, double b, double c) {
+      return Vec2{a * last->x + b * second->x + c * third->x,
+                  a * last->y + b * second->y + c * third->y};
+    };
+    place(column + dx, row + dy) = mix(3, -3, 1);
+    place(column + 2 * dx, row + 2 * dy) = mix(6, -8, 3);
+  };
   const int right = grid.columns - 1;
   const int bottom = grid.rows - 1;
   for (int row = 0; row < grid.rows; ++row) {
-    place(-1, row) = beyond(grid.at(0, row), grid.at(1, row), grid.at(2, row));
-    place(right + 1, row) =
-        beyond(grid.at(right, row), grid.at(right - 1, row), grid.at(right - 2, row));
+    extend(0, row, -1, 0);
+    extend(right, row, 1, 0);
   }
   for (int column = 0; column < grid.columns; ++column) {
-    place(column, -1) = beyond(grid.at(column, 0), grid.at(column, 1), grid.at(column, 2));
-    place(column, bottom + 1) =
-        beyond(grid.at(column, bottom), grid.at(column, bottom - 1), grid.at(column, bottom - 2));
+    extend(column, 0, 0, -1);
+    extend(column, bottom, 0, 1);
   }
-  ringed = refine_corners(picture, ringed, wider);
-  const auto seen_along = [&](int column, int row, int dx, int dy, int count) {
-    int seen = 0;
-    for (int i = 0; i < count; ++i) seen += place(column + i * dx, row + i * dy) ? 1 : 0;
-    return seen >= min_going_on * count;
+  // The squares beyond the last ones of the board.
+  const Grid wide(wider, ringed);
+  const double sign = first_dark_share(picture, grid) > 0.5 ? 1 : -1;
+  const double contrast = contrast_of(picture, grid);
+  const auto alternate = [&](int column, int row, int dx, int dy, int count) {
+    int pairs = 0;
+    int right_way = 0;
+    for (int i = 0; i + 1 < count; ++i) {
+      const int x = column + i * dx;
+      const int y = row + i * dy;
+      const auto here = square_code(picture, wide, x, y);
+      const auto next = square_code(picture, wide, x + dx, y + dy);
+      if (!here || !next) continue;
+      const double rise = sign * (*next - *here) * ((x + y) % 2 == 0 ? 1 : -1);
+      ++pairs;
+      right_way += rise > min_contrast_beyond * contrast ? 1 : 0;
+    }
+    return 2 * pairs >= count && right_way >= min_going_on * pairs;
   };
-  return seen_along(-1, 0, 0, 1, grid.rows) || seen_along(right + 1, 0, 0, 1, grid.rows) ||
-         seen_along(0, -1, 1, 0, grid.columns) || seen_along(0, bottom + 1, 1, 0, grid.columns);
+  return alternate(0, rings, 0, 1, bottom) || alternate(right + rings + 1, rings, 0, 1, bottom) ||
+         alternate(rings, 0, 1, 0, right) || alternate(rings, bottom + rings + 1, 1, 0, right);
 }
 
 }  // namespace calibrate

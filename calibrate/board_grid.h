@@ -17,6 +17,9 @@ void order_corners(const GreyPicture& picture, const Board& board, BoardView& vi
 // a chessboard) its colours do not alternate. Empty if they can.
 std::string grid_fault(const GreyPicture& picture, const Board& board, const BoardView& view);
 
+// Whether most corners of a side of a chessboard are missing: a smaller board was taken for it.
+bool ends_early(const Board& board, const BoardView& view);
+
 // Whether a chessboard goes on where it should end: a part of a larger one was found.
 bool goes_on(const GreyPicture& picture, const Board& board, const BoardView& view);
 
