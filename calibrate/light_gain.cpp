@@ -1,0 +1,336 @@
+// The gain from the lightprobe's units to the plate's, from what both tell of the same things.
+#include "calibrate/light_gain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <Eigen/Dense>
+
+namespace calibrate {
+namespace {
+
+constexpr int rounds = 30;
+constexpr std::size_t folds = 5;
+constexpr std::size_t fewest_for_folds = 5;
+// Nine numbers want this many colours.
+constexpr std::size_t fewest_for_matrix = 12;
+// Width of Cauchy's loss, in standard deviations, and where a pair counts as left out.
+constexpr double loss_width = 2.385;
+constexpr double left_out_beyond = 4;
+// Relative errors are not known better than this.
+constexpr double least_spread = 1e-5;
+
+using Used = std::vector<bool>;
+
+void check(std::span<const LightPair> pairs) {
+  for (const LightPair& pair : pairs) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (!(pair.probe[c] > 0) || !(pair.plate[c] > 0) || !std::isfinite(pair.probe[c]) ||
+          !std::isfinite(pair.plate[c])) {
+        throw std::invalid_argument("pairs of light are finite and above 0");
+      }
+    }
+  }
+  if (pairs.empty()) {
+    throw std::runtime_error(
+        "there is nothing that the probe and the plate both tell the light of: state a grey card, "
+        "or turn the cameras so that they see things in common");
+  }
+}
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Robust standard deviation about 0.
+double spread_of(std::span<const double> errors) {
+  std::vector<double> sizes;
+  for (const double e : errors) sizes.push_back(std::abs(e));
+  return sizes.empty() ? least_spread : std::max(least_spread, 1.4826 * median_of(sizes));
+}
+
+double weight_of(double error, double spread) {
+  const double r = error / (loss_width * spread);
+  return 1 / (1 + r * r);
+}
+
+// Logarithms of the gains and of every frame's exposure.
+struct Logs {
+  std::array<double, 3> gain{};
+  std::vector<double> exposure;
+};
+
+double log_ratio(const LightPair& pair, std::size_t c) {
+  return std::log(pair.plate[c] / pair.probe[c]);
+}
+
+double error_of(const LightPair& pair, std::size_t c, const Logs& logs) {
+  return log_ratio(pair, c) - logs.gain[c] - logs.exposure[pair.frame];
+}
+
+std::vector<double> errors_of(std::span<const LightPair> pairs,
+                              const Logs& logs,
+                              const Used& used) {
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (std::size_t c = 0; used[i] && c < 3; ++c) errors.push_back(error_of(pairs[i], c, logs));
+  }
+  return errors;
+}
+
+// Gains and exposures in turn, each the weighted mean of what the other leaves. Medians first.
+Logs solve_gains(std::span<const LightPair> pairs, const Used& used) {
+  std::size_t frames = 0;
+  for (const LightPair& pair : pairs) frames = std::max(frames, pair.frame + 1);
+  Logs logs{{}, std::vector<double>(frames, 0.0)};
+  std::vector<std::vector<double>> by_frame(frames);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    for (std::size_t c = 0; used[i] && c < 3; ++c) {
+      by_frame[pairs[i].frame].push_back(log_ratio(pairs[i], c));
+    }
+  }
+  for (std::size_t f = 0; f < frames; ++f) {
+    if (!by_frame[f].empty()) logs.exposure[f] = median_of(by_frame[f]);
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<double> rest;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (used[i]) rest.push_back(error_of(pairs[i], c, logs));
+    }
+    logs.gain[c] = median_of(rest);
+  }
+  for (int round = 0; round < rounds; ++round) {
+    const double spread = spread_of(errors_of(pairs, logs, used));
+    const Logs before = logs;
+    std::array<double, 3> sum{};
+    std::array<double, 3> weights{};
+    std::vector<double> frame_sum(frames, 0.0);
+    std::vector<double> frame_weights(frames, 0.0);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      for (std::size_t c = 0; used[i] && c < 3; ++c) {
+        const double error = error_of(pairs[i], c, before);
+        const double weight = weight_of(error, spread);
+        sum[c] += weight * error;
+        weights[c] += weight;
+      }
+    }
+    for (std::size_t c = 0; c < 3; ++c) logs.gain[c] += sum[c] / weights[c];
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      for (std::size_t c = 0; used[i] && c < 3; ++c) {
+        const double error = error_of(pairs[i], c, logs);
+        const double weight = weight_of(error, spread);
+        frame_sum[pairs[i].frame] += weight * error;
+        frame_weights[pairs[i].frame] += weight;
+      }
+    }
+    for (std::size_t f = 0; f < frames; ++f) {
+      if (frame_weights[f] > 0) logs.exposure[f] += frame_sum[f] / frame_weights[f];
+    }
+  }
+  return logs;
+}
+
+// plate / exposure = matrix * probe, by relative errors.
+std::optional<Eigen::Matrix3d> solve_matrix(std::span<const LightPair> pairs,
+                                            const Logs& logs,
+                                            const Used& used) {
+  Eigen::Matrix3d matrix =
+      Eigen::Vector3d(std::exp(logs.gain[0]), std::exp(logs.gain[1]), std::exp(logs.gain[2]))
+          .asDiagonal();
+  for (int round = 0; round < rounds; ++round) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto row = static_cast<Eigen::Index>(c);
+      const auto error = [&](const LightPair& pair) {
+        const Eigen::Map<const Eigen::Vector3d> probe(pair.probe.data());
+        return matrix.row(row).dot(probe) * std::exp(logs.exposure[pair.frame]) / pair.plate[c] - 1;
+      };
+      std::vector<double> errors;
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        if (used[i]) errors.push_back(error(pairs[i]));
+      }
+      const double spread = spread_of(errors);
+      Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+      Eigen::Vector3d right = Eigen::Vector3d::Zero();
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        if (!used[i]) continue;
+        const Eigen::Map<const Eigen::Vector3d> probe(pairs[i].probe.data());
+        const Eigen::Vector3d relative =
+            probe * std::exp(logs.exposure[pairs[i].frame]) / pairs[i].plate[c];
+        const double weight = weight_of(error(pairs[i]), spread);
+        normal += weight * relative * relative.transpose();
+        right += weight * relative;
+      }
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(normal);
+      constexpr double open = 1e-10;  // colours all alike leave the matrix open
+      if (!(axes.eigenvalues()[0] > open * axes.eigenvalues()[2])) return std::nullopt;
+      matrix.row(row) = normal.ldlt().solve(right).transpose();
+    }
+  }
+  return matrix;
+}
+
+// RMS without the worst tenth: what moved, or was in another light.
+double error_without_worst(std::vector<double> errors) {
+  if (errors.empty()) return 0;
+  for (double& e : errors) e = std::abs(e);
+  std::ranges::sort(errors);
+  errors.resize(std::max<std::size_t>(1, errors.size() - errors.size() / 10));
+  double sum = 0;
+  for (const double e : errors) sum += e * e;
+  return std::sqrt(sum / static_cast<double>(errors.size()));
+}
+
+struct HeldOut {
+  double gains = 0;
+  std::optional<double> matrix;
+};
+
+HeldOut hold_out(std::span<const LightPair> pairs, bool try_matrix) {
+  std::vector<double> by_gains;
+  std::vector<double> by_matrix;
+  bool solved = try_matrix;
+  for (std::size_t fold = 0; fold < folds; ++fold) {
+    Used used(pairs.size(), true);
+    for (std::size_t i = fold; i < used.size(); i += folds) used[i] = false;
+    const Logs logs = solve_gains(pairs, used);
+    const auto matrix = solved ? solve_matrix(pairs, logs, used) : std::nullopt;
+    solved = solved && matrix.has_value();
+    // A frame without any pair left has no exposure to judge by.
+    std::vector<bool> known(logs.exposure.size(), false);
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      if (used[i]) known[pairs[i].frame] = true;
+    }
+    for (std::size_t i = fold; i < used.size(); i += folds) {
+      if (!known[pairs[i].frame]) continue;
+      for (std::size_t c = 0; c < 3; ++c) {
+        by_gains.push_back(std::expm1(-error_of(pairs[i], c, logs)));
+        if (!solved) continue;
+        const Eigen::Map<const Eigen::Vector3d> probe(pairs[i].probe.data());
+        by_matrix.push_back(matrix->row(static_cast<Eigen::Index>(c)).dot(probe) *
+                                std::exp(logs.exposure[pairs[i].frame]) / pairs[i].plate[c] -
+                            1);
+      }
+    }
+  }
+  HeldOut result{error_without_worst(by_gains), std::nullopt};
+  if (solved) result.matrix = error_without_worst(by_matrix);
+  return result;
+}
+
+// Exposures relative to the first frame that has one; the gains take up its own.
+void set_exposures(std::span<const LightPair> pairs, const Logs& logs, LightGain& fit) {
+  std::vector<bool> seen(logs.exposure.size(), false);
+  for (const LightPair& pair : pairs) seen[pair.frame] = true;
+  const auto first = static_cast<std::size_t>(std::ranges::find(seen, true) - seen.begin());
+  for (std::size_t f = 0; f < seen.size(); ++f) {
+    fit.exposures.push_back(seen[f] ? std::exp(logs.exposure[f] - logs.exposure[first]) : 0);
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    fit.gain[c] = std::exp(logs.gain[c] + logs.exposure[first]);
+  }
+}
+
+void set_sigmas(std::span<const LightPair> pairs, const Logs& logs, LightGain& fit) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<double> errors;
+    for (const LightPair& pair : pairs) errors.push_back(error_of(pair, c, logs));
+    const double spread = spread_of(errors);
+    double sum = 0;
+    double slope = 0;
+    for (const double e : errors) {  // Huber's sandwich
+      const double r = e / (loss_width * spread);
+      const double weight = 1 / (1 + r * r);
+      sum += weight * e * weight * e;
+      slope += weight * weight * (1 - r * r);
+    }
+    const auto n = static_cast<double>(pairs.size());
+    fit.sigma[c] = pairs.size() > 1 && slope > 0 ? std::sqrt(sum * n / (n - 1)) / slope : 1;
+  }
+  const Used all(pairs.size(), true);
+  const double spread = spread_of(errors_of(pairs, logs, all));
+  for (const LightPair& pair : pairs) {
+    double worst = 0;
+    for (std::size_t c = 0; c < 3; ++c) worst = std::max(worst, std::abs(error_of(pair, c, logs)));
+    fit.left_out += worst > left_out_beyond * spread ? 1 : 0;
+  }
+}
+
+}  // namespace
+
+LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOptions& options) {
+  check(pairs);
+  const Used all(pairs.size(), true);
+  const Logs logs = solve_gains(pairs, all);
+  LightGain fit;
+  set_exposures(pairs, logs, fit);
+  set_sigmas(pairs, logs, fit);
+  if (pairs.size() < fewest_for_folds) {
+    fit.warnings.push_back("the gains rest on " + std::to_string(pairs.size()) +
+                           (pairs.size() == 1 ? " thing" : " things") +
+                           " only, and nothing is left to check them by");
+    fit.heldout_error = std::numeric_limits<double>::quiet_NaN();
+    return fit;
+  }
+  const HeldOut held_out = hold_out(pairs, pairs.size() >= fewest_for_matrix);
+  fit.heldout_error = held_out.gains;
+  fit.matrix_heldout_error = held_out.matrix;
+  if (held_out.matrix && held_out.gains > options.good_enough &&
+      *held_out.matrix < (1 - options.matrix_improves) * held_out.gains) {
+    if (const auto matrix = solve_matrix(pairs, logs, all)) {
+      const double first =
+          std::exp(logs.exposure[pairs.front().frame]) / fit.exposures[pairs.front().frame];
+      fit.matrix.emplace();
+      Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(fit.matrix->data()) =
+          first * *matrix;
+    }
+  }
+  constexpr double doubtful = 0.3;
+  if (held_out.gains > doubtful) {
+    fit.warnings.emplace_back(
+        "the pairs disagree widely: things may be near, poses wrong, or the plate not linear");
+  }
+  return fit;
+}
+
+std::array<double, 3> predict(const LightGain& fit, const std::array<double, 3>& probe) {
+  std::array<double, 3> plate{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    plate[c] = fit.gain[c] * probe[c];
+    if (!fit.matrix) continue;
+    plate[c] = 0;
+    for (std::size_t k = 0; k < 3; ++k) plate[c] += (*fit.matrix)[3 * c + k] * probe[k];
+  }
+  return plate;
+}
+
+double follow_exposure(const LightGain& fit, std::span<const LightPair> pairs) {
+  check(pairs);
+  std::vector<double> logs;
+  for (const LightPair& pair : pairs) {
+    const std::array<double, 3> expected = predict(fit, pair.probe);
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (expected[c] > 0) logs.push_back(std::log(pair.plate[c] / expected[c]));
+    }
+  }
+  if (logs.empty()) throw std::runtime_error("no pair of light can be predicted");
+  double level = median_of(logs);
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<double> errors;
+    for (const double log : logs) errors.push_back(log - level);
+    const double spread = spread_of(errors);
+    double sum = 0;
+    double weights = 0;
+    for (const double e : errors) {
+      sum += weight_of(e, spread) * e;
+      weights += weight_of(e, spread);
+    }
+    level += sum / weights;
+  }
+  return std::exp(level);
+}
+
+}  // namespace calibrate

@@ -1,0 +1,53 @@
+// The gain from the lightprobe's units to the plate's, from what both tell of the same things.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace calibrate {
+
+// One thing: a direction that both cameras see, a grey card, a patch of a chart.
+struct LightPair {
+  std::array<double, 3> probe{};  // what the probe's light makes it send, in the probe's units, > 0
+  std::array<double, 3> plate{};  // what the plate shows, linear, > 0
+  std::size_t frame = 0;          // of the plate, whose exposure may change from frame to frame
+};
+
+struct LightGainOptions {
+  // A matrix is taken if it lowers the held-out error by more than this share of it, and the gains'
+  // is above `good_enough`.
+  double matrix_improves = 0.25;
+  double good_enough = 0.01;
+};
+
+struct LightGain {
+  std::array<double, 3> gain{1, 1, 1};  // plate = gain * probe * exposure of the frame
+  std::array<double, 3> sigma{};        // relative
+  // Row by row, in place of the gains where held-out pairs ask for it.
+  std::optional<std::array<double, 9>> matrix;
+  double heldout_error = 0;  // relative RMS of the gains, of pairs that took no part
+  std::optional<double> matrix_heldout_error;  // nothing if there are too few pairs to try
+  // The plate's exposure by frame, the first that pairs are of being 1; 0 where no pair is of it.
+  std::vector<double> exposures;
+  std::size_t left_out = 0;  // pairs beyond four standard deviations, which hardly count
+  std::vector<std::string> warnings;
+};
+
+// Gains by Cauchy's loss on the logarithms of plate over probe, one exposure a frame solved along
+// with them; the matrix by the same loss on relative errors. Held out is every fifth pair in turn,
+// and the worst tenth of them does not count. Throws std::invalid_argument for values that are not
+// finite and above 0, std::runtime_error if there is no pair.
+LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOptions& options = {});
+
+// One frame's exposure on the scale of a fit: a single number, whatever its pairs, so that the
+// fixed gains follow the plate's auto-exposure. Throws as fit_light_gain.
+double follow_exposure(const LightGain& fit, std::span<const LightPair> pairs);
+
+// What a fit expects the plate to show, at exposure 1.
+std::array<double, 3> predict(const LightGain& fit, const std::array<double, 3>& probe);
+
+}  // namespace calibrate
