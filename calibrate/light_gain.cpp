@@ -221,6 +221,19 @@ HeldOut hold_out(std::span<const LightPair> pairs, bool try_matrix) {
   return result;
 }
 
+// By how much the probe's colours differ from each other, in logarithms.
+double colour_spread(std::span<const LightPair> pairs) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::size_t c : {std::size_t{0}, std::size_t{2}}) {
+    std::vector<double> tints;
+    for (const LightPair& pair : pairs) tints.push_back(std::log(pair.probe[c] / pair.probe[1]));
+    const double middle = median_of(tints);
+    for (double& tint : tints) tint -= middle;
+    least = std::min(least, spread_of(tints));
+  }
+  return least;
+}
+
 // Exposures relative to the first frame that has one; the gains take up its own.
 void set_exposures(std::span<const LightPair> pairs, const Logs& logs, LightGain& fit) {
   std::vector<bool> seen(logs.exposure.size(), false);
@@ -278,7 +291,10 @@ LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOption
   const HeldOut held_out = hold_out(pairs, pairs.size() >= fewest_for_matrix);
   fit.heldout_error = held_out.gains;
   fit.matrix_heldout_error = held_out.matrix;
+  // Of greys, a matrix would only average the channels' noise.
+  constexpr double colours_over_noise = 5;
   if (held_out.matrix && held_out.gains > options.good_enough &&
+      colour_spread(pairs) > colours_over_noise * *held_out.matrix &&
       *held_out.matrix < (1 - options.matrix_improves) * held_out.gains) {
     if (const auto matrix = solve_matrix(pairs, logs, all)) {
       const double first =

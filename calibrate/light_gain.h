@@ -18,8 +18,8 @@ struct LightPair {
 };
 
 struct LightGainOptions {
-  // A matrix is taken if it lowers the held-out error by more than this share of it, and the gains'
-  // is above `good_enough`.
+  // A matrix is taken if it lowers the held-out error by more than this share of it, the gains' is
+  // above `good_enough`, and the probe's colours differ by five times the matrix's or more.
   double matrix_improves = 0.25;
   double good_enough = 0.01;
 };

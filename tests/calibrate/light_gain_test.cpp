@@ -104,6 +104,21 @@ TEST(FitLightGain, TakesAMatrixOnlyWhereHeldOutPairsAskForIt) {
   }
 }
 
+TEST(FitLightGain, TakesNoMatrixToAverageTheNoiseOfGreys) {
+  made::Random random(7);
+  std::vector<LightPair> pairs(200);
+  for (LightPair& pair : pairs) {
+    const double level = std::exp(random.normal());
+    for (std::size_t c = 0; c < 3; ++c) {
+      pair.probe[c] = level * std::exp(0.03 * random.normal());
+      pair.plate[c] = made_gain[c] * level;
+    }
+  }
+  const LightGain fit = fit_light_gain(pairs);
+  EXPECT_FALSE(fit.matrix);
+  EXPECT_LT(*fit.matrix_heldout_error, 0.75 * fit.heldout_error);  // or this would test nothing
+}
+
 TEST(FitLightGain, TellsAutoExposureFromTheGains) {
   made::Random random(5);
   std::vector<LightPair> pairs;
