@@ -133,11 +133,11 @@ bool is_lit(Vec3f irradiance) {
 
 }  // namespace
 
-MatchResult match_by_overlap(const capture::Image& plate,
-                             const calibrate::DirectionTable& plate_directions,
-                             const calibrate::Pose& cam_from_set,
-                             const Environment& env,
-                             const MatchSettings& settings) {
+std::vector<OverlapTexel> find_overlap(const capture::Image& plate,
+                                       const calibrate::DirectionTable& plate_directions,
+                                       const calibrate::Pose& cam_from_set,
+                                       const Environment& env,
+                                       const MatchSettings& settings) {
   check(env);
   if (plate.width != plate_directions.width || plate.height != plate_directions.height ||
       plate.channels != 3) {
@@ -145,20 +145,36 @@ MatchResult match_by_overlap(const capture::Image& plate,
   }
   const std::vector<Texel> texels =
       average_over_texels(plate, plate_directions, cam_from_set, env, settings);
-  MatchResult result;
-  std::vector<Colour> ratios;
+  std::vector<OverlapTexel> overlap;
   for (std::size_t t = 0; t < texels.size(); ++t) {
     const Texel& texel = texels[t];
     const bool seen = env.seen.empty() || env.seen[t] != 0;
     if (!seen || texel.pixels < least_pixels_per_texel) continue;
-    Colour ratio{};
+    OverlapTexel both;
+    both.pixels = texel.pixels;
     for (std::size_t c = 0; c < 3; ++c) {
-      ratio[c] = texel.sum[c] / static_cast<float>(texel.pixels) /
-                 counted_radiance(env.radiance.pixels[3 * t + c]);
+      both.plate[c] = texel.sum[c] / static_cast<float>(texel.pixels);
+      both.probe[c] = counted_radiance(env.radiance.pixels[3 * t + c]);
     }
+    overlap.push_back(both);
+  }
+  return overlap;
+}
+
+MatchResult match_by_overlap(const capture::Image& plate,
+                             const calibrate::DirectionTable& plate_directions,
+                             const calibrate::Pose& cam_from_set,
+                             const Environment& env,
+                             const MatchSettings& settings) {
+  MatchResult result;
+  std::vector<Colour> ratios;
+  for (const OverlapTexel& both :
+       find_overlap(plate, plate_directions, cam_from_set, env, settings)) {
+    Colour ratio{};
+    for (std::size_t c = 0; c < 3; ++c) ratio[c] = both.plate[c] / both.probe[c];
     if (!std::isfinite(ratio[0] + ratio[1] + ratio[2])) continue;
     ratios.push_back(ratio);
-    result.pixels += texel.pixels;
+    result.pixels += both.pixels;
   }
   if (ratios.empty()) {
     result.note =

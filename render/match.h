@@ -3,6 +3,7 @@
 
 #include <array>
 #include <string>
+#include <vector>
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
@@ -22,6 +23,21 @@ struct MatchSettings {
   float clipped = 0.98F;   // plate values from here on say nothing
   float darkest = 0.005F;  // neither do plate values below this
 };
+
+// A texel of the environment that both cameras see.
+struct OverlapTexel {
+  std::array<float, 3> plate{};  // mean of its pixels
+  std::array<float, 3> probe{};  // its radiance
+  int pixels = 0;                // of the plate
+};
+
+// Texels that a whole plate tells, neither clipped nor dark, and that the probe saw. Both are taken
+// to look at things far away. Throws as match_by_overlap.
+std::vector<OverlapTexel> find_overlap(const capture::Image& plate,
+                                       const calibrate::DirectionTable& plate_directions,
+                                       const calibrate::Pose& cam_from_set,
+                                       const Environment& env,
+                                       const MatchSettings& settings = {});
 
 // From the directions that both cameras see: the median over the environment's texels of plate over
 // probe, where a whole texel of the plate is neither clipped nor dark. Both are taken to look at

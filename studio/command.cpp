@@ -74,6 +74,7 @@ std::span<const Command> commands() {
       calibrate_pose_command(),
       calibrate_probe_command(),
       calibrate_offset_command(),
+      calibrate_light_command(),
   };
   return all;
 }

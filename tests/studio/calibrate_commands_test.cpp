@@ -2,8 +2,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -205,6 +209,95 @@ TEST_F(CalibrateCommands, OffsetOfTwoRecordingsIsThatOfTheirFirstFrames) {
   EXPECT_EQ(dark.status, 1);
   expect_one_line(dark.err);
   EXPECT_THAT(dark.err, HasSubstr("nothing changes"));
+}
+
+// A set whose plate is `gain` times the probe's light, by colour, but for a clipped lamp, and a
+// level card of albedo 0.4 in its corner.
+class CalibrateLight : public CalibrateCommands {
+ protected:
+  const std::array<float, 3> gain_{0.9F, 0.5F, 1.4F};
+
+  void SetUp() override {
+    CalibrateCommands::SetUp();
+    const made::LampWorld world{{{calibrate::normalize(calibrate::Vec3{0.1, 1, 0.3}), 0.05, 8}}};
+    const calibrate::Pose plate_pose = calibrate::look_at({0, 0, 1}, {0, 1, 1.4}, 0.1);
+    const calibrate::Pose probe_pose = calibrate::pose_from_axis({}, {0, 0, 1}, 0.3);
+    made::Random random(5);
+    capture::Image plate =
+        made::photograph(world, made::scene_lens(), plate_pose.R, 1e9, 0.02, random);
+    const double card = 0.4 / std::numbers::pi * irradiance(world);
+    for (int y = 0; y < plate.height; ++y) {
+      for (int x = 0; x < plate.width; ++x) {
+        for (int c = 0; c < 3; ++c) {
+          float& value = plate.at(y, x, c);
+          if (x < 30 && y < 20) value = static_cast<float>(card);
+          value = std::min(value * gain_[static_cast<std::size_t>(c)], 1.0F);
+        }
+      }
+    }
+    capture::write_exr(path("plate.exr"), plate);
+    capture::write_exr(path("light.exr"), made::photograph(world, made::probe_lens(), probe_pose.R,
+                                                           1e4, 0.02, random));
+    calibrate::write_lens(path("plate.toml"), made::scene_lens());
+    calibrate::write_lens(path("light.toml"), made::probe_lens());
+    calibrate::write_pose(path("plate_pose.toml"), plate_pose, made::scene_lens(), "made");
+    const auto line = content_of(path("plate_pose.toml"));
+    write("set.toml",
+          "[show]\nwidth = 320\nheight = 240\n[camera]\nsource = \"plate.exr\"\n"
+          "colour = \"linear\"\nlens = \"plate.toml\"\n" +
+              line +
+              "[probe]\nsource = \"light.exr\"\nlens = \"light.toml\"\n"
+              "pose = { axis = [0, 0, 1], roll = " +
+              fmt::format("{}", 0.3 / made::degree) + " }\n");
+  }
+
+  static double irradiance(const made::LampWorld& world) {
+    constexpr int directions = 40'000;
+    double sum = 0;
+    for (int i = 0; i < directions; ++i) {
+      const double z = (i + 0.5) / directions;
+      const double turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
+      const double r = std::sqrt(1 - z * z);
+      sum += z * world.light({r * std::cos(turn), r * std::sin(turn), z});
+    }
+    return sum * 2 * std::numbers::pi / directions;
+  }
+
+  void expect_gain() const {
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(double{figures()["gain"][c]} / static_cast<double>(gain_[c]), 1, 0.02);
+    }
+  }
+};
+
+TEST_F(CalibrateLight, FindsTheGainFromWhatBothCamerasSee) {
+  const Outcome outcome = run_with_figures("calibrate light " + path("set.toml"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("match = ["));
+  expect_gain();
+  EXPECT_GT(figures()["pairs"], 100);
+  EXPECT_LT(figures()["heldout_error"], 0.1);
+  EXPECT_FALSE(figures().contains("matrix"));
+}
+
+TEST_F(CalibrateLight, FindsTheGainFromAGreyCard) {
+  const std::string card = write("card.toml", "[[patch]]\npixels = [4, 3, 20, 12]\nalbedo = 0.4\n");
+  const Outcome outcome =
+      run_with_figures("calibrate light " + path("set.toml") + " --patches " + card);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_gain();
+  EXPECT_EQ(figures()["pairs"], 1);
+
+  const std::string bad = write("bad.toml", "[[patch]]\npixels = [4, 3, 20]\nalbedo = 2\n");
+  const Outcome refused = run("calibrate light " + path("set.toml") + " --patches " + bad);
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.err, HasSubstr("bad.toml:2:"));
+  EXPECT_THAT(refused.err, HasSubstr("bad.toml:3:"));
+  const std::string outside =
+      write("outside.toml", "[[patch]]\npixels = [310, 3, 20, 9]\nalbedo = 0.4\n");
+  const Outcome out = run("calibrate light " + path("set.toml") + " --patches " + outside);
+  EXPECT_EQ(out.status, 1);
+  expect_one_line(out.err);
 }
 
 }  // namespace

@@ -1,0 +1,251 @@
+// platelight calibrate light: the gain from a set's lightprobe to its plate.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "calibrate/light_gain.h"
+#include "render/match.h"
+#include "studio/commands/commands.h"
+#include "studio/frame_maker.h"
+#include "studio/section.h"
+
+namespace studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Colour = std::array<double, 3>;
+
+constexpr std::int64_t default_frames = 25;
+
+struct LightOptions {
+  std::string set;
+  std::string patches;
+  std::optional<std::int64_t> frames;
+};
+
+// A grey card, or a patch of a chart, in the plate.
+struct PaintedPatch {
+  render::Patch place;
+  std::array<float, 3> albedo{};
+  calibrate::Vec3 normal{0, 0, 1};
+};
+
+std::vector<PaintedPatch> read_patches(const std::string& path) {
+  Faults faults(path);
+  TomlValue file;
+  try {
+    file = read_toml(path);
+  } catch (const TomlError& error) {
+    faults.add(error.place(), error.what());
+    throw SetError(faults.sorted());
+  }
+  Section root(file, "", faults);
+  root.need("patch", "the tables of what is painted: [[patch]] with pixels and albedo");
+  std::vector<PaintedPatch> patches;
+  for (Section& table : root.tables("patch")) {
+    PaintedPatch patch;
+    std::array<int, 4> pixels{0, 0, 1, 1};
+    table.need("pixels", "[x, y, width, height] in the plate");
+    table.integers("pixels", pixels, 0, 65535);
+    patch.place = {pixels[0], pixels[1], std::max(1, pixels[2]), std::max(1, pixels[3])};
+    table.need("albedo", "what it reflects, 0 to 1, one number or three");
+    table.colour("albedo", patch.albedo, {1e-3, 1});
+    if (table.vector("normal", patch.normal) && !(length(patch.normal) > 0)) {
+      table.fault("normal", "must not be zero");
+    }
+    table.finish();
+    patches.push_back(patch);
+  }
+  root.finish();
+  if (const auto sorted = faults.sorted(); !sorted.empty()) throw SetError(sorted);
+  return patches;
+}
+
+// The plate as a lens without vignetting would have taken it.
+capture::Image even_plate(const PreparedFrame& frame) {
+  capture::Image plate = to_float(*frame.plate);
+  const calibrate::DirectionTable& directions = *frame.directions;
+  if (directions.sensitivity.empty()) return plate;
+  for (int y = 0; y < plate.height; ++y) {
+    for (int x = 0; x < plate.width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        plate.at(y, x, c) /= directions.sensitivity[directions.index(y, x)];
+      }
+    }
+  }
+  return plate;
+}
+
+bool is_light(const Colour& colour) {
+  return std::ranges::all_of(colour, [](double v) { return v > 0 && std::isfinite(v); });
+}
+
+void add_pair(const Colour& probe,
+              const Colour& plate,
+              std::size_t frame,
+              std::vector<calibrate::LightPair>& pairs) {
+  if (is_light(probe) && is_light(plate)) pairs.push_back({probe, plate, frame});
+}
+
+// What each patch sends by the probe's light, and what the plate shows of it. One that is clipped,
+// dark or unlit tells nothing.
+void add_patches(const std::vector<PaintedPatch>& patches,
+                 const capture::Image& plate,
+                 const render::Environment& env,
+                 std::size_t frame,
+                 std::vector<calibrate::LightPair>& pairs) {
+  for (const PaintedPatch& patch : patches) {
+    const render::Vec3f light =
+        render::irradiance_of(env, calibrate::to_float(normalize(patch.normal)));
+    const auto match = render::match_by_patch(plate, patch.place, patch.albedo, light);
+    if (match.pixels == 0) continue;
+    const Colour irradiance{light.x, light.y, light.z};
+    Colour sent{};
+    Colour shown{};
+    for (std::size_t c = 0; c < 3; ++c) {
+      sent[c] = patch.albedo[c] * irradiance[c] / std::numbers::pi;
+      shown[c] = sent[c] * match.gain[c];
+    }
+    add_pair(sent, shown, frame, pairs);
+  }
+}
+
+void add_overlap(const PreparedFrame& prepared,
+                 const capture::Image& plate,
+                 std::size_t frame,
+                 std::vector<calibrate::LightPair>& pairs) {
+  const auto overlap = render::find_overlap(plate, *prepared.directions, prepared.job.cam_from_set,
+                                            *prepared.environment);
+  for (const render::OverlapTexel& both : overlap) {
+    Colour probe{};
+    Colour shown{};
+    std::ranges::copy(both.probe, probe.begin());
+    std::ranges::copy(both.plate, shown.begin());
+    add_pair(probe, shown, frame, pairs);
+  }
+}
+
+std::vector<calibrate::LightPair> collect(const Set& set,
+                                          const std::vector<PaintedPatch>& patches,
+                                          std::int64_t frames) {
+  FrameMaker maker(set);
+  const std::int64_t count = maker.is_endless() ? 1 : frames;
+  std::vector<calibrate::LightPair> pairs;
+  for (std::int64_t n = 0; n < count; ++n) {
+    const auto prepared =
+        maker.plate().is_live() ? maker.make_at(maker.wait_for_plate()) : maker.make(n);
+    if (!prepared) break;
+    const capture::Image plate = even_plate(*prepared);
+    const auto frame = static_cast<std::size_t>(n);
+    if (patches.empty()) {
+      add_overlap(*prepared, plate, frame, pairs);
+    } else {
+      add_patches(patches, plate, *prepared->environment, frame, pairs);
+    }
+  }
+  return pairs;
+}
+
+// What the probe did not see is filled from the plate, in its units: with the gain of a first
+// round, both are of one unit.
+calibrate::LightGain fit(Set set,
+                         const std::vector<PaintedPatch>& patches,
+                         std::int64_t frames,
+                         std::size_t& pair_count) {
+  const bool fills =
+      !patches.empty() && set.probe->lens.has_value() && set.probe->unseen == render::Unseen::floor;
+  Colour before{1, 1, 1};
+  calibrate::LightGain found;
+  for (int round = 0; round < (fills ? 3 : 1); ++round) {
+    set.probe->match.method = MatchSettings::Method::gains;
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (round > 0) before[c] = found.gain[c];
+      set.probe->match.gains[c] = static_cast<float>(before[c]);
+    }
+    const auto pairs = collect(set, patches, frames);
+    pair_count = pairs.size();
+    found = calibrate::fit_light_gain(pairs);
+    for (std::size_t c = 0; c < 3; ++c) found.gain[c] *= before[c];
+    for (std::size_t i = 0; found.matrix && i < 9; ++i) (*found.matrix)[i] *= before[i % 3];
+  }
+  return found;
+}
+
+void calibrate_light(const LightOptions& options, Console& console) {
+  Set set = read_set(options.set);
+  if (!set.probe) throw std::runtime_error(set.path + ": has no [probe] to match to the plate");
+  const PoseSettings& pose = set.camera.pose;
+  const bool posed = !pose.track.empty() || pose.cam_from_set != calibrate::Pose{};
+  if (options.patches.empty() && (set.camera.lens.width == 0 || !posed)) {
+    throw std::runtime_error(set.path +
+                             ": the camera's lens and pose are needed to find what both cameras "
+                             "see; or give --patches");
+  }
+  // Nothing virtual is needed for it.
+  set.objects.clear();
+  set.stand_ins.clear();
+  set.lamps.clear();
+  const auto patches =
+      options.patches.empty() ? std::vector<PaintedPatch>{} : read_patches(options.patches);
+  std::size_t pairs = 0;
+  calibrate::LightGain found;
+  try {
+    found = fit(set, patches, options.frames.value_or(default_frames), pairs);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", set.path, error.what()));
+  }
+  if (found.matrix) {
+    found.warnings.emplace_back(
+        "a matrix would match better than gains: the cameras' colours differ; sets take gains");
+  }
+  Json figures{
+      {"gain", found.gain}, {"sigma", found.sigma},       {"heldout_error", found.heldout_error},
+      {"pairs", pairs},     {"left_out", found.left_out}, {"exposures", found.exposures}};
+  if (found.matrix_heldout_error) figures["matrix_heldout_error"] = *found.matrix_heldout_error;
+  if (found.matrix) figures["matrix"] = *found.matrix;
+  figures["warnings"] = found.warnings;
+  console.figures(figures.dump(2));
+  for (const std::string& warning : found.warnings) console.warn(warning);
+  console.say(fmt::format("from {} {}: +- {:.2f}, {:.2f}, {:.2f} %{}", pairs,
+                          patches.empty() ? "directions that both cameras see" : "painted patches",
+                          100 * found.sigma[0], 100 * found.sigma[1], 100 * found.sigma[2],
+                          std::isfinite(found.heldout_error)
+                              ? fmt::format("; held-out error {:.1f} %", 100 * found.heldout_error)
+                              : ""));
+  if (found.exposures.size() > 1) {
+    const auto [low, high] = std::ranges::minmax_element(found.exposures);
+    console.say(fmt::format("the plate's exposure goes from {:.3f} to {:.3f} of its first frame's",
+                            *low, *high));
+  }
+  console.say(
+      fmt::format("match = [{:.6g}, {:.6g}, {:.6g}]", found.gain[0], found.gain[1], found.gain[2]));
+}
+
+}  // namespace
+
+Command calibrate_light_command() {
+  return {"calibrate light", "Measure the gain from a set's lightprobe to its plate",
+          "platelight calibrate light studio/sets/desk_car.toml --patches chart.toml",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto o = std::make_shared<LightOptions>();
+            arguments.positional("SET", o->set, "set file with a camera and a probe");
+            arguments.option("--patches", o->patches,
+                             ".toml file of a grey card or chart in the plate; without it, from "
+                             "what both cameras see");
+            arguments.option("--frames", o->frames, 1, 10'000,
+                             "frames of the plate, each with an exposure of its own; 25 if not "
+                             "said");
+            return [o](Console& console) { calibrate_light(*o, console); };
+          }};
+}
+
+}  // namespace studio
