@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <numeric>
 #include <stdexcept>
 
 #include <Eigen/Dense>
@@ -177,39 +179,96 @@ double sum_of_squares(std::span<const Sight> sights, const Pose& pose) {
   return sum;
 }
 
-// Least squares over the sights that agree, which are found anew from its result.
-RefinedPose fit_agreeing(std::span<const Sight> sights,
-                         Pose pose,
-                         double noise_px,
-                         std::vector<Sight>& agreeing,
-                         std::vector<bool>& agrees) {
-  constexpr double squares = std::numeric_limits<double>::infinity();
-  constexpr int rounds = 15;
-  const bool all = sights.size() < fewest + 2;  // too few to tell a wrong one
+// The sights that agree, and least squares over them.
+struct Agreement {
+  std::vector<bool> agrees;
+  std::vector<Sight> sights;
   RefinedPose refined;
-  for (int turn = 0; turn < 3; ++turn) {
-    const double sigma = std::max(noise_px, robust_sigma(sights, pose));
-    std::vector<bool> before = agrees;
-    agreeing.clear();
-    agrees.clear();
-    for (const Sight& sight : sights) {
-      const double r2 = squared(residual_of(sight, pose));
-      agrees.push_back(all || r2 < wrong_beyond * wrong_beyond * sigma * sigma);
-      if (agrees.back()) agreeing.push_back(sight);
-    }
-    if (agrees == before) break;
-    const std::size_t least = std::max(fewest, (sights.size() + 1) / 2);
-    if (agreeing.size() < least || sigma > disagree_beyond * noise_px) {
-      throw std::runtime_error(
-          "the markers do not agree on a pose: at best, " + std::to_string(agreeing.size()) +
-          " of " + std::to_string(sights.size()) +
-          " do; check that names, positions and pixels belong together, and that the lens is this "
-          "camera's");
-    }
-    refined = refine_pose(agreeing, pose, squares, rounds);
-    pose = refined.cam_from_set;
+};
+
+std::size_t fewest_agreeing(std::size_t sights) {
+  return sights < fewest + 2 ? sights : std::max(fewest, (sights + 1) / 2);
+}
+
+Agreement fit_those(std::span<const Sight> sights, std::vector<bool> agrees, const Pose& seed) {
+  constexpr int rounds = 15;
+  Agreement agreement{std::move(agrees), {}, {}};
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    if (agreement.agrees[i]) agreement.sights.push_back(sights[i]);
   }
-  return refined;
+  if (agreement.sights.empty()) return agreement;
+  agreement.refined =
+      refine_pose(agreement.sights, seed, std::numeric_limits<double>::infinity(), rounds);
+  return agreement;
+}
+
+double variance_of(const Agreement& agreement, double noise_px) {
+  const auto n = static_cast<double>(agreement.sights.size());
+  return std::max(noise_px * noise_px,
+                  sum_of_squares(agreement.sights, agreement.refined.cam_from_set) / (2 * n - 6));
+}
+
+// Of many: those within a few standard deviations, which are found anew from the result.
+Agreement agree_by_spread(std::span<const Sight> sights, Pose pose, double noise_px) {
+  Agreement agreement;
+  for (int turn = 0; turn < 3; ++turn) {
+    const double limit = wrong_beyond * std::max(noise_px, robust_sigma(sights, pose));
+    std::vector<bool> agrees;
+    for (const Sight& sight : sights) {
+      agrees.push_back(squared(residual_of(sight, pose)) < limit * limit);
+    }
+    if (agrees == agreement.agrees) break;
+    agreement = fit_those(sights, std::move(agrees), pose);
+    if (agreement.sights.size() < fewest_agreeing(sights.size())) break;
+    pose = agreement.refined.cam_from_set;
+  }
+  return agreement;
+}
+
+// Of few, a spread tells little: leaving out the worst ones always makes the rest look good.
+// Without one more, without two more, until half are left: whatever explains all at the least cost,
+// if what is left out could be anywhere within a radian.
+Agreement agree_by_cost(std::span<const Sight> sights, const Pose& pose, double noise_px) {
+  const std::size_t n = sights.size();
+  std::vector<std::size_t> order(n);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {},
+                    [&](std::size_t i) { return squared(residual_of(sights[i], pose)); });
+  double log_range = 0;
+  for (const Sight& sight : sights) {
+    log_range += std::log(length(sight.right) * length(sight.down)) / static_cast<double>(n);
+  }
+  Agreement best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t kept = fewest_agreeing(n); kept <= n; ++kept) {
+    std::vector<bool> agrees(n, false);
+    for (std::size_t i = 0; i < kept; ++i) agrees[order[i]] = true;
+    Agreement agreement = fit_those(sights, std::move(agrees), pose);
+    const double variance = variance_of(agreement, noise_px);
+    const double squares = sum_of_squares(agreement.sights, agreement.refined.cam_from_set);
+    const double cost =
+        static_cast<double>(kept) * std::log(2 * std::numbers::pi * variance) +
+        squares / (2 * variance) +
+        static_cast<double>(n - kept) * (log_range + std::log(static_cast<double>(n)));
+    if (cost > least) continue;
+    least = cost;
+    best = std::move(agreement);
+  }
+  return best;
+}
+
+Agreement find_agreement(std::span<const Sight> sights, const Pose& pose, double noise_px) {
+  constexpr std::size_t few = 12;
+  Agreement agreement = sights.size() > few ? agree_by_spread(sights, pose, noise_px)
+                                            : agree_by_cost(sights, pose, noise_px);
+  const double too_far = disagree_beyond * noise_px;
+  if (agreement.sights.size() < fewest_agreeing(sights.size()) ||
+      variance_of(agreement, noise_px) > too_far * too_far) {
+    throw std::runtime_error(
+        "the markers do not agree on a pose; check that names, positions and pixels belong "
+        "together, and that the lens is this camera's");
+  }
+  return agreement;
 }
 
 void set_covariance(Registration& registration, const PoseMatrix& information, double variance) {
@@ -272,16 +331,16 @@ Registration register_camera(std::span<const Sight> sights, const RegistrationOp
         "together");
   }
   Registration registration;
-  std::vector<Sight> agreeing;
-  const RefinedPose best =
-      fit_agreeing(sights, minima.front().cam_from_set, noise_px, agreeing, registration.agrees);
-  const Pose& pose = registration.cam_from_set = best.cam_from_set;
+  const Agreement agreement = find_agreement(sights, minima.front().cam_from_set, noise_px);
+  const std::vector<Sight>& agreeing = agreement.sights;
+  registration.agrees = agreement.agrees;
+  const Pose& pose = registration.cam_from_set = agreement.refined.cam_from_set;
   for (const Sight& sight : sights) registration.residuals_px.push_back(residual_of(sight, pose));
   const auto count = static_cast<double>(agreeing.size());
   const double squares = sum_of_squares(agreeing, pose);
   registration.rms_px = std::sqrt(squares / count);
-  const double variance = std::max(noise_px * noise_px, squares / (2 * count - 6));
-  set_covariance(registration, best.information, variance);
+  const double variance = variance_of(agreement, noise_px);
+  set_covariance(registration, agreement.refined.information, variance);
 
   for (std::size_t i = 1; i < minima.size(); ++i) {
     const RefinedPose other =

@@ -112,6 +112,32 @@ TEST(RegisterCamera, LeavesOutMarkersThatWereMistaken) {
   }
 }
 
+TEST(RegisterCamera, TakesCoarseMarkersForCoarseAndNotForWrong) {
+  made::Random random(10);
+  int right = 0;
+  for (int i = 0; i < cases; ++i) {
+    const made::MarkerScene scene = made::random_markers(12, 80 * degree, 3, random);
+    const Registration found = register_camera(scene.sights, {0.5});
+    right += made::chi_square(found, scene.cam_from_set) < 40 ? 1 : 0;
+  }
+  EXPECT_GE(right, cases - 2);
+}
+
+TEST(RegisterCamera, RefusesFiveMarkersOfWhichOneIsWrong) {
+  made::Random random(11);
+  int refused = 0;
+  for (int i = 0; i < cases; ++i) {
+    made::MarkerScene scene = made::random_markers(5, 80 * degree, noise_px, random);
+    made::mistake_markers(scene.sights, 1);
+    try {
+      register_camera(scene.sights, {noise_px});
+    } catch (const std::runtime_error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GE(refused, cases - 2);
+}
+
 TEST(RegisterCamera, IsExactWithoutNoise) {
   made::Random random(3);
   for (int i = 0; i < cases; ++i) {
