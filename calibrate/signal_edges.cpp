@@ -101,8 +101,13 @@ std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal) {
     if (next + 1 >= signal.size() || !calm(next)) continue;
     const double jump = level(next) - before;
     if (std::abs(jump) < least_jump * noise) continue;
-    SignalEdge edge{last.time_s + last.exposure_s / 2,
-                    signal[next].time_s - signal[next].exposure_s / 2, least_sigma_s, jump > 0};
+    const SignalSample& first = signal[next];
+    const double noise_share = noise / std::abs(jump);
+    // What a calm frame may hide of the other level.
+    const double hidden = most_unrest * noise_share;
+    SignalEdge edge{last.time_s + (0.5 - hidden) * last.exposure_s,
+                    first.time_s - (0.5 - hidden) * first.exposure_s,
+                    std::max(least_sigma_s, noise_share * last.exposure_s), jump > 0};
     if (!straight) {
       const SignalSample& between = signal[i + 2];
       const double share = (between.value - before) / jump;
@@ -111,7 +116,7 @@ std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal) {
         continue;
       if (between.exposure_s > 0) {
         edge.low_s = edge.high_s = between.time_s + (0.5 - share) * between.exposure_s;
-        edge.sigma_s = std::max(least_sigma_s, 1.3 * noise / std::abs(jump) * between.exposure_s);
+        edge.sigma_s = std::max(least_sigma_s, 1.3 * noise_share * between.exposure_s);
       }
     }
     if (edge.high_s >= edge.low_s) edges.push_back(edge);
