@@ -9,7 +9,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
+
+#include "calibrate/rotation_fit.h"
 
 namespace calibrate {
 namespace {
@@ -63,22 +64,6 @@ Eigen::VectorXd prior_information(const LensForm& form, const Lens& lens, std::s
     prior(i) = 1 / (static_cast<double>(lens.width) * lens.width);
   }
   return prior;
-}
-
-// The rotation that best turns `a` into `b`.
-Mat3 best_rotation(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    H += Eigen::Vector3d(b[i].x, b[i].y, b[i].z) *
-         Eigen::Vector3d(a[i].x, a[i].y, a[i].z).transpose();
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::Matrix3d R =
-      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
-  Mat3 result;
-  for (int i = 0; i < 9; ++i) result.m[static_cast<std::size_t>(i)] = R(i / 3, i % 3);
-  return result;
 }
 
 // A square root of the covariance of a solve's free parameters.

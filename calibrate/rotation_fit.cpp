@@ -178,6 +178,16 @@ RotationFit fit_rotation(std::span<const SeenDirection> directions) {
   return fit;
 }
 
+Mat3 best_rotation(std::span<const Vec3> from, std::span<const Vec3> to) {
+  if (from.size() != to.size()) {
+    throw std::invalid_argument("a rotation needs as many directions on both sides");
+  }
+  std::vector<SeenDirection> pairs;
+  for (std::size_t i = 0; i < from.size(); ++i) pairs.push_back({to[i], from[i], 1});
+  const std::vector<double> weights(pairs.size(), 1.0);
+  return solve_wahba(pairs, weights).value_or(Mat3{});
+}
+
 std::vector<SeenDirection> directions_from(std::span<const Sight> sights,
                                            Vec3 position,
                                            double noise_px) {

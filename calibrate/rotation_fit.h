@@ -34,6 +34,12 @@ struct RotationFit {
 // std::runtime_error if there are fewer than two, if all lie on one axis, or do not agree.
 RotationFit fit_rotation(std::span<const SeenDirection> directions);
 
+// The rotation R that brings R * from[i] and to[i] together best by least squares: all directions
+// alike, none taken for wrong. Identity if they leave it open. Kabsch, "A Solution for the Best
+// Rotation to Relate Two Sets of Vectors", Acta Crystallographica A32, 1976. Throws
+// std::invalid_argument if they are not as many.
+Mat3 best_rotation(std::span<const Vec3> from, std::span<const Vec3> to);
+
 // Sights from a known position in the set; `noise_px` along each pixel axis. Throws
 // std::invalid_argument if a sight's point is that position.
 std::vector<SeenDirection> directions_from(std::span<const Sight> sights,

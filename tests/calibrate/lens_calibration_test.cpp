@@ -3,14 +3,17 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/calibrate/made_boards.h"
+#include "calibrate/made_boards.h"
 
 namespace calibrate {
 namespace {
+
+constexpr double degree = std::numbers::pi / 180;
 
 using ::testing::AnyOf;
 using ::testing::Contains;
@@ -21,7 +24,7 @@ constexpr double off_family_rad = 0.0008;
 
 struct Case {
   MadeLens truth;
-  MadeOptions options;
+  MadeBoards options;
   double max_deg;
 };
 
@@ -62,9 +65,9 @@ RayErrors ray_errors(const Case& c, unsigned seeds) {
   double found = 0;
   double foretold = 0;
   for (unsigned seed = 1; seed <= seeds; ++seed) {
-    MadeOptions options = c.options;
+    MadeBoards options = c.options;
     options.seed = seed;
-    const LensCalibration calibration = calibrate_lens(made_problem(c.truth, options));
+    const LensCalibration calibration = calibrate_lens(make_board_views(c.truth, options));
     found += std::pow(ray_error_mrad(c.truth, calibration.lens, c.max_deg), 2) / seeds;
     foretold += std::pow(foretold_mrad(c.truth, calibration, c.max_deg), 2) / seeds;
   }
@@ -86,18 +89,18 @@ TEST(CalibrateLens, FindsAFisheyeThatNoModelDescribesExactly) {
 }
 
 TEST(CalibrateLens, FindsAFisheyeThoughCornersAreWrong) {
-  MadeOptions options;
+  MadeBoards options;
   options.outliers = 0.15;
   EXPECT_LE(ray_errors({made_fisheye(), options, 89}, few_seeds).found_mrad, 1);
   EXPECT_LE(ray_errors({made_fisheye(off_family_rad), options, 89}, 2 * few_seeds).found_mrad, 1);
 }
 
 TEST(CalibrateLens, FindsAFisheyeThoughTheBoardIsBent) {
-  MadeOptions options;
+  MadeBoards options;
   options.warp_m = {.002, .001};
   EXPECT_LE(ray_errors({made_fisheye(), options, 89}, few_seeds).found_mrad, 1);
   options.warp_m = {.005, 0};
-  const LensCalibration bent = calibrate_lens(made_problem(made_fisheye(), options));
+  const LensCalibration bent = calibrate_lens(make_board_views(made_fisheye(), options));
   EXPECT_NEAR(bent.warp_m.x, .005, 2e-4);
   EXPECT_NEAR(bent.warp_m.y, 0, 2e-4);
   EXPECT_THAT(bent.warnings, Contains(HasSubstr("bent")));
@@ -105,25 +108,25 @@ TEST(CalibrateLens, FindsAFisheyeThoughTheBoardIsBent) {
 }
 
 TEST(CalibrateLens, FindsANormalLens) {
-  EXPECT_LE(ray_errors({made_normal(), normal_options(), 28}, few_seeds / 2).found_mrad, 0.25);
-  MadeOptions bent = normal_options();
+  EXPECT_LE(ray_errors({made_normal(), normal_boards(), 28}, few_seeds / 2).found_mrad, 0.25);
+  MadeBoards bent = normal_boards();
   bent.warp_m = {.002, 0};
   EXPECT_LE(ray_errors({made_normal(), bent, 28}, few_seeds / 2).found_mrad, 0.35);
 }
 
 TEST(CalibrateLens, ChoosesWhatFitsIntoACameraModelIfItIsAskedTo) {
   const LensCalibration c =
-      calibrate_lens(made_problem(made_normal(), normal_options()),
+      calibrate_lens(make_board_views(made_normal(), normal_boards()),
                      {.models = LensCalibrationOptions::Models::perspective, .form = {}});
   EXPECT_THAT(c.lens.model, HasSubstr("LENSMODEL_OPENCV"));
   EXPECT_LE(ray_error_mrad(made_normal(), c.lens, 28), 0.4);
 }
 
 TEST(CalibrateLens, TellsWhatItSawAndWhatItDidNot) {
-  MadeOptions options;
+  MadeBoards options;
   options.sees_deg = 60;
   options.centre_deg = 45;
-  const LensCalibration c = calibrate_lens(made_problem(made_fisheye(), options));
+  const LensCalibration c = calibrate_lens(make_board_views(made_fisheye(), options));
   EXPECT_NEAR(c.coverage_deg, 60, 2);
   EXPECT_THAT(c.warnings, Contains(HasSubstr("degrees off the axis: the rim is a guess")));
   EXPECT_TRUE(c.overlay->at({513, 509}));
@@ -133,9 +136,9 @@ TEST(CalibrateLens, TellsWhatItSawAndWhatItDidNot) {
 }
 
 LensProblem good_problem() {
-  MadeOptions options;
+  MadeBoards options;
   options.views = 12;
-  return made_problem(made_fisheye(), options);
+  return make_board_views(made_fisheye(), options);
 }
 
 TEST(CalibrateLens, LeavesOutPicturesThatTellSomethingElse) {

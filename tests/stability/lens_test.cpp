@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -10,10 +10,13 @@
 #include <gtest/gtest.h>
 
 #include "calibrate/lens_calibration.h"
-#include "tests/calibrate/made_boards.h"
+#include "calibrate/made_boards.h"
+#include "calibrate/rotation_fit.h"
 
 namespace calibrate {
 namespace {
+
+constexpr double degree = std::numbers::pi / 180;
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -56,7 +59,7 @@ Honesty honesty_of(const MadeLens& truth, const LensCalibration& c) {
       predicted.push_back(*error);
     }
   }
-  const Mat3 turn = best_turn(expected, found);
+  const Mat3 turn = best_rotation(expected, found);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto there = project(c.lens, turn * expected[i]);
     const double error =
@@ -69,18 +72,18 @@ Honesty honesty_of(const MadeLens& truth, const LensCalibration& c) {
 
 struct Group {
   const char* name;
-  void (*change)(MadeOptions&, unsigned);
+  void (*change)(MadeBoards&, unsigned);
 };
 constexpr std::array groups{
-    Group{"good", [](MadeOptions&, unsigned) {}},
-    Group{"sparse", [](MadeOptions& o, unsigned) { o.views = 8; }},
-    Group{"narrow", [](MadeOptions& o, unsigned) { o.centre_deg *= 0.3; }},
+    Group{"good", [](MadeBoards&, unsigned) {}},
+    Group{"sparse", [](MadeBoards& o, unsigned) { o.views = 8; }},
+    Group{"narrow", [](MadeBoards& o, unsigned) { o.centre_deg *= 0.3; }},
     Group{"fronto-parallel",
-          [](MadeOptions& o, unsigned) {
+          [](MadeBoards& o, unsigned) {
             o.fronto = true;
             o.centre_deg *= 0.6;
           }},
-    Group{"few", [](MadeOptions& o, unsigned i) { o.views = 2 + i % 3; }},
+    Group{"few", [](MadeBoards& o, unsigned i) { o.views = 2 + i % 3; }},
 };
 
 // 95 of 100 predictions hold. Few runs only tell the gross lie: errors of one calibration stand and
@@ -98,10 +101,10 @@ TEST(PredictedOverlayError, CoversTheTrueOneAndIsUnknownWhereNothingWasSeen) {
     for (unsigned i = 0; i < runs; ++i) {
       const bool normal = i % 3 == 2;
       const MadeLens truth = normal ? made_normal() : made_fisheye(i % 3 == 1 ? 0.0008 : 0);
-      MadeOptions options = normal ? normal_options() : MadeOptions{};
+      MadeBoards options = normal ? normal_boards() : MadeBoards{};
       options.seed = 7000 + 100 * static_cast<unsigned>(&group - groups.data()) + i;
       group.change(options, i);
-      const Honesty honesty = honesty_of(truth, calibrate_lens(made_problem(truth, options)));
+      const Honesty honesty = honesty_of(truth, calibrate_lens(make_board_views(truth, options)));
       EXPECT_EQ(honesty.called_good, 0u) << group.name << ", seed " << options.seed;
       pixels += static_cast<double>(honesty.ratio.size());
       covered += static_cast<double>(honesty.covered);
@@ -139,10 +142,10 @@ TEST(SelectLens, TakesTheTrueNumberOfTerms) {
       parameters.insert(parameters.end(), sizes.begin(),
                         sizes.begin() + static_cast<std::ptrdiff_t>(terms));
       const MadeLens truth{{"kannala_brandt", 1024, 1024, parameters}, 0, 90 * degree};
-      MadeOptions options;
+      MadeBoards options;
       options.seed = 300 + 100 * static_cast<unsigned>(terms) + i;
       options.views = 15;
-      const LensCalibration c = calibrate_lens(made_problem(truth, options));
+      const LensCalibration c = calibrate_lens(make_board_views(truth, options));
       ++cases;
       right += c.form == LensForm{"kannala_brandt", terms, true};
       const double best = c.selection.candidates[c.selection.best].heldout_rms_px;
@@ -152,11 +155,11 @@ TEST(SelectLens, TakesTheTrueNumberOfTerms) {
   EXPECT_GE(right, cases - (PLATELIGHT_FULL_TESTS ? 5 : 1)) << "of " << cases;
 }
 
-LensCalibration calibrated(void (*change)(MadeOptions&), const MadeLens& truth = made_fisheye()) {
-  MadeOptions options;
+LensCalibration calibrated(void (*change)(MadeBoards&), const MadeLens& truth = made_fisheye()) {
+  MadeBoards options;
   options.views = 15;
   change(options);
-  return calibrate_lens(made_problem(truth, options));
+  return calibrate_lens(make_board_views(truth, options));
 }
 
 // What half of the known picture is predicted to be off by at most; nothing if nothing is known.
@@ -174,7 +177,7 @@ std::optional<double> usual_error_px(const LensCalibration& c) {
 }
 
 TEST(CalibrateLensAtItsLimits, SaysThatBoardsFacingTheCameraDoNotTellTheFocalLength) {
-  const LensCalibration c = calibrated([](MadeOptions& o) {
+  const LensCalibration c = calibrated([](MadeBoards& o) {
     o.fronto = true;
     o.centre_deg = 40;
   });
@@ -183,7 +186,7 @@ TEST(CalibrateLensAtItsLimits, SaysThatBoardsFacingTheCameraDoNotTellTheFocalLen
 }
 
 TEST(CalibrateLensAtItsLimits, KnowsNothingOfTheRimIfBoardsWereOnlyInTheCentre) {
-  const LensCalibration c = calibrated([](MadeOptions& o) {
+  const LensCalibration c = calibrated([](MadeBoards& o) {
     o.centre_deg = 5;
     o.least_m = 0.8;
     o.most_m = 1.2;
@@ -195,12 +198,12 @@ TEST(CalibrateLensAtItsLimits, KnowsNothingOfTheRimIfBoardsWereOnlyInTheCentre) 
 
 TEST(CalibrateLensAtItsLimits, SaysThatFewPicturesAreFew) {
   for (const std::size_t views : {1U, 2U, 3U}) {
-    MadeOptions options;
+    MadeBoards options;
     options.views = views;
     options.centre_deg = 40;
     const MadeLens truth = made_fisheye();
     try {
-      const LensCalibration c = calibrate_lens(made_problem(truth, options));
+      const LensCalibration c = calibrate_lens(make_board_views(truth, options));
       EXPECT_THAT(c.warnings, Contains(HasSubstr("pictures could be used"))) << views;
       const Honesty honesty = honesty_of(truth, c);
       EXPECT_EQ(honesty.called_good, 0u);
@@ -211,16 +214,16 @@ TEST(CalibrateLensAtItsLimits, SaysThatFewPicturesAreFew) {
 }
 
 TEST(CalibrateLensAtItsLimits, TakesOnePictureShownTenTimesForOne) {
-  MadeOptions options;
+  MadeBoards options;
   options.views = 3;
-  LensProblem problem = made_problem(made_fisheye(), options);
+  LensProblem problem = make_board_views(made_fisheye(), options);
   for (int i = 0; i < 10; ++i) problem.views.push_back(problem.views[0]);
   const LensCalibration c = calibrate_lens(problem);
   EXPECT_THAT(c.warnings, Contains(HasSubstr("only 3 pictures")));
 }
 
 TEST(CalibrateLensAtItsLimits, StandsHalfOfItsCornersWrong) {
-  const LensCalibration c = calibrated([](MadeOptions& o) {
+  const LensCalibration c = calibrated([](MadeBoards& o) {
     o.outliers = 0.5;
     o.views = 30;
   });
@@ -229,16 +232,16 @@ TEST(CalibrateLensAtItsLimits, StandsHalfOfItsCornersWrong) {
 }
 
 TEST(CalibrateLensAtItsLimits, SaysThatCornersScatter) {
-  const LensCalibration c = calibrated([](MadeOptions& o) { o.noise_px = 2.5; });
+  const LensCalibration c = calibrated([](MadeBoards& o) { o.noise_px = 2.5; });
   EXPECT_THAT(c.warnings, Contains(HasSubstr("corners scatter by 2.")));
 }
 
 // Rows are exposed one after the other while the board moves: each row of corners sees it
 // somewhere else.
 TEST(CalibrateLensAtItsLimits, NoticesARollingShutter) {
-  MadeOptions options;
+  MadeBoards options;
   options.noise_px = 0.1;
-  LensProblem problem = made_problem(made_fisheye(), options);
+  LensProblem problem = make_board_views(made_fisheye(), options);
   std::mt19937 random(4);
   std::normal_distribution<double> speed(0, 6);  // pixels over a picture's height
   for (BoardView& view : problem.views) {
@@ -256,15 +259,15 @@ TEST(CalibrateLensAtItsLimits, NoticesARollingShutter) {
 TEST(CalibrateLensAtItsLimits, LosesAccuracySmoothlyAsCornersGetNoisier) {
   double before = 0;
   for (const double noise_px : {0.1, 0.3, 1.0, 3.0}) {
-    MadeOptions options;
+    MadeBoards options;
     options.noise_px = noise_px;
     options.views = 12;
     const MadeLens truth = made_fisheye();
     double sum = 0;
     for (unsigned seed = 1; seed <= 3; ++seed) {
       options.seed = seed;
-      sum +=
-          std::pow(ray_error_mrad(truth, calibrate_lens(made_problem(truth, options)).lens, 85), 2);
+      sum += std::pow(
+          ray_error_mrad(truth, calibrate_lens(make_board_views(truth, options)).lens, 85), 2);
     }
     const double error = std::sqrt(sum / 3);
     EXPECT_LE(error, 5 * noise_px) << noise_px;

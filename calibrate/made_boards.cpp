@@ -1,55 +1,51 @@
 // Boards before made cameras, with known truth.
-#pragma once
+#include "calibrate/made_boards.h"
 
+#include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <numbers>
-#include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
-
-#include "calibrate/lens.h"
-#include "calibrate/lens_bundle.h"
-#include "calibrate/lens_solve.h"
+#include "calibrate/rotation_fit.h"
 #include "calibrate/rotation_vector.h"
 
 namespace calibrate {
+namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 
-// A lens of the family, or just outside of it: the angle off the axis has a ripple.
-struct MadeLens {
-  Lens lens;
-  double ripple_rad = 0;  // of five times the angle
-  double sees_rad = 0;    // corners beyond are not in the picture
+// The shortest one.
+Mat3 turn_between(Vec3 from, Vec3 to) {
+  const Vec3 axis = cross(normalize(from), normalize(to));
+  const double sine = length(axis);
+  const double angle = std::atan2(sine, dot(normalize(from), normalize(to)));
+  return sine > 0 ? rotation_of(axis * (angle / sine)) : Mat3{};
+}
 
-  Vec2 project(Vec3 v) const {
-    const double off = hypotenuse(v.x, v.y);
-    const double angle = std::atan2(off, v.z);
-    const double shown = angle + ripple_rad * std::sin(5 * angle);
-    const double s = off > 0 ? std::sin(shown) / off : 0;
-    return calibrate::project(lens, {v.x * s, v.y * s, std::cos(shown)}).value();
-  }
+}  // namespace
 
-  std::optional<Vec3> unproject(Vec2 q) const {
-    const auto v = calibrate::unproject(lens, q);
-    if (!v) return std::nullopt;
-    const double off = hypotenuse(v->x, v->y);
-    const double shown = std::atan2(off, v->z);
-    double angle = shown;
-    for (int i = 0; i < 50; ++i) angle = shown - ripple_rad * std::sin(5 * angle);
-    const double s = off > 0 ? std::sin(angle) / off : 0;
-    return Vec3{v->x * s, v->y * s, std::cos(angle)};
-  }
-};
+Vec2 MadeLens::project(Vec3 v) const {
+  const double off = hypotenuse(v.x, v.y);
+  const double angle = std::atan2(off, v.z);
+  const double shown = angle + ripple_rad * std::sin(5 * angle);
+  const double s = off > 0 ? std::sin(shown) / off : 0;
+  return calibrate::project(lens, {v.x * s, v.y * s, std::cos(shown)}).value();
+}
 
-inline MadeLens made_fisheye(double ripple_rad = 0) {
+std::optional<Vec3> MadeLens::unproject(Vec2 q) const {
+  const auto v = calibrate::unproject(lens, q);
+  if (!v) return std::nullopt;
+  const double off = hypotenuse(v->x, v->y);
+  const double shown = std::atan2(off, v->z);
+  double angle = shown;
+  for (int i = 0; i < 50; ++i) angle = shown - ripple_rad * std::sin(5 * angle);
+  const double s = off > 0 ? std::sin(angle) / off : 0;
+  return Vec3{v->x * s, v->y * s, std::cos(angle)};
+}
+
+MadeLens made_fisheye(double ripple_rad) {
   // Sees a little beyond 90 degrees, as such lenses do.
   return {
       {"decentred_kannala_brandt", 1024, 1024,
@@ -59,7 +55,7 @@ inline MadeLens made_fisheye(double ripple_rad = 0) {
       90 * degree};
 }
 
-inline MadeLens made_normal() {
+MadeLens made_normal() {
   return {{"LENSMODEL_OPENCV5",
            1280,
            720,
@@ -68,38 +64,17 @@ inline MadeLens made_normal() {
           60 * degree};
 }
 
-struct MadeOptions {
-  std::size_t views = 30;
-  double noise_px = 0.3;
-  double outliers = 0;     // share of the corners
-  double centre_deg = 78;  // boards' middles lie up to here off the axis
-  double tilt_deg = 40;
-  double least_m = 0.28, most_m = 0.6;  // distance
-  Vec2 warp_m;
-  bool fronto = false;    // all boards face the camera
-  double sees_deg = 180;  // corners beyond are hidden
-  unsigned seed = 1;
-};
-
-// Of a normal lens: boards farther away, over its narrower picture.
-inline MadeOptions normal_options() {
-  MadeOptions options;
-  options.centre_deg = 18;
-  options.least_m = 0.5;
-  options.most_m = 1.1;
-  return options;
+MadeBoards normal_boards() {
+  MadeBoards boards;
+  boards.centre_deg = 18;
+  boards.least_m = 0.5;
+  boards.most_m = 1.1;
+  return boards;
 }
 
-inline Board made_board() { return {Board::Kind::chessboard, 10, 10, .04, 0, ""}; }
+Board made_board() { return {Board::Kind::chessboard, 10, 10, .04, 0, ""}; }
 
-inline Mat3 turn_between(Vec3 from, Vec3 to) {
-  const Vec3 axis = cross(normalize(from), normalize(to));
-  const double sine = length(axis);
-  const double angle = std::atan2(sine, dot(normalize(from), normalize(to)));
-  return sine > 0 ? rotation_of(axis * (angle / sine)) : Mat3{};
-}
-
-inline LensProblem made_problem(const MadeLens& truth, const MadeOptions& options) {
+LensProblem make_board_views(const MadeLens& truth, const MadeBoards& options) {
   LensProblem problem{made_board(), truth.lens.width, truth.lens.height, {}};
   const Board& board = problem.board;
   std::mt19937 random(options.seed);
@@ -151,26 +126,7 @@ inline LensProblem made_problem(const MadeLens& truth, const MadeOptions& option
   return problem;
 }
 
-// The rotation that best turns directions a into directions b.
-inline Mat3 best_turn(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    H += Eigen::Vector3d(b[i].x, b[i].y, b[i].z) *
-         Eigen::Vector3d(a[i].x, a[i].y, a[i].z).transpose();
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::Matrix3d R =
-      svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
-  Mat3 turn;
-  for (int i = 0; i < 9; ++i) turn.m[static_cast<std::size_t>(i)] = R(i / 3, i % 3);
-  return turn;
-}
-
-// RMS angle in milliradians between true and solved directions of the pixels that the lens shows up
-// to an angle off the axis, evenly over the sphere, once the best rotation between the two cameras
-// is taken out (no picture of boards can tell that).
-inline double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg) {
+double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg) {
   std::vector<Vec3> expected, found;
   for (double off = 1; off <= max_deg; off += 2) {
     const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
@@ -186,7 +142,7 @@ inline double ray_error_mrad(const MadeLens& truth, const Lens& solved, double m
       found.push_back(*u);
     }
   }
-  const Mat3 turn = best_turn(found, expected);
+  const Mat3 turn = best_rotation(found, expected);
   double sum = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Vec3 turned = turn * found[i];
