@@ -21,6 +21,7 @@ constexpr std::size_t min_corners = 6;
 // Bearings this far off their mean (by cosine) say little on the plane perpendicular to it.
 constexpr double least_cosine = 0.15;
 constexpr int refinement_steps = 5;
+constexpr int rough_steps = 2;
 
 Vector3d eigen(Vec3 v) { return {v.x, v.y, v.z}; }
 
@@ -124,7 +125,8 @@ double refine(std::span<const Vec3> bearings,
 }  // namespace
 
 std::optional<BoardPose> find_board_pose(std::span<const Vec3> bearings,
-                                         std::span<const Vec3> p_board) {
+                                         std::span<const Vec3> p_board,
+                                         PoseEffort effort) {
   if (bearings.size() != p_board.size()) return std::nullopt;
   Vector3d mean = Vector3d::Zero();
   for (const Vec3 b : bearings) mean += eigen(b);
@@ -152,7 +154,9 @@ std::optional<BoardPose> find_board_pose(std::span<const Vec3> bearings,
   Matrix3d R = plane_from_cam.transpose() * svd.matrixU() * svd.matrixV().transpose();
   Vector3d t = plane_from_cam.transpose() * H->col(2);
   if (!R.allFinite() || !t.allFinite() || R.determinant() < 0) return std::nullopt;
-  double error_rad = refine(bearings, p_board, R, t, refinement_steps);
+  const bool rough = effort == PoseEffort::rough;
+  double error_rad = refine(bearings, p_board, R, t, rough ? rough_steps : refinement_steps);
+  if (rough) return BoardPose{pose_of(R, t), error_rad};
 
   // The other pose of nearly the same picture: its normal mirrored at the line of sight, turned
   // about the board's middle.

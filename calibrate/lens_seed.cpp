@@ -19,8 +19,8 @@ constexpr double most_focal = 12;
 constexpr double focal_step = 1.35;
 constexpr double fine_step = 1.1;  // around the best of them
 // Views and corners that a trial looks at.
-constexpr std::size_t trial_views = 12;
-constexpr std::size_t trial_corners = 30;
+constexpr std::size_t trial_views = 10;
+constexpr std::size_t trial_corners = 20;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -66,7 +66,7 @@ void mark_smooth(const Board& board,
     q.row(row) << corners[i].q.x, corners[i].q.y;
   }
   // Least absolute distances by reweighting, then Cauchy's weights at their own scale.
-  constexpr int rounds = 20;
+  constexpr int rounds = 10;
   constexpr double least_px = 0.1;
   Eigen::VectorXd weight = Eigen::VectorXd::Ones(A.rows());
   Eigen::VectorXd distance(A.rows());
@@ -104,7 +104,8 @@ std::optional<BoardPose> pose_of(const Lens& lens,
                                  const Board& board,
                                  Vec2 warp_m,
                                  std::span<const SeenCorner> corners,
-                                 std::span<const std::size_t> chosen) {
+                                 std::span<const std::size_t> chosen,
+                                 PoseEffort effort = PoseEffort::both) {
   std::vector<Vec2> pixels;
   for (const std::size_t i : chosen) pixels.push_back(corners[i].q);
   const auto directions = unproject_all(lens, pixels);
@@ -114,7 +115,7 @@ std::optional<BoardPose> pose_of(const Lens& lens,
     bearings.push_back(*directions[i]);
     points.push_back(corner_of(board, warp_m, corners[chosen[i]].index));
   }
-  return find_board_pose(bearings, points);
+  return find_board_pose(bearings, points, effort);
 }
 
 Lens one_parameter_lens(const LensForm& form, int width, int height, double focal_px) {
@@ -180,7 +181,8 @@ std::optional<LensSeed> seed_lens(const LensForm& form,
       const std::size_t count = begins[view + 1] - begins[view];
       const auto chosen = choose(used.subspan(begins[view], count), trial_corners);
       if (chosen.size() < 6) continue;
-      const auto pose = pose_of(lens, board, {}, corners.subspan(begins[view], count), chosen);
+      const auto pose =
+          pose_of(lens, board, {}, corners.subspan(begins[view], count), chosen, PoseEffort::rough);
       errors.push_back(pose ? pose->error_rad * focal_px : HUGE_VAL);
     }
     return errors.empty() ? HUGE_VAL : median(errors);

@@ -98,9 +98,8 @@ LensStart start_with(const LensProblem& problem, LensStart start, const LensForm
   return start;
 }
 
-}  // namespace
-
-LensStarts start_lens(const LensProblem& problem) {
+// The corners, and which of them can be right.
+LensStart smooth_start(const LensProblem& problem) {
   check(problem.board);
   if (problem.width < 1 || problem.height < 1) {
     throw std::invalid_argument("the size of the pictures must be above 0");
@@ -108,10 +107,27 @@ LensStarts start_lens(const LensProblem& problem) {
   LensStart start;
   start.corners = corners_of(problem, start.not_finite);
   start.used = smooth_corners(problem.board, problem.views.size(), start.corners);
+  return start;
+}
+
+}  // namespace
+
+LensForm one_parameter_form(const LensForm& form) {
+  if (form.model.starts_with("LENSMODEL_OPENCV") || form.model == "LENSMODEL_PINHOLE") {
+    return {"LENSMODEL_PINHOLE", 0, true};
+  }
+  return {"kannala_brandt", 0, true};
+}
+
+LensStarts start_lens(const LensProblem& problem) {
+  const LensStart start = smooth_start(problem);
   return {start_with(problem, start, {"kannala_brandt", 0, true}),
           start_with(problem, start, {"LENSMODEL_PINHOLE", 0, true})};
 }
 
+LensStart start_lens(const LensProblem& problem, const LensForm& one_parameter) {
+  return start_with(problem, smooth_start(problem), one_parameter);
+}
 std::optional<LensSolve> solve_lens(const LensProblem& problem,
                                     const LensForm& form,
                                     const LensStart& start,

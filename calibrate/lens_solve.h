@@ -37,6 +37,10 @@ struct LensStarts {
   LensStart equidistant, pinhole;
 };
 LensStarts start_lens(const LensProblem& problem);
+// With one projection only: "kannala_brandt" without terms, or "LENSMODEL_PINHOLE".
+LensStart start_lens(const LensProblem& problem, const LensForm& one_parameter);
+// The one that suits a form.
+LensForm one_parameter_form(const LensForm& form);
 
 struct LensSolve {
   Bundle bundle;

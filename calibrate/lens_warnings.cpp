@@ -20,6 +20,8 @@ constexpr std::size_t few_views = 5;
 constexpr double tilt_rad = 8 * degree;
 constexpr double unseen_share = 0.25;  // of the picture that the lens sees
 constexpr double large_error_px = 3;
+// Fish-eyes show nothing beyond, and the picture is black there.
+constexpr double image_circle_rad = 95 * degree;
 
 template <class... T>
 std::string text(const char* format, T... values) {
@@ -128,8 +130,10 @@ void warn_of_coverage(const LensProblem& problem,
       const Vec2 q{(x + 0.5) * problem.width / columns, (y + 0.5) * problem.height / rows};
       const auto v = unproject(whole, q);
       if (!v) continue;
+      const double off_rad = std::atan2(hypotenuse(v->x, v->y), v->z);
+      if (off_rad > std::max(image_circle_rad, c.coverage_deg * degree)) continue;
       ++seen;
-      farthest_rad = std::max(farthest_rad, std::atan2(hypotenuse(v->x, v->y), v->z));
+      farthest_rad = std::max(farthest_rad, off_rad);
       const auto error = c.overlay->at(q);
       if (error) errors.push_back(*error);
       if (!error) ++unknown;

@@ -127,6 +127,13 @@ LensProblem make_board_views(const MadeLens& truth, const MadeBoards& options) {
 }
 
 double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg) {
+  return ray_error_mrad(
+      truth, [&](Vec2 q) { return unproject(solved, q); }, max_deg);
+}
+
+double ray_error_mrad(const MadeLens& truth,
+                      const std::function<std::optional<Vec3>(Vec2)>& solved,
+                      double max_deg) {
   std::vector<Vec3> expected, found;
   for (double off = 1; off <= max_deg; off += 2) {
     const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
@@ -136,7 +143,7 @@ double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg)
                    std::cos(off * degree)};
       const Vec2 q = truth.project(v);
       if (q.x < 0 || q.y < 0 || q.x > truth.lens.width - 1 || q.y > truth.lens.height - 1) continue;
-      const auto u = unproject(solved, q);
+      const auto u = solved(q);
       if (!u) return HUGE_VAL;
       expected.push_back(v);
       found.push_back(*u);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 
 #include "calibrate/lens.h"
@@ -53,5 +54,9 @@ LensProblem make_board_views(const MadeLens& truth, const MadeBoards& boards);
 // to an angle off the axis, evenly over the sphere, once the best rotation between the two cameras
 // is taken out (no picture of boards can tell that). Infinite if the solved lens does not see one.
 double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg);
+// The same of any camera: `unproject` gives the direction of a pixel.
+double ray_error_mrad(const MadeLens& truth,
+                      const std::function<std::optional<Vec3>(Vec2)>& unproject,
+                      double max_deg);
 
 }  // namespace calibrate

@@ -44,11 +44,14 @@ struct Stressor {
   std::string floor_name{};
 };
 
-// Other figures of the points against their time, each with a word on it. "error_p99", or a name
-// among ChartPoint::figures; points without it are left out.
+// Other figures of the points against their time, each with a word on it. "error", "error_p99", or
+// a name among ChartPoint::figures; points without it are left out.
 struct FigurePanel {
   std::string name;  // of the axis
   std::vector<std::pair<std::string, std::string>> figures;
+  // Against another figure than time, and its axis's name.
+  std::string across{};
+  std::string across_name{};
 };
 
 // What an error is made of: it falls from step to step as one thing after the other is made true.
@@ -68,7 +71,9 @@ struct Chart {
   std::string subtitle;                          // scene, size, threads
   std::string time_name = "time per frame, ms";  // of the axes
   std::string error_name = "relative RMS error";
-  std::string variant_name;  // what variants differ in
+  bool relative = true;                       // errors are shares, written in percent
+  std::string stressed_error_name = "error";  // of the stressors' axes
+  std::string variant_name;                   // what variants differ in
   std::vector<ChartPoint> points;
   std::vector<FigurePanel> panels;
   std::vector<Stressor> stressors;

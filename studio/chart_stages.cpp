@@ -4,13 +4,15 @@
 #include <vector>
 
 #include "studio/charts/hdr.h"
+#include "studio/charts/lens.h"
 #include "studio/charts/lights.h"
 #include "studio/charts/photograph.h"
 
 namespace studio {
 
 std::span<const ChartStage> chart_stages() {
-  static const std::vector<ChartStage> all{hdr_chart(), lights_chart(), photograph_chart()};
+  static const std::vector<ChartStage> all{hdr_chart(), lens_chart(), lights_chart(),
+                                           photograph_chart()};
   return all;
 }
 

@@ -84,8 +84,10 @@ std::vector<Series> series_of(const Chart& chart) {
 using Value = std::function<std::optional<double>(const ChartPoint&)>;
 
 std::optional<double> error_of(const ChartPoint& p) { return p.error; }
+std::optional<double> time_of(const ChartPoint& p) { return p.time_ms; }
 
 Value figure_named(const std::string& name) {
+  if (name == "error") return error_of;
   if (name == "error_p99") return [](const ChartPoint& p) { return p.error_p99; };
   return [name](const ChartPoint& p) -> std::optional<double> {
     const auto found = std::ranges::find(p.figures, name, &std::pair<std::string, double>::first);
@@ -160,12 +162,15 @@ void draw_points(Svg& svg,
                  const Value& value,
                  const Axis& x,
                  const Axis& y,
-                 double radius) {
+                 double radius,
+                 const Value& across = time_of) {
   for (const bool lines : {true, false}) {
     for (const Series& series : all) {
       std::vector<std::pair<double, double>> places;
       for (const ChartPoint* p : series.points) {
-        if (const auto v = value(*p)) places.emplace_back(x(p->time_ms), y(*v));
+        const auto u = across(*p);
+        const auto v = value(*p);
+        if (u && v) places.emplace_back(x(*u), y(*v));
       }
       if (lines && places.size() > 1) {
         svg.polyline(places, series.colour, series.peer ? 1.8 : 1, series.peer ? peer_dashes : "");
@@ -183,22 +188,33 @@ std::vector<double> times_of(const Chart& chart) {
   return times;
 }
 
+// Of the errors of a chart, and of figures beside them.
+Axis axis_of(const Chart& chart, const std::vector<double>& errors, double from, double to) {
+  return chart.relative ? error_axis(errors, from, to) : log_axis(errors, from, to);
+}
+
 void draw_figures(Svg& svg,
                   const Chart& chart,
                   const std::vector<Series>& all,
                   const FigurePanel& panel,
                   double left,
                   double top) {
-  const Axis x = log_axis(times_of(chart), left, left + small_width);
+  const Value across = panel.across.empty() ? time_of : figure_named(panel.across);
+  std::vector<double> places;
+  for (const ChartPoint& p : chart.points) {
+    if (const auto place = across(p)) places.push_back(*place);
+  }
+  const Axis x = log_axis(places, left, left + small_width);
   std::vector<double> values;
   for (const auto& [figure, word] : panel.figures) {
     for (const ChartPoint& p : chart.points) values.push_back(figure_named(figure)(p).value_or(0));
   }
-  const Axis y = error_axis(values, top + small_height, top);
-  draw_axes(svg, x, y, chart.time_name, panel.name, 11.5);
+  const Axis y = axis_of(chart, values, top + small_height, top);
+  draw_axes(svg, x, y, panel.across.empty() ? chart.time_name : panel.across_name, panel.name,
+            11.5);
   for (const auto& [figure, word] : panel.figures) {
     const Value value = figure_named(figure);
-    draw_points(svg, all, value, x, y, 3.2);
+    draw_points(svg, all, value, x, y, 3.2, across);
     double highest = 0;  // of our own
     for (const ChartPoint& p : chart.points) {
       if (!p.peer) highest = std::max(highest, value(p).value_or(0));
@@ -213,7 +229,7 @@ void draw_main_panel(Svg& svg, const Chart& chart, const std::vector<Series>& al
   std::vector<double> errors;
   for (const ChartPoint& p : chart.points) errors.push_back(p.error);
   const Axis x = log_axis(times_of(chart), panel_left, panel_left + panel_width);
-  const Axis y = error_axis(errors, title_height + panel_height, title_height);
+  const Axis y = axis_of(chart, errors, title_height + panel_height, title_height);
   draw_axes(svg, x, y, chart.time_name, chart.error_name, 13);
   draw_points(svg, all, error_of, x, y, 4.5);
   std::vector<std::pair<double, double>> front;
@@ -278,7 +294,8 @@ void draw_legend(Svg& svg, const Chart& chart, const std::vector<Series>& all) {
   svg.text(legend_left + 30, y + 8, "faster and closer", {11, Anchor::start, faint_ink});
 }
 
-void draw_stressor(Svg& svg, const Stressor& stressor, double left, double top) {
+void draw_stressor(
+    Svg& svg, const Chart& chart, const Stressor& stressor, double left, double top) {
   std::vector<double> values;
   std::vector<double> errors;
   for (const StressorSample& s : stressor.samples) {
@@ -292,11 +309,11 @@ void draw_stressor(Svg& svg, const Stressor& stressor, double left, double top) 
     x = {low, high > low ? high : low + 1, false, left, left + small_width};
   }
   if (stressor.floor > 0) errors.push_back(stressor.floor);
-  const Axis y = error_axis(errors, top + small_height, top);
+  const Axis y = axis_of(chart, errors, top + small_height, top);
   const std::string name = stressor.unit.empty()
                                ? stressor.stressor
                                : fmt::format("{}, {}", stressor.stressor, stressor.unit);
-  draw_axes(svg, x, y, name, "error", 11.5);
+  draw_axes(svg, x, y, name, chart.stressed_error_name, 11.5);
   std::vector<std::pair<double, double>> error_line;
   std::vector<std::pair<double, double>> reported_line;
   for (const StressorSample& s : stressor.samples) {
@@ -374,7 +391,7 @@ std::string chart_svg(const Chart& chart) {
   }
   for (const Stressor& stressor : chart.stressors) {
     small.push_back(
-        [&](Svg& svg, double left, double top) { draw_stressor(svg, stressor, left, top); });
+        [&](Svg& svg, double left, double top) { draw_stressor(svg, chart, stressor, left, top); });
   }
   const double small_top = title_height + panel_height + axis_height + 46;
   const double height = title_height + panel_height + axis_height + margin / 2 +
