@@ -29,12 +29,6 @@ constexpr double hopeless = 0.01;
 // Lenses by angle see no farther beyond the farthest corner: there their polynomial is a guess.
 constexpr double guess_rad = 10 * degree;
 
-std::string number(double value, int digits) {
-  std::string text =
-      std::to_string(std::round(value * std::pow(10, digits)) / std::pow(10, digits));
-  return text.substr(0, text.find('.') + (digits > 0 ? static_cast<std::size_t>(digits) + 1 : 0));
-}
-
 // Whether a view shows the board from behind, as a mirror does: the picture turns the other way
 // round than the board.
 bool is_mirrored(const Board& board, const BoardView& view) {
@@ -295,7 +289,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   Robust robust = solve_first(problem, options.models, forms);
   if (!(robust.solve.sigma_px < hopeless * problem.width)) {
     throw std::runtime_error(
-        "the corners miss the best lens by " + number(robust.solve.sigma_px, 1) +
+        "the corners miss the best lens by " + std::to_string(std::lround(robust.solve.sigma_px)) +
         " px: they are not corners of this board (is the number of inner corners right?)");
   }
   const LensForm richest = robust.solve.bundle.form;

@@ -16,7 +16,7 @@ packages=(
   # studio
   fonts-dejavu-core libcli11-dev libfmt-dev libopencv-photo-dev librsvg2-dev nlohmann-json3-dev
   # tests
-  ffmpeg libgmock-dev libgtest-dev openimageio-tools
+  ffmpeg libgmock-dev libgtest-dev locales openimageio-tools
 )
 missing=()
 for package in "${packages[@]}"; do
