@@ -224,6 +224,31 @@ std::vector<BelievedSolve> believed(const LensSelection& selection) {
   return solves;
 }
 
+// A spline, if the forms leave something that is not noise and the corners suffice for so many
+// parameters. It takes seconds, so it is not tried without need.
+void try_spline(const LensProblem& problem, bool warp, LensCalibration& result) {
+  const LensSolve& best = *result.selection.candidates[result.selection.best].solve;
+  if (agreement_of_neighbours(problem, result.start, best) < suspicious_agreement) return;
+  constexpr int knots = 8;
+  constexpr std::size_t corners_per_parameter = 40;
+  double farthest_rad = 0;
+  for (std::size_t i = 0; i < best.used.size(); ++i) {
+    if (best.used[i] == 0) continue;
+    const SeenCorner& corner = result.start.corners[i];
+    const Vec3 p = best.bundle.cam_from_board[corner.view] *
+                   corner_of(problem.board, best.bundle.warp_m, corner.index);
+    farthest_rad = std::max(farthest_rad, std::atan2(hypotenuse(p.x, p.y), p.z));
+  }
+  const int field_deg = std::min(2 * static_cast<int>(farthest_rad / degree) + 15, 340);
+  const LensForm spline{"LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=" + std::to_string(knots) +
+                            "_Ny=" + std::to_string(knots) +
+                            "_fov_x_deg=" + std::to_string(field_deg),
+                        0, true};
+  if (count(result.start.used) < corners_per_parameter * free_count(spline)) return;
+  LensSelection more = select_lens(problem, start_of(result.start, best), {&spline, 1}, warp);
+  result.selection.add(std::move(more.candidates.front()));
+}
+
 void fill_reports(const LensProblem& problem, LensCalibration& result) {
   const LensSolve& solve = result.solve();
   const auto missed = residuals(solve.bundle, problem.board, result.start.corners);
@@ -307,6 +332,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   const bool warp = is_bent(problem, robust);
   if (options.form) forms = {*options.form};
   result.selection = select_lens(problem, result.start, forms, warp);
+  if (!options.form) try_spline(problem, warp, result);
   const LensCandidate& chosen = result.selection.candidates[result.selection.chosen];
   result.form = chosen.form;
   result.warp_m = chosen.solve->bundle.warp_m;

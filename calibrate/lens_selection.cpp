@@ -129,6 +129,32 @@ bool suffices(const LensCandidate& candidate, const LensCandidate& best) {
   return sum_of(candidate.heldout_squares) - sum_of(best.heldout_squares) <= tolerance * variance;
 }
 
+// The best and the smallest that suffices.
+void choose(LensSelection& selection) {
+  std::ranges::stable_sort(selection.candidates, {}, &LensCandidate::parameters);
+  const auto& all = selection.candidates;
+  // Without held-out views, the smallest form that can be solved at all.
+  const auto error_of = [](const LensCandidate& c) {
+    return c.solve ? c.heldout_rms_px : std::nan("");
+  };
+  bool any = false;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all[i].solve) continue;
+    if (!any || error_of(all[i]) < error_of(all[selection.best])) selection.best = i;
+    any = true;
+  }
+  if (!any) {
+    throw std::runtime_error(
+        "no lens model can be fitted to these corners: they are too few, or "
+        "are not corners of this board");
+  }
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (i != selection.best && !(all[i].solve && suffices(all[i], all[selection.best]))) continue;
+    selection.chosen = i;
+    break;
+  }
+}
+
 }  // namespace
 
 std::vector<LensForm> angular_forms() {
@@ -165,29 +191,13 @@ LensSelection select_lens(const LensProblem& problem,
   tbb::parallel_for(std::size_t{0}, forms.size(), [&](std::size_t i) {
     selection.candidates[i] = judge(problem, start, forms[i], warp, folds);
   });
-  std::ranges::stable_sort(selection.candidates, {}, &LensCandidate::parameters);
-  const auto& all = selection.candidates;
-  // Without held-out views, the smallest form that can be solved at all.
-  const auto error_of = [](const LensCandidate& c) {
-    return c.solve ? c.heldout_rms_px : std::nan("");
-  };
-  bool any = false;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (!all[i].solve) continue;
-    if (!any || error_of(all[i]) < error_of(all[selection.best])) selection.best = i;
-    any = true;
-  }
-  if (!any) {
-    throw std::runtime_error(
-        "no lens model can be fitted to these corners: they are too few, or "
-        "are not corners of this board");
-  }
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i != selection.best && !(all[i].solve && suffices(all[i], all[selection.best]))) continue;
-    selection.chosen = i;
-    break;
-  }
+  choose(selection);
   return selection;
+}
+
+void LensSelection::add(LensCandidate candidate) {
+  candidates.push_back(std::move(candidate));
+  choose(*this);
 }
 
 }  // namespace calibrate

@@ -26,6 +26,9 @@ struct LensSelection {
   std::size_t chosen = 0;
   std::size_t best = 0;  // of the least held-out error
   std::size_t folds = 0;
+
+  // Takes one more, and chooses again. Throws std::runtime_error if none can be solved.
+  void add(LensCandidate candidate);
 };
 
 // Fish-eyes and other lenses by angle: Kannala and Brandt's, from none to four terms, with and

@@ -13,7 +13,6 @@ namespace {
 constexpr double degree = std::numbers::pi / 180;
 // From these on, something is said.
 constexpr double scatter_px = 1;
-constexpr double agreement = 0.25;  // correlation of neighbours' residuals
 constexpr double bend_m = 0.0005;
 constexpr double outlier_share = 0.05;
 constexpr std::size_t few_views = 5;
@@ -60,26 +59,12 @@ void warn_of_corners(const LensProblem& problem,
     warnings.push_back(text("the board is bent by %.1f mm; that is taken into account",
                             1000 * hypotenuse(c.warp_m.x, c.warp_m.y)));
   }
-  // Noise differs from corner to corner; what is left of a wrong model does not.
-  const LensSolve& solve = c.solve();
-  const auto missed = residuals(solve.bundle, problem.board, c.start.corners);
-  const auto columns = static_cast<std::size_t>(problem.board.columns);
-  double together = 0;
-  double alone = 0;
-  for (std::size_t i = 0; i + 1 < missed.size(); ++i) {
-    const SeenCorner& a = c.start.corners[i];
-    const SeenCorner& b = c.start.corners[i + 1];
-    const bool neighbours = a.view == b.view && b.index == a.index + 1 && b.index % columns != 0;
-    if (!neighbours || solve.used[i] == 0 || solve.used[i + 1] == 0) continue;
-    together += missed[i]->x * missed[i + 1]->x + missed[i]->y * missed[i + 1]->y;
-    alone += 0.5 * (missed[i]->x * missed[i]->x + missed[i]->y * missed[i]->y +
-                    missed[i + 1]->x * missed[i + 1]->x + missed[i + 1]->y * missed[i + 1]->y);
-  }
-  if (together > agreement * alone) {
+  const double agreement = agreement_of_neighbours(problem, c.start, c.solve());
+  if (agreement > suspicious_agreement) {
     warnings.push_back(
         text("residuals of neighbouring corners agree (correlation %.2f): something is not in the "
              "model, such as a rolling shutter, a moving board or one that is bent in another way",
-             together / alone));
+             agreement));
   }
 }
 
@@ -159,6 +144,26 @@ void warn_of_coverage(const LensProblem& problem,
 }
 
 }  // namespace
+
+// Noise differs from corner to corner; what is left of a wrong model does not.
+double agreement_of_neighbours(const LensProblem& problem,
+                               const LensStart& start,
+                               const LensSolve& solve) {
+  const auto missed = residuals(solve.bundle, problem.board, start.corners);
+  const auto columns = static_cast<std::size_t>(problem.board.columns);
+  double together = 0;
+  double alone = 0;
+  for (std::size_t i = 0; i + 1 < missed.size(); ++i) {
+    const SeenCorner& a = start.corners[i];
+    const SeenCorner& b = start.corners[i + 1];
+    const bool neighbours = a.view == b.view && b.index == a.index + 1 && b.index % columns != 0;
+    if (!neighbours || solve.used[i] == 0 || solve.used[i + 1] == 0) continue;
+    together += missed[i]->x * missed[i + 1]->x + missed[i]->y * missed[i + 1]->y;
+    alone += 0.5 * (missed[i]->x * missed[i]->x + missed[i]->y * missed[i]->y +
+                    missed[i + 1]->x * missed[i + 1]->x + missed[i + 1]->y * missed[i + 1]->y);
+  }
+  return alone > 0 ? together / alone : 0;
+}
 
 std::vector<std::string> warnings_of(const LensProblem& problem,
                                      const LensCalibration& calibration) {

@@ -29,20 +29,29 @@ Mat3 turn_between(Vec3 from, Vec3 to) {
 Vec2 MadeLens::project(Vec3 v) const {
   const double off = hypotenuse(v.x, v.y);
   const double angle = std::atan2(off, v.z);
+  const double around = std::atan2(v.y, v.x);
+  const double sine = std::sin(angle);
   const double shown = angle + ripple_rad * std::sin(5 * angle);
-  const double s = off > 0 ? std::sin(shown) / off : 0;
-  return calibrate::project(lens, {v.x * s, v.y * s, std::cos(shown)}).value();
+  const double bent = around + bend_rad * sine * sine * std::sin(3 * around);
+  const double s = std::sin(shown);
+  return calibrate::project(lens, {s * std::cos(bent), s * std::sin(bent), std::cos(shown)})
+      .value();
 }
 
 std::optional<Vec3> MadeLens::unproject(Vec2 q) const {
   const auto v = calibrate::unproject(lens, q);
   if (!v) return std::nullopt;
-  const double off = hypotenuse(v->x, v->y);
-  const double shown = std::atan2(off, v->z);
+  const double shown = std::atan2(hypotenuse(v->x, v->y), v->z);
+  const double bent = std::atan2(v->y, v->x);
   double angle = shown;
-  for (int i = 0; i < 50; ++i) angle = shown - ripple_rad * std::sin(5 * angle);
-  const double s = off > 0 ? std::sin(angle) / off : 0;
-  return Vec3{v->x * s, v->y * s, std::cos(angle)};
+  double around = bent;
+  for (int i = 0; i < 50; ++i) {
+    angle = shown - ripple_rad * std::sin(5 * angle);
+    const double sine = std::sin(angle);
+    around = bent - bend_rad * sine * sine * std::sin(3 * around);
+  }
+  const double s = std::sin(angle);
+  return Vec3{s * std::cos(around), s * std::sin(around), std::cos(angle)};
 }
 
 MadeLens made_fisheye(double ripple_rad) {

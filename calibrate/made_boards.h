@@ -10,11 +10,13 @@
 
 namespace calibrate {
 
-// A lens of the family, or just outside of it: the angle off the axis has a ripple.
+// A lens of the family, or just outside of it: the angle off the axis has a ripple; or far outside:
+// the angle around it is bent.
 struct MadeLens {
   Lens lens;
-  double ripple_rad = 0;  // of five times the angle
+  double ripple_rad = 0;  // of five times the angle off the axis
   double sees_rad = 0;    // corners beyond are not in the picture
+  double bend_rad = 0;    // at the rim, of three times the angle around the axis
 
   Vec2 project(Vec3 v) const;
   std::optional<Vec3> unproject(Vec2 q) const;

@@ -261,8 +261,15 @@ LensCalibrationOptions models_of(const LensOptions& options) {
     if (fits_perspective_only) {
       throw UsageError("a fish-eye does not fit into a .cameramodel: let -o name a .toml file");
     }
+  } else if (options.model.starts_with("LENSMODEL_")) {
+    models.form = calibrate::LensForm{options.model, 0, false};
+    try {
+      free_count(*models.form);
+    } catch (const std::invalid_argument& error) {
+      throw UsageError(error.what());
+    }
   } else {
-    throw UsageError("--model is auto, perspective or fisheye");
+    throw UsageError("--model is auto, perspective, fisheye or one of mrcal's LENSMODEL_...");
   }
   return models;
 }
@@ -322,7 +329,8 @@ Command calibrate_lens_command() {
             arguments.option("-o,--out", o->out, ".cameramodel, or .toml for any lens");
             arguments.required("--out");
             arguments.option("--report", o->report, "HTML file; else beside the lens");
-            arguments.option("--model", o->model, "auto, perspective or fisheye");
+            arguments.option("--model", o->model,
+                             "auto, perspective, fisheye, or one of mrcal's LENSMODEL_...");
             arguments.option("--every", o->every, 1, 100000, "frames of a video; one in 25");
             arguments.option("--limit", o->limit_s, 0.1, 600, "seconds to look at each picture; 5");
             return [o](Console& console) { calibrate_lens(*o, console); };

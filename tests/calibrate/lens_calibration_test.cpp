@@ -122,6 +122,19 @@ TEST(CalibrateLens, ChoosesWhatFitsIntoACameraModelIfItIsAskedTo) {
   EXPECT_LE(ray_error_mrad(made_normal(), c.lens, 28), 0.4);
 }
 
+TEST(CalibrateLens, TakesASplineIfNothingSmallerFollowsAndThereAreCornersEnough) {
+  MadeLens odd = made_fisheye();
+  odd.bend_rad = 0.004;
+  MadeBoards boards;
+  boards.views = 20;
+  const LensCalibration few = calibrate_lens(make_board_views(odd, boards));
+  EXPECT_THAT(few.lens.model, Not(HasSubstr("SPLINED")));
+  boards.views = 60;
+  const LensCalibration many = calibrate_lens(make_board_views(odd, boards));
+  EXPECT_THAT(many.lens.model, HasSubstr("SPLINED"));
+  EXPECT_LT(ray_error_mrad(odd, many.lens, 86), 0.75 * ray_error_mrad(odd, few.lens, 86));
+}
+
 TEST(CalibrateLens, TellsWhatItSawAndWhatItDidNot) {
   MadeBoards options;
   options.sees_deg = 60;
