@@ -12,6 +12,7 @@
 #include <random>
 #include <string>
 
+#include "calibrate/board_drawing.h"
 #include "calibrate/charuco.h"
 #include "calibrate/corner_refinement.h"
 #include "capture/files.h"
@@ -232,7 +233,7 @@ TEST(DetectBoard, IsRightOrSilentUnderMotionBlur) {
     std::size_t last_found = 0;
     for (const double motion_px : {2., 6., 12., 24., 48.}) {
       made::BoardPictureOptions options;
-      options.motion_px = motion_px;
+      options.view.motion_px = motion_px;
       const BoardDetection found =
           detect_board(made::render_board(board, pose, pinhole, options), board, patient);
       last_found = found.view ? count_corners(*found.view) : 0;
