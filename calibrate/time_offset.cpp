@@ -255,6 +255,10 @@ void refine_by_edges(std::span<const SignalSample> a,
                      bool mirrored,
                      double interval_s,
                      TimeOffset& result) {
+  // Without exposures, frames tell of a jump only which two it lies between; at equal rates their
+  // limits then all lie in step, and promise more than they hold.
+  const auto tells_exposure = [](const SignalSample& sample) { return sample.exposure_s > 0; };
+  if (std::ranges::none_of(a, tells_exposure) || std::ranges::none_of(b, tells_exposure)) return;
   std::vector<SignalEdge> edges_b = find_edges(b);
   for (SignalEdge& edge : edges_b) edge.rising = edge.rising != mirrored;
   const double reach_s = 0.75 * interval_s;

@@ -29,6 +29,8 @@ struct OffsetOptions {
   std::string camera_b;
   std::optional<double> length_s;
   std::optional<double> largest_s;
+  std::optional<double> exposure_a_s;
+  std::optional<double> exposure_b_s;
 };
 
 // Of about ten thousand pixels; what is not finite has no light.
@@ -50,14 +52,18 @@ double brightness_of(const capture::Image& image) {
   return sum / count;
 }
 
-std::vector<calibrate::SignalSample> watch(capture::Camera& camera, double length_s) {
+// `exposure_s` is that of frames which do not tell theirs.
+std::vector<calibrate::SignalSample> watch(capture::Camera& camera,
+                                           double length_s,
+                                           double exposure_s) {
   using Seconds = std::chrono::duration<double>;
   std::vector<calibrate::SignalSample> signal;
   while (const std::optional<capture::Frame> frame = camera.next()) {
     if (frame->status == capture::FrameStatus::lost || frame->image == nullptr) continue;
     const double time_s = Seconds(frame->time).count();
     if (!signal.empty() && time_s <= signal.back().time_s) continue;
-    signal.push_back({time_s, brightness_of(*frame->image), frame->exposure_s});
+    signal.push_back({time_s, brightness_of(*frame->image),
+                      frame->exposure_s > 0 ? frame->exposure_s : exposure_s});
     if (time_s - signal.front().time_s >= length_s) break;
   }
   return signal;
@@ -77,8 +83,10 @@ void calibrate_offset(const OffsetOptions& options, Console& console) {
         "for {:.0f} s, switch a lamp that both cameras see on and off, at random", length_s));
   }
   // Both at a time: live cameras would wait for each other.
-  auto watching = std::async(std::launch::async, [&] { return watch(*camera_b, length_s); });
-  const auto a = watch(*camera_a, length_s);
+  auto watching = std::async(std::launch::async, [&] {
+    return watch(*camera_b, length_s, options.exposure_b_s.value_or(0));
+  });
+  const auto a = watch(*camera_a, length_s, options.exposure_a_s.value_or(0));
   const auto b = watching.get();
   calibrate::TimeOffsetOptions search;
   search.largest_s = options.largest_s.value_or(search.largest_s);
@@ -91,7 +99,15 @@ void calibrate_offset(const OffsetOptions& options, Console& console) {
                        {"overlap_s", found.overlap_s},
                        {"frames", {a.size(), b.size()}}}
                       .dump(2));
-  if (found.sigma_s > aimed_at_s) {
+  const auto tells_none = [](const std::vector<calibrate::SignalSample>& signal) {
+    return std::ranges::all_of(signal, [](const auto& sample) { return sample.exposure_s == 0; });
+  };
+  if (tells_none(a) || tells_none(b)) {
+    console.warn(fmt::format(
+        "{} does not tell its exposures, so that the lamp's moments are only known to a frame: "
+        "say them by --exposure-{}",
+        tells_none(a) ? options.camera_a : options.camera_b, tells_none(a) ? "a" : "b"));
+  } else if (found.sigma_s > aimed_at_s) {
     console.warn(fmt::format(
         "the offset is uncertain by more than a millisecond: watch for longer than {:.0f} s, or "
         "with longer exposures",
@@ -116,6 +132,9 @@ Command calibrate_offset_command() {
             arguments.option("--seconds", o->length_s, 1, 600, "how long to watch; 20 if not said");
             arguments.option("--largest", o->largest_s, 0.01, 60,
                              "seconds that the offset may be at most; 5 if not said");
+            arguments.option("--exposure-a", o->exposure_a_s, 1e-6, 10,
+                             "seconds, where the first camera does not tell them, as in videos");
+            arguments.option("--exposure-b", o->exposure_b_s, 1e-6, 10, "and of the second");
             return [o](Console& console) { calibrate_offset(*o, console); };
           }};
 }
