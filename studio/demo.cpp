@@ -16,6 +16,7 @@
 #include "render/made_car.h"
 #include "render/made_lamp.h"
 #include "render/made_park.h"
+#include "studio/demo_calibration.h"
 #include "studio/demo_files.h"
 
 namespace studio {
@@ -124,6 +125,11 @@ DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progres
   capture::write_exr((truth / "environment.exr").string(),
                      render::add_light(around, strength_at(0)));
   write_demo_cameras(settings.dir, studio);
+  if (court) {
+    progress(0.58, "calibration");
+    write_demo_calibration(settings.dir / "calibration", studio,
+                           {first_radiance, render::add_light(probe, strength_at(0))});
+  }
   figures.set = settings.dir / (court ? "car.toml" : "park_car.toml");
   write_text(figures.set, court ? court_set(studio, "") : park_set(studio, ""));
   write_demo_truth(truth / "truth.json", settings, studio);

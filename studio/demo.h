@@ -66,6 +66,8 @@ std::vector<render::LocalLight> lights_of_lamp(const render::MadeStudio& studio,
 //   plate.csv              of the park: where the camera was
 //   probe/                 the fish-eye's shots and frames.csv
 //   scene.cameramodel, probe.toml   the lenses
+//   calibration/           of the court: boards, markers and a lamp before both cameras
+//                          (demo_calibration.h)
 //   truth/truth.json       what all of it was made with
 //   truth/environment.exr  the light at the probe, latitude-longitude, at time 0
 //   truth/plate_linear_0000.exr   frame 0 without noise
