@@ -28,6 +28,8 @@ class Arguments {
 
   // Required, in order: "SET", "the set file".
   void positional(const std::string& name, std::string& target, const std::string& help);
+  // May be left out; the only positional.
+  void optional_positional(const std::string& name, std::string& target, const std::string& help);
   // One or more; the last positional.
   void positionals(const std::string& name,
                    std::vector<std::string>& target,

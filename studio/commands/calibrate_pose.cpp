@@ -1,4 +1,4 @@
-// platelight calibrate pose: where a camera stands and looks, from surveyed markers.
+// platelight calibrate pose: where a camera stands and looks, from surveyed markers or a board.
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -10,9 +10,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/board_detector.h"
+#include "calibrate/corner_refinement.h"
 #include "calibrate/markers.h"
 #include "calibrate/pose_file.h"
 #include "calibrate/registration.h"
+#include "capture/camera.h"
+#include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
 
@@ -25,11 +29,20 @@ constexpr double degree = std::numbers::pi / 180;
 
 struct PoseOptions {
   std::string lens;
-  std::string markers;
-  std::string picture;
   std::string out;
   std::optional<double> noise_px;
+  // By markers
+  std::string markers;
+  std::string picture;
+  // By a board
+  std::string board_picture;
+  BoardOptions board;
+  std::string board_pose;
 };
+
+// board_from_set of a board that lies on the ground at the origin: the set's x runs along its rows,
+// y up its columns, and z is up.
+const calibrate::Pose lying{{{1, 0, 0, 0, -1, 0, 0, 0, -1}}, {}};
 
 Json markers_json(const std::vector<calibrate::Marker>& markers,
                   const calibrate::Registration& found) {
@@ -43,11 +56,37 @@ Json markers_json(const std::vector<calibrate::Marker>& markers,
   return list;
 }
 
+// The corners of a board whose place in the set is known.
+std::vector<calibrate::Marker> find_board(const PoseOptions& options, const calibrate::Lens& lens) {
+  const calibrate::Board board = board_of(options.board);
+  const calibrate::Pose board_from_set =
+      options.board_pose.empty() ? lying : calibrate::read_pose(options.board_pose);
+  const auto frame = capture::open_camera(options.board_picture)->next();
+  if (!frame || frame->image == nullptr) {
+    throw std::runtime_error(options.board_picture + ": has no picture");
+  }
+  if (frame->image->width != lens.width || frame->image->height != lens.height) {
+    throw std::runtime_error(fmt::format("{}: is {}x{}, but {} is of {}x{}", options.board_picture,
+                                         frame->image->width, frame->image->height, options.lens,
+                                         lens.width, lens.height));
+  }
+  const calibrate::GreyPicture grey = calibrate::grey_picture(*frame->image);
+  calibrate::DetectionOptions detection;
+  detection.lens = lens;
+  const calibrate::BoardDetection found = calibrate::detect_board(grey, board, detection);
+  if (!found.view) throw std::runtime_error(options.board_picture + ": " + found.reason);
+  const calibrate::BoardView refined = calibrate::refine_corners(grey, *found.view, board, lens);
+  const bool better = count_corners(refined) > count_corners(*found.view) / 2;
+  return markers_of(board, better ? refined : *found.view, inverse(board_from_set));
+}
+
 void say_markers(const std::vector<calibrate::Marker>& markers,
                  const calibrate::Registration& found,
+                 bool all,
                  Console& console) {
-  console.say("marker                    off by, px");
+  if (all) console.say("marker                    off by, px");
   for (std::size_t i = 0; i < markers.size(); ++i) {
+    if (!all && found.agrees[i]) continue;
     const calibrate::Vec2 r = found.residuals_px[i];
     console.say(fmt::format("{:<25} {:>10.2f}{}", markers[i].name, std::hypot(r.x, r.y),
                             found.agrees[i] ? "" : "  left out"));
@@ -56,14 +95,22 @@ void say_markers(const std::vector<calibrate::Marker>& markers,
 
 void calibrate_pose(const PoseOptions& options, Console& console) {
   check_pose_file_name(options.out);
+  const bool by_board = !options.board_picture.empty();
+  if (by_board == !options.markers.empty()) {
+    throw UsageError("give --markers, or the PICTURE of a board");
+  }
+  const std::string& source = by_board ? options.board_picture : options.markers;
+  const std::string what = by_board ? "corners" : "markers";
+  const double usual_noise_px = by_board ? 0.2 : 0.5;
   const calibrate::Lens lens = calibrate::read_lens(options.lens);
-  const std::vector<calibrate::Marker> markers = read_markers_of(options.markers, options.picture);
+  const std::vector<calibrate::Marker> markers =
+      by_board ? find_board(options, lens) : read_markers_of(options.markers, options.picture);
   const calibrate::Registration found = [&] {
     try {
       return calibrate::register_camera(calibrate::sights_of(lens, markers),
-                                        {options.noise_px.value_or(0.5)});
+                                        {options.noise_px.value_or(usual_noise_px)});
     } catch (const std::runtime_error& error) {
-      throw std::runtime_error(fmt::format("{}: {}", options.markers, error.what()));
+      throw std::runtime_error(fmt::format("{}: {}", source, error.what()));
     }
   }();
   const double sigma_deg = found.turn_sigma_rad / degree;
@@ -81,35 +128,41 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   figures["markers"] = markers_json(markers, found);
   figures["warnings"] = found.warnings;
   write_pose_file(options.out, found.cam_from_set, lens,
-                  fmt::format("by platelight calibrate pose, from {} markers: +- {:.2g} degrees, "
+                  fmt::format("by platelight calibrate pose, from {} {}: +- {:.2g} degrees, "
                               "+- {:.2g} mm",
-                              markers.size(), sigma_deg, sigma_mm));
-  say_markers(markers, found, console);
+                              markers.size(), what, sigma_deg, sigma_mm));
+  say_markers(markers, found, !by_board, console);
   say_pose(found.cam_from_set, sigma_deg, sigma_mm, console);
   console.figures(figures.dump(2));
   for (const std::string& warning : found.warnings) console.warn(warning);
-  console.say(
-      fmt::format("{}: from {} markers, {:.2f} px off", options.out, markers.size(), found.rms_px));
+  console.say(fmt::format("{}: from {} {}, {:.2f} px off", options.out, markers.size(), what,
+                          found.rms_px));
 }
 
 }  // namespace
 
 Command calibrate_pose_command() {
-  return {"calibrate pose", "Find where a camera stands and looks from surveyed markers",
+  return {"calibrate pose", "Find where a camera stands and looks, from markers or a board",
           "platelight calibrate pose --lens scene.cameramodel --markers markers.toml -o pose.toml",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto o = std::make_shared<PoseOptions>();
             arguments.option("--lens", o->lens, "the lens: a .toml or .cameramodel file");
             arguments.required("--lens");
+            arguments.optional_positional("PICTURE", o->board_picture,
+                                          "of a board that lies in the set");
+            declare(arguments, o->board);
+            arguments.option("--board-pose", o->board_pose,
+                             "where the board is, a file of its pose; else it lies on the ground, "
+                             "its first corner at the origin, x along its rows");
             arguments.option("--markers", o->markers,
                              ".toml file of points in the set and their pixels");
-            arguments.required("--markers");
             arguments.option("--picture", o->picture, "only the markers of this picture");
             arguments.option("-o,--out", o->out,
                              ".toml file with the line for a set, or .cameramodel with extrinsics");
             arguments.required("--out");
             arguments.option("--noise", o->noise_px, 1e-3, 100,
-                             "expected error of a marker's pixel along each axis; 0.5 if not said");
+                             "expected error of a marker's pixel along each axis; 0.5 if not said, "
+                             "0.2 of a board's corners");
             return [o](Console& console) { calibrate_pose(*o, console); };
           }};
 }

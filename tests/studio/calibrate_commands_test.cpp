@@ -16,6 +16,8 @@
 #include "calibrate/lens.h"
 #include "calibrate/pose_file.h"
 #include "capture/exr.h"
+#include "capture/png.h"
+#include "tests/calibrate/made_board_picture.h"
 #include "tests/calibrate/made_lamps.h"
 #include "tests/calibrate/made_markers.h"
 #include "tests/studio/command_line.h"
@@ -96,6 +98,42 @@ TEST_F(CalibrateCommands, PoseOfMrcalsLensesGoesIntoTheirFiles) {
   const calibrate::CameraModel model = calibrate::read_camera_model(path("posed.cameramodel"));
   EXPECT_EQ(model.lens, lens);
   EXPECT_LT(made::error_of(*model.cam_from_ref, truth).turn_rad, 0.002);
+}
+
+TEST_F(CalibrateCommands, PoseComesFromABoardThatLiesInTheSet) {
+  const calibrate::Lens lens{"LENSMODEL_PINHOLE", 640, 480, {600, 600, 319.5, 239.5}};
+  const calibrate::Board board{calibrate::Board::Kind::chessboard, 9, 6, 0.05, 0, ""};
+  // Seen from behind the row that is farthest down in the board: the set's y runs away from there.
+  const calibrate::Pose truth = calibrate::look_at({0.3, -0.8, 0.6}, {0.2, -0.12, 0}, 0.05);
+  const calibrate::Pose set_from_board{{{1, 0, 0, 0, -1, 0, 0, 0, -1}}, {}};
+  const auto picture = made::render_board(board, truth * set_from_board, lens, {.noise = 1});
+  capture::write_png(dir_ / "board.png", lens.width, lens.height, 1, picture.pixels);
+  calibrate::write_lens(path("lens.toml"), lens);
+  const std::string pose = "calibrate pose " + path("board.png") + " --lens " + path("lens.toml") +
+                           " --square 0.05 -o " + path("pose.toml") + " --board ";
+  const std::string command = pose + "9x6";
+  const Outcome outcome = run_with_figures(command);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("54 corners"));
+  EXPECT_LT(figures()["rms_px"], 0.2);
+  const made::PoseError error = made::error_of(calibrate::read_pose(path("pose.toml")), truth);
+  EXPECT_LT(error.turn_rad / made::degree, 0.05);
+  EXPECT_LT(error.position_m, 0.001);
+
+  // The same board a metre higher and further to the right.
+  const std::string place = write("board.toml",
+                                  "pose = { position = [1, 0, 1], "
+                                  "rotation = [1, 0, 0, 0, -1, 0, 0, 0, -1] }\n");
+  ASSERT_EQ(run(command + " --board-pose " + place).status, 0);
+  const calibrate::Pose moved = calibrate::read_pose(path("pose.toml"));
+  EXPECT_LT(length(position_of(moved) - position_of(truth) - calibrate::Vec3{1, 0, 1}), 0.001);
+
+  const Outcome absent = run(pose + "10x7");
+  EXPECT_EQ(absent.status, 1);
+  expect_one_line(absent.err);
+  EXPECT_THAT(absent.err, HasSubstr("board.png"));
+  EXPECT_EQ(run(command + " --markers " + place).status, 2);
+  EXPECT_EQ(run("calibrate pose --lens " + path("lens.toml") + " -o " + path("a.toml")).status, 2);
 }
 
 TEST_F(CalibrateCommands, PoseSaysWhatIsMissing) {
