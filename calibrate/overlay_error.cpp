@@ -16,23 +16,15 @@ namespace calibrate {
 namespace {
 
 constexpr double cells_of_diagonal = 32;
-// 95 % of a normal error's length: in one direction only, and of one alike in all directions.
-constexpr double line_95 = 1.9600;
-constexpr double round_95 = 2.4477;
+// The farthest point of the ellipse that holds 95 % of a normal error, in standard deviations of
+// its worst direction.
+constexpr double ellipse_95 = 2.4477;
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// 95 % of the length of a normal error with this covariance. Between the two cases above the square
-// is nearly linear in the ratio of the variances.
-double length_95(const OverlayError::Covariance& c) {
-  const double middle = 0.5 * (c.xx + c.yy);
-  const double spread = std::hypot(0.5 * (c.xx - c.yy), c.xy);
-  const double most = middle + spread;
-  const double least = std::max(middle - spread, 0.0);
-  if (!(most > 0)) return 0;
-  const double ratio = least / most;
-  return std::sqrt(most * (line_95 * line_95 +
-                           (round_95 * round_95 - line_95 * line_95) * std::pow(ratio, 1.35)));
+double farthest_of_95(const OverlayError::Covariance& c) {
+  const double most = 0.5 * (c.xx + c.yy) + std::hypot(0.5 * (c.xx - c.yy), c.xy);
+  return ellipse_95 * std::sqrt(std::max(most, 0.0));
 }
 
 // A change of the free parameters as it shows at a direction: 2 x n, and 2 x 3 for a turn.
@@ -223,7 +215,7 @@ std::optional<double> OverlayError::at(Vec2 q) const {
     shares += member.share;
   }
   if (!(shares > 0)) return std::nullopt;
-  return length_95({sum.xx / shares, sum.xy / shares, sum.yy / shares});
+  return farthest_of_95({sum.xx / shares, sum.xy / shares, sum.yy / shares});
 }
 
 }  // namespace calibrate

@@ -16,8 +16,10 @@ struct BelievedSolve {
   double share = 1;  // of all forms'; they add up to 1
 };
 
-// The predicted error at each pixel: the distance in pixels that 95 of 100 calibrations like this
-// one stay below, once the camera's pose has been found through the same lens (a turn of the camera
+// The predicted error at each pixel: the distance in pixels that at least 95 of 100 calibrations
+// like this one stay below (the far end of the 95 % ellipse: errors of one calibration stand and
+// fall together, so a length that just 95 % of pixels hold would be broken all over the picture by
+// one in twenty), once the camera's pose has been found through the same lens (a turn of the camera
 // is part of its pose, not of the lens's error).
 //
 // Three things go into it. The corners' noise, carried from residuals through the solve to the
