@@ -50,6 +50,12 @@ Box box_of(const Board& board, const Pose& cam_from_board, const Lens& lens) {
   return box;
 }
 
+// By so many pixels, within the picture.
+Box grown(const Box& box, int reach, const Lens& lens) {
+  return {std::max(box.x0 - reach, 0), std::max(box.y0 - reach, 0),
+          std::min(box.x1 + reach, lens.width - 1), std::min(box.y1 + reach, lens.height - 1)};
+}
+
 // What is in the box, by a row of taps along a direction: a Gaussian, or with sigma < 0 an even one
 // -sigma pixels long.
 void smear(capture::Image& image, const Box& box, double sigma, double angle_rad) {
@@ -160,34 +166,42 @@ capture::Image photograph_board(const Board& board,
     const double share = drawn.at(static_cast<int>(ty), static_cast<int>(tx)) / 255.0;
     return view.black + (view.white - view.black) * share;
   };
-  capture::Image picture = room;
-  const Box box = box_of(board, cam_from_board, lens);
+  // Of each pixel the board's light and its share, blurred together; the room is as it is.
+  capture::Image layer = capture::make_image(lens.height, lens.width, 2);
+  const int reach = static_cast<int>(std::ceil(3 * view.blur_px + view.motion_px));
+  const Box box = grown(box_of(board, cam_from_board, lens), reach, lens);
   for (int y = box.y0; y <= box.y1; ++y) {
     for (int x = box.x0; x <= box.x1; ++x) {
       const auto pixel = directions_in(directions, y, x);
       if (!pixel) continue;
-      double sum = 0;
+      double light = 0;
       int hits = 0;
       for (int s = 0; s < fine * fine; ++s) {
         const double right = (s % fine + 0.5) / fine - 0.5;
         const double down = (s / fine + 0.5) / fine - 0.5;
         const auto value = value_of(pixel->middle + pixel->per_x * right + pixel->per_y * down);
         if (!value) continue;
-        sum += *value;
+        light += *value;
         ++hits;
       }
-      for (int c = 0; c < picture.channels; ++c) {
-        float& entry = picture.at(y, x, c);
-        entry = static_cast<float>((sum + (fine * fine - hits) * static_cast<double>(entry)) /
-                                   (fine * fine));
-      }
+      layer.at(y, x, 0) = static_cast<float>(light / (fine * fine));
+      layer.at(y, x, 1) = static_cast<float>(hits) / (fine * fine);
     }
   }
   if (view.blur_px > 0) {
-    smear(picture, box, view.blur_px, 0);
-    smear(picture, box, view.blur_px, std::numbers::pi / 2);
+    smear(layer, box, view.blur_px, 0);
+    smear(layer, box, view.blur_px, std::numbers::pi / 2);
   }
-  if (view.motion_px > 0) smear(picture, box, -view.motion_px, view.motion_rad);
+  if (view.motion_px > 0) smear(layer, box, -view.motion_px, view.motion_rad);
+  capture::Image picture = room;
+  for (int y = box.y0; y <= box.y1; ++y) {
+    for (int x = box.x0; x <= box.x1; ++x) {
+      for (int c = 0; c < picture.channels; ++c) {
+        float& value = picture.at(y, x, c);
+        value = layer.at(y, x, 0) + (1 - layer.at(y, x, 1)) * value;
+      }
+    }
+  }
   return picture;
 }
 

@@ -36,9 +36,9 @@ std::vector<std::optional<Vec2>> true_corners(const Board& board,
                                               const Pose& cam_from_board,
                                               const Lens& lens);
 
-// The board, with a white border of one square, before `room`, (height, width, channels): 3x3 rays
-// a pixel over the board, which is blurred with what is around it; `room` is as the camera sees it.
-// `directions` are the lens's. Throws std::invalid_argument if sizes differ or the board cannot be.
+// The board, with a white border of one square, before `room`, (height, width, channels), which is
+// as the camera sees it: 3x3 rays a pixel, then the board's blur. `directions` are the lens's.
+// Throws std::invalid_argument if sizes differ or the board cannot be.
 capture::Image photograph_board(const Board& board,
                                 const Pose& cam_from_board,
                                 const Lens& lens,

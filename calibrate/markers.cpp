@@ -175,7 +175,8 @@ std::vector<Sight> sights_of(const Lens& lens, std::span<const Marker> markers) 
     if (!sight) {
       throw std::runtime_error("marker " + quoted(marker.name) + ": the lens sees nothing at [" +
                                to_text(marker.q.x) + ", " + to_text(marker.q.y) +
-                               "]; check the pixel, and that the lens is this camera's");
+                               "]; check the pixel, that the lens is this camera's, and that its " +
+                               "boards reached so far out");
     }
     sights.push_back(*sight);
   }

@@ -90,7 +90,7 @@ Pose hold_board(const calibrate::Board& board,
     const double distance_m =
         board.square_m / (square_px * (1.2 + 0.2 * uniform(random)) * pixel_rad);
     held = make_board_pose(board, *v, distance_m, tilt_rad, spin_rad, random);
-    if (is_seen_whole(board, *held, lens, 0.3 * square_px, 0.6 * square_px)) break;
+    if (is_seen_whole(board, *held, lens, 0.3 * square_px, 0.72 * square_px)) break;
   }
   return held.value();
 }
@@ -117,7 +117,7 @@ std::vector<Pose> boards_before_probe(const calibrate::Lens& lens, std::mt19937&
     poses.push_back(hold_board(demo_board(), lens,
                                {lens.width * (0.5 + radius * std::cos(angle)),
                                 lens.height * (0.5 + radius * std::sin(angle))},
-                               lens.width / 27.0, std::numbers::pi, random));
+                               lens.width / 25.0, std::numbers::pi, random));
   };
   hold(0, 0);
   hold(0.05, 0.3);
@@ -189,12 +189,15 @@ std::vector<SurveyedPoint> survey() {
 void write_markers(const fs::path& file, const render::MadeCamera& camera, std::mt19937& random) {
   const calibrate::Lens& lens = camera.lens;
   const double margin_px = lens.width / 100.0;
+  // Further out, a fish-eye is not calibrated well: boards do not reach the rim.
+  const double least_cosine = std::cos(80 * std::numbers::pi / 180);
   std::normal_distribution<double> noise(0, demo_marker_noise_px);
   std::string text = "# Surveyed points, and where they were marked in a picture.\n";
   for (const SurveyedPoint& point : survey()) {
-    const auto q = project(lens, camera.cam_from_set * point.p_set);
-    if (!q || q->x < margin_px || q->y < margin_px || q->x > lens.width - 1 - margin_px ||
-        q->y > lens.height - 1 - margin_px) {
+    const Vec3 p_cam = camera.cam_from_set * point.p_set;
+    const auto q = project(lens, p_cam);
+    if (!q || p_cam.z < least_cosine * length(p_cam) || q->x < margin_px || q->y < margin_px ||
+        q->x > lens.width - 1 - margin_px || q->y > lens.height - 1 - margin_px) {
       continue;
     }
     const double x = q->x + noise(random);
@@ -204,6 +207,13 @@ void write_markers(const fs::path& file, const render::MadeCamera& camera, std::
         point.name, point.p_set.x, point.p_set.y, point.p_set.z, x, y);
   }
   write_text(file, text);
+}
+
+void write_patches(const fs::path& file, const render::MadeStudio& studio) {
+  const auto card = render::picture_of_card(studio);
+  write_text(file, fmt::format("# The grey card on the ground.\n[[patch]]\n"
+                               "pixels = [{}, {}, {}, {}]\nalbedo = {}\n",
+                               card[0], card[1], card[2], card[3], render::court_card.albedo));
 }
 
 constexpr double lamp_length_s = 10;
@@ -318,6 +328,7 @@ void write_demo_calibration(const fs::path& dir,
   write_boards(dir / "probe", studio.probe, rooms.probe, probe);
   write_markers(dir / "plate_markers.toml", studio.plate, random);
   write_markers(dir / "probe_markers.toml", studio.probe, random);
+  write_patches(dir / "patches.toml", studio);
   const std::vector<double> switched_s = switch_lamp(random);
   write_lamp(dir / "plate_lamp.mkv", studio.plate, rooms.plate, 0, switched_s);
   write_lamp(dir / "probe_lamp.mkv", studio.probe, rooms.probe, -demo_offset_s(studio), switched_s);

@@ -29,6 +29,7 @@ struct DemoRooms {
 //   probe/00.png...      and before the fish-eye, out to its rim
 //   plate_markers.toml   marks on the ground and on poles around the car's place, surveyed
 //   probe_markers.toml   the same ones, as the fish-eye sees them
+//   patches.toml         the grey card in the plate
 //   plate_lamp.mkv       ten seconds in which a lamp is switched at random
 //   probe_lamp.mkv       the same of the fish-eye; its recording begins as much before the plate's
 //                        as that of the take does

@@ -75,10 +75,16 @@ void say_pose(const calibrate::Pose& cam_from_set,
   const calibrate::Vec3 axis = row(cam_from_set.R, 2);
   console.say(fmt::format("position [{:.4f}, {:.4f}, {:.4f}] m{}", p.x, p.y, p.z,
                           sigma_mm > 0 ? fmt::format(", +- {:.2g} mm", sigma_mm) : ", as given"));
-  console.say(
-      fmt::format("looks along [{:.5f}, {:.5f}, {:.5f}], rolled {:.3f} degrees, +- {:.2g} "
-                  "degrees",
-                  axis.x, axis.y, axis.z, roll_of(cam_from_set) / degree, sigma_deg));
+  // Of what looks straight up or down, the roll turns with the least tilt.
+  constexpr double nearly_vertical = 0.999;
+  const calibrate::Vec3 top = -row(cam_from_set.R, 1);
+  const std::string turned =
+      std::abs(axis.z) > nearly_vertical
+          ? fmt::format("the top of its picture towards [{:.4f}, {:.4f}, {:.4f}]", top.x, top.y,
+                        top.z)
+          : fmt::format("rolled {:.3f} degrees", roll_of(cam_from_set) / degree);
+  console.say(fmt::format("looks along [{:.5f}, {:.5f}, {:.5f}], {}, +- {:.2g} degrees", axis.x,
+                          axis.y, axis.z, turned, sigma_deg));
 }
 
 }  // namespace studio
