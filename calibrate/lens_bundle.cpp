@@ -11,10 +11,10 @@
 #include <ceres/ordered_groups.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
-#include <glog/logging.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "calibrate/keep_ceres_quiet.h"
 #include "calibrate/rotation_vector.h"
 
 namespace calibrate {
@@ -109,15 +109,6 @@ class CornerCost : public ceres::CostFunction {
   Vec2 weights_;
   Vec2 q_;
 };
-
-// Ceres writes to stderr through glog, even of a step that it then makes shorter.
-void keep_ceres_quiet() {
-  static const bool once = [] {
-    FLAGS_minloglevel = google::GLOG_FATAL;
-    return true;
-  }();
-  static_cast<void>(once);
-}
 
 ceres::Solver::Options solver_options(const BundleOptions& options) {
   ceres::Solver::Options result;

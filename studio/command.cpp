@@ -71,6 +71,7 @@ std::span<const Command> commands() {
       calibrate_vignetting_command(),
       calibrate_board_command(),
       calibrate_lens_command(),
+      calibrate_lines_command(),
       calibrate_pose_command(),
       calibrate_probe_command(),
       calibrate_offset_command(),

@@ -8,6 +8,7 @@ namespace studio {
 Command bench_command();
 Command calibrate_board_command();
 Command calibrate_light_command();
+Command calibrate_lines_command();
 Command calibrate_offset_command();
 Command calibrate_lens_command();
 Command calibrate_pose_command();

@@ -56,6 +56,27 @@ std::string markers_text(const calibrate::Lens& lens,
   return text;
 }
 
+TEST_F(CalibrateCommands, LensOfTheDeskComesFromItsLinesWithoutBoards) {
+  const std::string lines = PLATELIGHT_SOURCE_DIR "/tests/data/desk_lines.toml";
+  const Outcome outcome = run_with_figures("calibrate lines " + lines + " -o " + path("lens.toml"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("vertical: 8 lines agree to 0."));
+  EXPECT_THAT(outcome.out, HasSubstr("the camera is rolled by -2."));
+  const Json found = figures();
+  EXPECT_LT(found["parallels"][0]["rms_deg"], 0.5);
+  EXPECT_NEAR(found["rectangles"][0]["aspect"], 2.77, 0.03);
+  EXPECT_NEAR(found["roll_deg"], -2.6, 0.5);
+  const calibrate::Lens lens = calibrate::read_lens(path("lens.toml"));
+  EXPECT_EQ(lens.model, "equisolid");
+  EXPECT_EQ(lens.parameters[0], found["focal_px"]);
+  EXPECT_NEAR(lens.max_angle_rad / made::degree, 93, 1e-9);
+
+  EXPECT_EQ(run("calibrate lines " + lines + " -o " + path("lens.cameramodel")).status, 2);
+  const Outcome wrong = run("calibrate lines " + lines + " --model fish -o " + path("lens.toml"));
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("equisolid or equidistant"));
+}
+
 TEST_F(CalibrateCommands, PoseOfAFishEyeComesOutAsALineForASet) {
   const calibrate::Pose truth = calibrate::look_at({0.4, -0.3, 1.2}, {2, 1, 0}, 0.1);
   calibrate::write_lens(path("lens.toml"), made::fish_eye());
