@@ -47,8 +47,8 @@ Lens cropped(const Lens& lens, int x, int y, int width, int height);
 // Lens of the same picture at another size (area-scaled: pixel edges map to pixel edges).
 Lens resized(const Lens& lens, int width, int height);
 
-// Reads mrcal's .cameramodel, or our .toml lens, by the file's ending. A .cameramodel's pose comes
-// along if asked for. Throws std::runtime_error with path, line where known, and reason.
+// Reads mrcal's .cameramodel, our .toml lens, or OpenCV's .yml, .yaml or .xml (opencv_lens.h), by
+// the file's ending. Throws std::runtime_error with path, line where known, and reason.
 Lens read_lens(const std::string& path);
 void write_lens(const std::string& path, const Lens& lens);
 

@@ -1,4 +1,4 @@
-// Lenses in files: .toml, and mrcal's .cameramodel.
+// Lenses in files: .toml, mrcal's .cameramodel, and OpenCV's.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +11,7 @@
 #include "calibrate/camera_model.h"
 #include "calibrate/lens.h"
 #include "calibrate/mrcal_lens.h"
+#include "calibrate/opencv_lens.h"
 #include "calibrate/text_file.h"
 
 namespace calibrate {
@@ -187,12 +188,20 @@ void write_toml_lens(const std::string& path, const Lens& lens) {
   write_text_file(path, text);
 }
 
+bool is_opencv_name(const std::string& path) {
+  return path.ends_with(".yml") || path.ends_with(".yaml") || path.ends_with(".xml");
+}
+
+constexpr const char* known_endings =
+    ": a lens file must end in .cameramodel or .toml, or be OpenCV's .yml, .yaml or .xml";
+
 }  // namespace
 
 Lens read_lens(const std::string& path) {
   if (path.ends_with(".cameramodel")) return read_camera_model(path).lens;
   if (path.ends_with(".toml")) return read_toml_lens(path);
-  throw std::runtime_error(path + ": a lens file must end in .cameramodel or .toml");
+  if (is_opencv_name(path)) return read_opencv_lens(path);
+  throw std::runtime_error(path + known_endings);
 }
 
 void write_lens(const std::string& path, const Lens& lens) {
@@ -200,8 +209,10 @@ void write_lens(const std::string& path, const Lens& lens) {
     write_camera_model(path, {lens, std::nullopt});
   } else if (path.ends_with(".toml")) {
     write_toml_lens(path, lens);
+  } else if (is_opencv_name(path)) {
+    write_opencv_lens(path, lens);
   } else {
-    throw std::runtime_error(path + ": a lens file must end in .cameramodel or .toml");
+    throw std::runtime_error(path + known_endings);
   }
 }
 

@@ -46,7 +46,7 @@ TEST(ReadLens, TakesAnglesInDegreesUpToHalfTheSphere) {
 }
 
 TEST(ReadLens, RefusesFilesOfOtherKindsAndMissingOnes) {
-  EXPECT_THROW(read_lens("lens.xml"), std::runtime_error);
+  EXPECT_THROW(read_lens("lens.json"), std::runtime_error);
   EXPECT_THROW(read_lens("/nowhere/lens.toml"), std::runtime_error);
   EXPECT_THROW(read_lens("/nowhere/lens.cameramodel"), std::runtime_error);
 }
