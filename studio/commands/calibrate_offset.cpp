@@ -102,16 +102,16 @@ void calibrate_offset(const OffsetOptions& options, Console& console) {
   const auto tells_none = [](const std::vector<calibrate::SignalSample>& signal) {
     return std::ranges::all_of(signal, [](const auto& sample) { return sample.exposure_s == 0; });
   };
-  if (tells_none(a) || tells_none(b)) {
-    console.warn(fmt::format(
-        "{} does not tell its exposures, so that the lamp's moments are only known to a frame: "
-        "say them by --exposure-{}",
-        tells_none(a) ? options.camera_a : options.camera_b, tells_none(a) ? "a" : "b"));
-  } else if (found.sigma_s > aimed_at_s) {
-    console.warn(fmt::format(
-        "the offset is uncertain by more than a millisecond: watch for longer than {:.0f} s, or "
-        "with longer exposures",
-        length_s));
+  if (found.sigma_s > aimed_at_s) {
+    const bool unknown = tells_none(a) || tells_none(b);
+    console.warn(
+        unknown ? fmt::format("the offset is uncertain by more than a millisecond: {} does not "
+                              "tell its exposures; say them by --exposure-{}",
+                              tells_none(a) ? options.camera_a : options.camera_b,
+                              tells_none(a) ? "a" : "b")
+                : fmt::format("the offset is uncertain by more than a millisecond: watch for "
+                              "longer than {:.0f} s, or with longer exposures",
+                              length_s));
   }
   console.say(fmt::format("{} stamps its frames {:.2f} +- {:.2f} ms {} than {}", options.camera_b,
                           1000 * std::abs(found.offset_s), 1000 * found.sigma_s,
