@@ -286,7 +286,7 @@ TEST(DetectBoard, EndsFindersThatNeverEnd) {
   const BoardDetection found = detect_board(noise_picture(64, 48), chessboard, options);
   EXPECT_FALSE(found.view);
   EXPECT_THAT(found.reason, HasSubstr("no board within the time limit of 0.6 s: "));
-  EXPECT_THAT(found.reason, HasSubstr("findChessboardCorners was ended after 0.1 s"));
+  EXPECT_THAT(found.reason, HasSubstr("findChessboardCorners was ended after"));
   EXPECT_LT(found.time_ms, 600 + 2000);
 }
 
