@@ -82,10 +82,6 @@ void leave_out(LensProblem& problem, std::vector<ViewReport>& reports) {
   }
 }
 
-std::size_t count(std::span<const std::uint8_t> flags) {
-  return static_cast<std::size_t>(std::ranges::count_if(flags, [](auto f) { return f != 0; }));
-}
-
 // A robust solve that begins with few parameters and ends with many, so that no outlier is taken
 // for the lens, and nothing of the lens for an outlier.
 struct Robust {
@@ -100,8 +96,8 @@ std::optional<Robust> solve_robustly(const LensProblem& problem,
     const LensStart& from = result ? result->start : start;
     auto solve = solve_lens(problem, form, from, {.warp = true});
     if (!solve) continue;
-    const bool worse = result && (static_cast<double>(count(solve->used)) <
-                                      0.9 * static_cast<double>(count(from.used)) ||
+    const bool worse = result && (static_cast<double>(count_used(solve->used)) <
+                                      0.9 * static_cast<double>(count_used(from.used)) ||
                                   solve->sigma_px > 1.05 * result->solve.sigma_px);
     if (worse) continue;
     LensStart next = start_of(from, *solve);
@@ -207,7 +203,7 @@ std::vector<BelievedSolve> believed(const LensSelection& selection) {
       continue;
     }
     const double squares =
-        c.solve->rms_px * c.solve->rms_px * static_cast<double>(count(c.solve->used));
+        c.solve->rms_px * c.solve->rms_px * static_cast<double>(count_used(c.solve->used));
     criterion.push_back(squares / variance + 2 * static_cast<double>(c.parameters));
   }
   const double least = *std::ranges::min_element(criterion);
@@ -244,7 +240,7 @@ void try_spline(const LensProblem& problem, bool warp, LensCalibration& result) 
                             "_Ny=" + std::to_string(knots) +
                             "_fov_x_deg=" + std::to_string(field_deg),
                         0, true};
-  if (count(result.start.used) < corners_per_parameter * free_count(spline)) return;
+  if (count_used(result.start.used) < corners_per_parameter * free_count(spline)) return;
   LensSelection more = select_lens(problem, start_of(result.start, best), {&spline, 1}, warp);
   result.selection.add(std::move(more.candidates.front()));
 }
@@ -291,7 +287,7 @@ Robust solve_first(const LensProblem& problem,
         "numbers of corners");
   }
   const auto worth = [](const Robust& r) {  // corners explained, and how well
-    return static_cast<double>(count(r.solve.used)) / std::max(r.solve.sigma_px, 0.05);
+    return static_cast<double>(count_used(r.solve.used)) / std::max(r.solve.sigma_px, 0.05);
   };
   const bool by_angle = angular && (!perspective || worth(*angular) > 1.02 * worth(*perspective));
   forms = by_angle ? angular_forms() : perspective_forms();

@@ -43,18 +43,15 @@ Scale scale_of(const Bundle& bundle,
   return scale;
 }
 
-std::size_t count(std::span<const std::uint8_t> flags) {
-  return static_cast<std::size_t>(std::ranges::count_if(flags, [](auto f) { return f != 0; }));
-}
-
 // Equations less unknowns.
 double freedoms(const LensSolve& solve, const LensStart& start) {
   std::vector<std::uint8_t> views(solve.bundle.cam_from_board.size(), 0);
   for (std::size_t i = 0; i < solve.used.size(); ++i) {
     if (solve.used[i] != 0) views[start.corners[i].view] = 1;
   }
-  return 2 * static_cast<double>(count(solve.used)) -
-         static_cast<double>(solve.bundle.free.size() + (solve.warp ? 2 : 0) + 6 * count(views));
+  return 2 * static_cast<double>(count_used(solve.used)) -
+         static_cast<double>(solve.bundle.free.size() + (solve.warp ? 2 : 0) +
+                             6 * count_used(views));
 }
 
 std::vector<SeenCorner> corners_of(const LensProblem& problem, std::size_t& not_finite) {
@@ -183,7 +180,7 @@ std::optional<LensSolve> solve_lens(const LensProblem& problem,
   }
   if (!std::isfinite(sum)) return std::nullopt;
   solve.sigma_px = std::sqrt(sum / freedoms(solve, start));
-  solve.rms_px = std::sqrt(sum / static_cast<double>(count(solve.used)));
+  solve.rms_px = std::sqrt(sum / static_cast<double>(count_used(solve.used)));
   solve.lens = lens_of(form, problem.width, problem.height, solve.bundle.free);
   try {
     check(solve.lens);
@@ -191,6 +188,10 @@ std::optional<LensSolve> solve_lens(const LensProblem& problem,
     return std::nullopt;  // a focal length below 0
   }
   return solve;
+}
+
+std::size_t count_used(std::span<const std::uint8_t> used) {
+  return static_cast<std::size_t>(std::ranges::count_if(used, [](auto flag) { return flag != 0; }));
 }
 
 LensStart start_of(const LensStart& before, const LensSolve& solve) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,9 @@ std::optional<LensSolve> solve_lens(const LensProblem& problem,
                                     const LensForm& form,
                                     const LensStart& start,
                                     const SolveOptions& options = {});
+
+// How many flags are set.
+std::size_t count_used(std::span<const std::uint8_t> used);
 
 // The start of a further solve: where this one ended.
 LensStart start_of(const LensStart& before, const LensSolve& solve);

@@ -21,29 +21,6 @@ using calibrate::Vec2;
 constexpr double figure_width = 640;
 constexpr double legend_height = 34;
 
-std::string escaped(std::string_view text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
-}
-
 std::string pixels(double px) {
   return std::isfinite(px) ? fmt::format("{:.3f}", px) : std::string("&ndash;");
 }

@@ -10,6 +10,19 @@ namespace {
 
 constexpr std::string_view font = "DejaVu Sans, Verdana, sans-serif";
 
+std::string_view name_of(Anchor anchor) {
+  return anchor == Anchor::start ? "start" : anchor == Anchor::middle ? "middle" : "end";
+}
+
+std::string path_of(const std::vector<std::pair<double, double>>& points) {
+  std::string list;
+  for (const auto& [x, y] : points) list += fmt::format("{:.2f},{:.2f} ", x, y);
+  if (!list.empty()) list.pop_back();
+  return list;
+}
+
+}  // namespace
+
 std::string escaped(std::string_view text) {
   std::string result;
   for (const char c : text) {
@@ -32,19 +45,6 @@ std::string escaped(std::string_view text) {
   }
   return result;
 }
-
-std::string_view name_of(Anchor anchor) {
-  return anchor == Anchor::start ? "start" : anchor == Anchor::middle ? "middle" : "end";
-}
-
-std::string path_of(const std::vector<std::pair<double, double>>& points) {
-  std::string list;
-  for (const auto& [x, y] : points) list += fmt::format("{:.2f},{:.2f} ", x, y);
-  if (!list.empty()) list.pop_back();
-  return list;
-}
-
-}  // namespace
 
 double text_width(std::string_view text, double size) {
   std::size_t letters = 0;

@@ -7,6 +7,9 @@
 
 namespace studio {
 
+// Text as SVG and HTML take it.
+std::string escaped(std::string_view text);
+
 // Where text stands to its point.
 enum class Anchor { start, middle, end };
 
