@@ -1,0 +1,320 @@
+// Where the cameras of a rig stand to each other, from boards that several of them see.
+#include "calibrate/rig.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+#include "calibrate/board_pose.h"
+#include "calibrate/rig_bundle.h"
+
+namespace calibrate {
+namespace {
+
+constexpr std::size_t least_corners = 6;  // of a view
+constexpr double most_wrong_px = 20;      // of a view's residual, in comparing starts
+
+// A board before one camera.
+struct Seen {
+  std::vector<Sight> sights;
+  Pose cam_from_board;
+};
+
+// Per camera, per instant.
+using AllSeen = std::vector<std::vector<std::optional<Seen>>>;
+
+void check(const RigProblem& problem, const RigOptions& options) {
+  check(problem.board);
+  if (!(options.noise_px > 0)) throw std::invalid_argument("expected noise must be above 0");
+  if (problem.cameras.size() < 2) throw std::invalid_argument("a rig has two cameras or more");
+  for (const RigCamera& camera : problem.cameras) {
+    check(camera.lens);
+    if (camera.name.empty() ||
+        std::ranges::count(problem.cameras, camera.name, &RigCamera::name) > 1) {
+      throw std::invalid_argument("each camera of a rig has a name of its own, not \"" +
+                                  camera.name + "\"");
+    }
+    if (camera.views.size() != problem.cameras[0].views.size()) {
+      throw std::invalid_argument("camera " + camera.name + " has not as many views as " +
+                                  problem.cameras[0].name);
+    }
+    for (const BoardView& view : camera.views) {
+      if (!view.corners.empty() && view.corners.size() != problem.board.corner_count()) {
+        throw std::invalid_argument("a view of camera " + camera.name +
+                                    " has not as many corners as the board");
+      }
+    }
+  }
+}
+
+std::optional<Seen> seen_by(const RigCamera& camera, const BoardView& view, const Board& board) {
+  Seen seen;
+  std::vector<Vec3> bearings, p_board;
+  for (std::size_t i = 0; i < view.corners.size(); ++i) {
+    if (!view.corners[i]) continue;
+    const auto sight = sight_of(camera.lens, *view.corners[i], corner_of(board, i));
+    if (!sight) continue;
+    seen.sights.push_back(*sight);
+    bearings.push_back(sight->v_cam);
+    p_board.push_back(sight->p_set);
+  }
+  if (seen.sights.size() < least_corners) return std::nullopt;
+  const auto pose = find_board_pose(bearings, p_board);
+  if (!pose) return std::nullopt;
+  constexpr double loss_px = 1;
+  seen.cam_from_board = refine_pose(seen.sights, pose->cam_from_board, loss_px, 20).cam_from_set;
+  return seen;
+}
+
+double rms_px(std::span<const Sight> sights, const Pose& cam_from_board) {
+  double sum = 0;
+  for (const Sight& sight : sights) {
+    const Vec2 r = residual_of(sight, cam_from_board);
+    sum += r.x * r.x + r.y * r.y;
+  }
+  return std::sqrt(sum / static_cast<double>(sights.size()));
+}
+
+// The board turned by half about its middle, as a place in its own frame.
+Pose half_turn(const Board& board) {
+  const Vec3 last = corner_of(board, board.corner_count() - 1);
+  return {{{-1, 0, 0, 0, -1, 0, 0, 0, 1}}, last};
+}
+
+// How a view may be counted: as it is and, for chessboards, from the other end.
+std::vector<Pose> countings(const Board& board) {
+  std::vector<Pose> result{Pose{}};
+  if (board.kind == Board::Kind::chessboard) result.push_back(half_turn(board));
+  return result;
+}
+
+struct Best {
+  Pose pose;
+  double error_px = HUGE_VAL;
+};
+
+// b_from_a that explains best what camera b saw at all instants, from one of them.
+Best relation(const std::vector<std::optional<Seen>>& a,
+              const std::vector<std::optional<Seen>>& b,
+              const std::vector<Pose>& countings) {
+  Best best;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!a[i] || !b[i]) continue;
+    for (const Pose& counting : countings) {
+      const Pose b_from_a = b[i]->cam_from_board * counting * inverse(a[i]->cam_from_board);
+      double error = 0;
+      for (std::size_t k = 0; k < a.size(); ++k) {
+        if (!a[k] || !b[k]) continue;
+        double least = most_wrong_px;
+        for (const Pose& other : countings) {
+          least = std::min(least, rms_px(b[k]->sights, b_from_a * a[k]->cam_from_board * other));
+        }
+        error += least;
+      }
+      if (error < best.error_px) best = {b_from_a, error};
+    }
+  }
+  return best;
+}
+
+std::size_t shared_views(const std::vector<std::optional<Seen>>& a,
+                         const std::vector<std::optional<Seen>>& b) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) count += a[i] && b[i] ? 1 : 0;
+  return count;
+}
+
+// Camera by camera, the next one that shares the most views with one that is placed.
+std::vector<Pose> start_cameras(const RigProblem& problem,
+                                const AllSeen& seen,
+                                const std::vector<Pose>& countings) {
+  const std::size_t count = problem.cameras.size();
+  std::vector<std::optional<Pose>> cam_from_rig(count);
+  cam_from_rig[0] = Pose{};
+  for (;;) {
+    std::size_t most = 0, from = 0, to = 0;
+    for (std::size_t a = 0; a < count; ++a) {
+      for (std::size_t b = 0; b < count; ++b) {
+        if (!cam_from_rig[a] || cam_from_rig[b]) continue;
+        const std::size_t shared = shared_views(seen[a], seen[b]);
+        if (shared > most) {
+          most = shared;
+          from = a;
+          to = b;
+        }
+      }
+    }
+    if (most == 0) break;
+    cam_from_rig[to] = relation(seen[from], seen[to], countings).pose * *cam_from_rig[from];
+  }
+  std::string lost;
+  std::vector<Pose> result;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!cam_from_rig[i]) lost += (lost.empty() ? "" : ", ") + problem.cameras[i].name;
+    result.push_back(cam_from_rig[i].value_or(Pose{}));
+  }
+  if (!lost.empty()) {
+    throw std::runtime_error("no board is seen at one instant by " + problem.cameras[0].name +
+                             "'s group of cameras and by these: " + lost +
+                             "; take pictures of the board where their views overlap");
+  }
+  return result;
+}
+
+// The corners of all boards that two cameras or more see, counted from the same end.
+struct Start {
+  RigBundle bundle;
+  std::vector<RigCorner> corners;
+  std::vector<std::size_t> instants;  // of the bundle's boards
+};
+
+Start start_rig(const RigProblem& problem, const AllSeen& seen) {
+  const std::vector<Pose> ways = countings(problem.board);
+  Start start;
+  start.bundle.cam_from_rig = start_cameras(problem, seen, ways);
+  for (std::size_t instant = 0; instant < problem.cameras[0].views.size(); ++instant) {
+    std::vector<std::size_t> who;
+    for (std::size_t c = 0; c < seen.size(); ++c) {
+      if (seen[c][instant]) who.push_back(c);
+    }
+    if (who.size() < 2) continue;
+    const std::size_t first = *std::ranges::max_element(
+        who, {}, [&](std::size_t c) { return seen[c][instant]->sights.size(); });
+    const Pose rig_from_board =
+        inverse(start.bundle.cam_from_rig[first]) * seen[first][instant]->cam_from_board;
+    for (const std::size_t c : who) {
+      const Pose cam_from_board = start.bundle.cam_from_rig[c] * rig_from_board;
+      const Pose way = *std::ranges::min_element(ways, {}, [&](const Pose& counting) {
+        return rms_px(seen[c][instant]->sights, cam_from_board * counting);
+      });
+      for (Sight sight : seen[c][instant]->sights) {
+        sight.p_set = way * sight.p_set;
+        start.corners.push_back({c, start.instants.size(), sight});
+      }
+    }
+    start.bundle.rig_from_board.push_back(rig_from_board);
+    start.instants.push_back(instant);
+  }
+  return start;
+}
+
+double length_px(const RigCorner& corner, const RigBundle& bundle) {
+  const Vec2 r = residual_of(
+      corner.sight, bundle.cam_from_rig[corner.camera] * bundle.rig_from_board[corner.board]);
+  return std::hypot(r.x, r.y);
+}
+
+// Of each coordinate, by the median length of residuals.
+double robust_sigma(const Start& start) {
+  std::vector<double> lengths;
+  for (const RigCorner& corner : start.corners) lengths.push_back(length_px(corner, start.bundle));
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::ranges::nth_element(lengths, middle);
+  constexpr double median_of_rayleigh = 1.17741;
+  return *middle / median_of_rayleigh;
+}
+
+// Solves, and says which corners are in use.
+std::vector<std::uint8_t> solve(Start& start, double noise_px) {
+  constexpr double most_sigmas = 4.5;
+  std::vector<std::uint8_t> used(start.corners.size(), 1);
+  bool solved = true;
+  for (int round = 0; round < 3; ++round) {
+    const double sigma = std::max(robust_sigma(start), noise_px / 4);
+    solved = solved && minimise(start.bundle, start.corners, used, 2 * sigma);
+  }
+  for (int round = 0; round < 5; ++round) {
+    const double most = most_sigmas * std::max(robust_sigma(start), noise_px / 4);
+    const std::vector<std::uint8_t> before = used;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      used[i] = length_px(start.corners[i], start.bundle) <= most ? 1 : 0;
+    }
+    solved = solved && minimise(start.bundle, start.corners, used, 0);
+    if (used == before && round > 0) break;
+  }
+  if (!solved) {
+    throw std::runtime_error(
+        "the cameras' boards do not agree on a rig: check that pictures belong to the same "
+        "instants, and that each lens is its camera's");
+  }
+  return used;
+}
+
+// The camera's own part of everything's covariance.
+void tell_uncertainty(RigCameraFit& fit,
+                      std::span<const double> all,
+                      std::size_t index,
+                      std::size_t count,
+                      double sigma_px) {
+  const std::size_t n = 6 * (count - 1);
+  for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t j = 0; j < 6; ++j) {
+      fit.covariance[6 * i + j] =
+          sigma_px * sigma_px * all[n * (6 * (index - 1) + i) + 6 * (index - 1) + j];
+    }
+  }
+  const auto& m = fit.covariance;
+  fit.turn_sigma_rad = std::sqrt(m[0] + m[7] + m[14]);
+  fit.position_sigma_m = std::sqrt(m[21] + m[28] + m[35]);
+}
+
+}  // namespace
+
+RigFit fit_rig(const RigProblem& problem, const RigOptions& options) {
+  check(problem, options);
+  AllSeen seen;
+  for (const RigCamera& camera : problem.cameras) {
+    seen.emplace_back();
+    for (const BoardView& view : camera.views) {
+      seen.back().push_back(seen_by(camera, view, problem.board));
+    }
+  }
+  Start start = start_rig(problem, seen);
+  const std::vector<std::uint8_t> used = solve(start, options.noise_px);
+
+  RigFit fit;
+  fit.cameras.resize(problem.cameras.size());
+  fit.rig_from_board.resize(problem.cameras[0].views.size());
+  for (std::size_t b = 0; b < start.instants.size(); ++b) {
+    fit.rig_from_board[start.instants[b]] = start.bundle.rig_from_board[b];
+    for (std::size_t c = 0; c < seen.size(); ++c) {
+      if (seen[c][start.instants[b]]) ++fit.cameras[c].views;
+    }
+  }
+  double squares = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    RigCameraFit& camera = fit.cameras[start.corners[i].camera];
+    if (used[i] == 0) {
+      ++camera.left_out;
+      continue;
+    }
+    const double r = length_px(start.corners[i], start.bundle);
+    camera.rms_px += r * r;
+    ++camera.corners;
+    squares += r * r;
+    ++count;
+  }
+  fit.rms_px = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(count, 1)));
+  const double freedoms =
+      2.0 * static_cast<double>(count) -
+      6.0 * static_cast<double>(start.instants.size() + problem.cameras.size() - 1);
+  const double sigma_px = std::max(options.noise_px, std::sqrt(squares / std::max(freedoms, 1.0)));
+  const std::vector<double> all = covariance(start.bundle, start.corners, used);
+  if (all.empty()) {
+    throw std::runtime_error("the boards leave a camera's pose open: take more pictures of them");
+  }
+  for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
+    RigCameraFit& camera = fit.cameras[c];
+    camera.cam_from_rig = start.bundle.cam_from_rig[c];
+    camera.rms_px =
+        std::sqrt(camera.rms_px / static_cast<double>(std::max<std::size_t>(camera.corners, 1)));
+    if (c > 0) tell_uncertainty(camera, all, c, fit.cameras.size(), sigma_px);
+  }
+  return fit;
+}
+
+}  // namespace calibrate

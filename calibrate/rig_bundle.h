@@ -1,0 +1,41 @@
+// The least-squares core of a rig: poses of cameras, poses of boards, lenses held.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "calibrate/pose.h"
+#include "calibrate/sight.h"
+
+namespace calibrate {
+
+// A corner of a board before one camera at one instant; the sight's p_set is in the board's frame.
+struct RigCorner {
+  std::size_t camera = 0;
+  std::size_t board = 0;  // which pose of it
+  Sight sight;
+};
+
+struct RigBundle {
+  std::vector<Pose> cam_from_rig;  // the first one is held
+  std::vector<Pose> rig_from_board;
+};
+
+// Moves all poses to the least sum over the corners in use of squared residuals (sight.h), or of
+// Cauchy's loss at the scale `loss_px` if that is above 0. Poses without corners stay. Returns
+// whether there is a solution.
+bool minimise(RigBundle& bundle,
+              std::span<const RigCorner> corners,
+              std::span<const std::uint8_t> used,
+              double loss_px);
+
+// Of turn and move of each camera but the first, one after the other, if residuals have a standard
+// deviation of 1 px: a square matrix of 6 values per camera, row by row. Empty if a camera's pose
+// is open.
+std::vector<double> covariance(const RigBundle& bundle,
+                               std::span<const RigCorner> corners,
+                               std::span<const std::uint8_t> used);
+
+}  // namespace calibrate

@@ -1,0 +1,194 @@
+// Rigs of several cameras before a board.
+#include "calibrate/rig.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/calibrate/made_markers.h"
+
+namespace calibrate {
+namespace {
+
+using made::degree;
+using testing::HasSubstr;
+
+Board made_board() { return {Board::Kind::chessboard, 9, 6, .05, 0, ""}; }
+
+Lens normal_lens() {
+  return {"LENSMODEL_OPENCV4", 1280, 720, {900, 900, 640, 360, -.1, .02, 0, 0}};
+}
+
+struct MadeRig {
+  RigProblem problem;
+  std::vector<Pose> cam_from_rig;
+};
+
+// A plate camera, a second one beside it and rolled, and a fish-eye that looks up between them. The
+// board moves before them; each sees it if it is in its picture.
+MadeRig made_rig(std::size_t instants, double noise_px, unsigned seed) {
+  made::Random random(seed);
+  MadeRig rig;
+  rig.problem.board = made_board();
+  rig.problem.cameras = {
+      {"plate", normal_lens(), {}}, {"side", normal_lens(), {}}, {"probe", made::fish_eye(), {}}};
+  const Pose first = look_at({0, 0, 1.5}, {0, 3, 1.2}, 0.02);
+  const std::vector<Pose> cam_from_set{first, look_at({0.8, 0.1, 1.4}, {0, 2, 1.2}, 2.6),
+                                       pose_from_axis({0.3, 0.6, 1.0}, {0.1, 0.3, 1}, 0.7)};
+  for (const Pose& pose : cam_from_set) rig.cam_from_rig.push_back(pose * inverse(first));
+  const Board& board = rig.problem.board;
+  const Vec3 middle = corner_of(board, board.corner_count() - 1) * 0.5;
+  for (std::size_t i = 0; i < instants; ++i) {
+    const Vec3 at{random.uniform(-0.5, 0.7), random.uniform(1.4, 2.6), random.uniform(0.9, 1.8)};
+    const Pose facing = look_at(at, {random.uniform(-0.5, 1), 0, random.uniform(0.8, 2)},
+                                random.uniform(-0.5, 0.5));
+    // The board's z points away from who sees it: turn it to face the cameras.
+    Pose set_from_board = inverse(facing);
+    set_from_board = set_from_board * Pose{{{-1, 0, 0, 0, 1, 0, 0, 0, -1}}, {}};
+    set_from_board.t = at - set_from_board.R * middle;
+    for (std::size_t c = 0; c < cam_from_set.size(); ++c) {
+      RigCamera& camera = rig.problem.cameras[c];
+      BoardView view{"instant " + std::to_string(i), {}};
+      for (std::size_t k = 0; k < board.corner_count(); ++k) {
+        const auto q =
+            project(camera.lens, cam_from_set[c] * (set_from_board * corner_of(board, k)));
+        const bool inside = q && q->x > 0 && q->y > 0 && q->x < camera.lens.width - 1 &&
+                            q->y < camera.lens.height - 1;
+        view.corners.push_back(inside ? std::optional(Vec2{q->x + noise_px * random.normal(),
+                                                           q->y + noise_px * random.normal()})
+                                      : std::nullopt);
+      }
+      camera.views.push_back(view);
+    }
+  }
+  return rig;
+}
+
+std::string reason_of(const RigProblem& problem) {
+  try {
+    fit_rig(problem);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(FitRig, FindsTheCamerasWithinTheirUncertainty) {
+  double squares = 0;
+  int count = 0;
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    const MadeRig rig = made_rig(15, 0.3, seed);
+    const RigFit fit = fit_rig(rig.problem);
+    EXPECT_EQ(fit.cameras[0].cam_from_rig, Pose{});
+    EXPECT_EQ(fit.cameras[0].turn_sigma_rad, 0);
+    for (std::size_t c = 1; c < 3; ++c) {
+      const RigCameraFit& camera = fit.cameras[c];
+      const made::PoseError error = made::error_of(camera.cam_from_rig, rig.cam_from_rig[c]);
+      EXPECT_LT(error.turn_rad, 0.1 * degree) << seed << " " << c;
+      EXPECT_LT(error.position_m, 0.003) << seed << " " << c;
+      EXPECT_LT(camera.turn_sigma_rad, 0.06 * degree);
+      EXPECT_LT(camera.position_sigma_m, 0.002);
+      EXPECT_NEAR(camera.rms_px, 0.3 * std::sqrt(2.0), 0.1);
+      EXPECT_EQ(camera.left_out, 0U);
+      Registration of_camera;
+      of_camera.cam_from_set = camera.cam_from_rig;
+      of_camera.covariance = camera.covariance;
+      squares += made::chi_square(of_camera, rig.cam_from_rig[c]);
+      count += 6;
+    }
+  }
+  EXPECT_GT(squares / count, 0.5);
+  EXPECT_LT(squares / count, 1.7);
+}
+
+TEST(FitRig, PassesOverWrongCornersAndMissingViews) {
+  MadeRig rig = made_rig(15, 0.2, 3);
+  made::Random random(5);
+  std::size_t wrong = 0;
+  for (RigCamera& camera : rig.problem.cameras) {
+    for (BoardView& view : camera.views) {
+      if (random.uniform(0, 1) < 0.2) view.corners.clear();
+      for (auto& q : view.corners) {
+        if (!q || random.uniform(0, 1) > 0.05) continue;
+        q->x += random.uniform(5, 25);
+        ++wrong;
+      }
+    }
+  }
+  const RigFit fit = fit_rig(rig.problem);
+  std::size_t left_out = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    left_out += fit.cameras[c].left_out;
+    if (c == 0) continue;
+    const made::PoseError error = made::error_of(fit.cameras[c].cam_from_rig, rig.cam_from_rig[c]);
+    EXPECT_LT(error.turn_rad, 5 * fit.cameras[c].turn_sigma_rad);
+    EXPECT_LT(error.position_m, 5 * fit.cameras[c].position_sigma_m);
+    EXPECT_LT(fit.cameras[c].position_sigma_m, 0.003);
+  }
+  EXPECT_GT(left_out, wrong / 3);
+  EXPECT_LE(left_out, wrong);
+}
+
+TEST(FitRig, FindsOutFromWhichEndAChessboardWasCounted) {
+  MadeRig rig = made_rig(12, 0.2, 4);
+  for (std::size_t i = 0; i < 12; i += 2)
+    std::ranges::reverse(rig.problem.cameras[1].views[i].corners);
+  const RigFit fit = fit_rig(rig.problem);
+  const made::PoseError error = made::error_of(fit.cameras[1].cam_from_rig, rig.cam_from_rig[1]);
+  EXPECT_LT(error.turn_rad, 0.1 * degree);
+  EXPECT_LT(error.position_m, 0.003);
+}
+
+TEST(FitRig, ChainsCamerasThatNeverSeeTheSame) {
+  // The first and the last share no instant, but both share some with the one between.
+  MadeRig rig = made_rig(24, 0.2, 6);
+  for (std::size_t i = 0; i < 24; ++i) {
+    rig.problem.cameras[i < 12 ? 2 : 0].views[i].corners.clear();
+  }
+  const RigFit fit = fit_rig(rig.problem);
+  for (std::size_t c = 1; c < 3; ++c) {
+    const made::PoseError error = made::error_of(fit.cameras[c].cam_from_rig, rig.cam_from_rig[c]);
+    EXPECT_LT(error.turn_rad, 4 * fit.cameras[c].turn_sigma_rad);
+    EXPECT_LT(error.position_m, 4 * fit.cameras[c].position_sigma_m);
+  }
+  EXPECT_GT(fit.cameras[2].position_sigma_m, fit.cameras[1].position_sigma_m);
+}
+
+TEST(FitRig, RaisesItsUncertaintyIfALensIsWrong) {
+  MadeRig rig = made_rig(15, 0.2, 7);
+  const double before = fit_rig(rig.problem).cameras[1].position_sigma_m;
+  rig.problem.cameras[1].lens.parameters[0] *= 1.03;
+  rig.problem.cameras[1].lens.parameters[1] *= 0.99;
+  const RigFit fit = fit_rig(rig.problem);
+  EXPECT_GT(fit.cameras[1].position_sigma_m, 1.5 * before);
+}
+
+TEST(FitRig, NamesCamerasThatShareNoView) {
+  MadeRig rig = made_rig(12, 0.2, 8);
+  for (BoardView& view : rig.problem.cameras[2].views) view.corners.clear();
+  EXPECT_THAT(reason_of(rig.problem), HasSubstr("these: probe;"));
+  for (BoardView& view : rig.problem.cameras[1].views) view.corners.clear();
+  EXPECT_THAT(reason_of(rig.problem), HasSubstr("these: side, probe;"));
+}
+
+TEST(FitRig, RefusesWhatIsNoRig) {
+  const MadeRig rig = made_rig(3, 0.2, 9);
+  RigProblem problem = rig.problem;
+  problem.cameras.resize(1);
+  EXPECT_THROW(fit_rig(problem), std::invalid_argument);
+  problem = rig.problem;
+  problem.cameras[1].name = "plate";
+  EXPECT_THROW(fit_rig(problem), std::invalid_argument);
+  problem = rig.problem;
+  problem.cameras[1].views.pop_back();
+  EXPECT_THROW(fit_rig(problem), std::invalid_argument);
+  problem = rig.problem;
+  problem.cameras[1].views[0].corners.resize(5);
+  EXPECT_THROW(fit_rig(problem), std::invalid_argument);
+  EXPECT_THROW(fit_rig(rig.problem, {.noise_px = 0}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace calibrate
