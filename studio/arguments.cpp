@@ -55,6 +55,12 @@ void Arguments::choices(const std::string& names,
       ->check(CLI::IsMember(choices));
 }
 
+void Arguments::repeated(const std::string& names,
+                         std::vector<std::string>& target,
+                         const std::string& help) {
+  app_->add_option(names, target, help)->type_name("TEXT")->allow_extra_args(false);
+}
+
 void Arguments::flag(const std::string& names, bool& target, const std::string& help) {
   app_->add_flag(names, target, help);
 }

@@ -51,6 +51,10 @@ class Arguments {
                std::vector<std::string>& target,
                const std::vector<std::string>& choices,
                const std::string& help);
+  // One value each time it is given.
+  void repeated(const std::string& names,
+                std::vector<std::string>& target,
+                const std::string& help);
   void flag(const std::string& names, bool& target, const std::string& help);
   void required(const std::string& name);
 

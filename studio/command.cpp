@@ -68,6 +68,7 @@ std::span<const Command> commands() {
       bench_command(),
       devices_command(),
       calibrate_response_command(),
+      calibrate_rig_command(),
       calibrate_vignetting_command(),
       calibrate_board_command(),
       calibrate_lens_command(),

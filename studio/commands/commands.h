@@ -14,6 +14,7 @@ Command calibrate_lens_command();
 Command calibrate_pose_command();
 Command calibrate_probe_command();
 Command calibrate_response_command();
+Command calibrate_rig_command();
 Command calibrate_vignetting_command();
 Command capture_command();
 Command chart_command();

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "calibrate/camera_model.h"
 #include "calibrate/lens.h"
 #include "calibrate/pose_file.h"
+#include "calibrate/rig_file.h"
 #include "capture/exr.h"
 #include "capture/png.h"
 #include "tests/calibrate/made_board_picture.h"
@@ -54,6 +56,50 @@ std::string markers_text(const calibrate::Lens& lens,
         i++, p.x, p.y, p.z, q->x + 0.2 * random.normal(), q->y + 0.2 * random.normal(), picture);
   }
   return text;
+}
+
+TEST_F(CalibrateCommands, RigComesFromPicturesOfTheSameNames) {
+  const calibrate::Board board{calibrate::Board::Kind::chessboard, 8, 5, 0.04, 0, ""};
+  const calibrate::Lens lens{"pinhole", 480, 360, {400, 400, 239.5, 179.5}};
+  const calibrate::Pose right_from_left = calibrate::look_at({0.25, 0, 0}, {0.1, 0.8, 0}, 0.05) *
+                                          inverse(calibrate::look_at({0, 0, 0}, {0.1, 0.8, 0}, 0));
+  calibrate::write_lens(path("left.toml"), lens);
+  calibrate::write_lens(path("right.yml"), lens);
+  std::mt19937 random(3);
+  for (const char* name : {"left", "right"}) fs::create_directories(dir_ / name);
+  for (int i = 0; i < 5; ++i) {
+    const calibrate::Pose left_from_board = made::make_board_pose(
+        board, {0.02 * i - 0.04, 0.01 * i - 0.02, 1}, 0.7 + 0.05 * i, 0.5, 0.3, random);
+    const auto save = [&](const std::string& camera, const calibrate::Pose& cam_from_board) {
+      const calibrate::GreyPicture picture = made::render_board(board, cam_from_board, lens);
+      capture::write_png(dir_ / camera / (std::to_string(i) + ".png"), picture.width,
+                         picture.height, 1, picture.pixels);
+    };
+    save("left", left_from_board);
+    if (i != 2) save("right", right_from_left * left_from_board);
+  }
+  const std::string sources = "left=" + path("left") + " right=" + path("right");
+  const std::string command = "calibrate rig " + sources + " --lens left=" + path("left.toml") +
+                              " --lens right=" + path("right.yml") +
+                              " --board 8x5 --square 0.04 -o " + path("rig.toml");
+  const Outcome outcome = run_with_figures(command);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("2 cameras"));
+  const std::vector<calibrate::RigMember> rig = calibrate::read_rig(path("rig.toml"));
+  ASSERT_EQ(rig.size(), 2U);
+  EXPECT_EQ(rig[1].name, "right");
+  EXPECT_EQ(rig[1].lens, path("right.yml"));
+  const made::PoseError error = made::error_of(rig[1].cam_from_rig, right_from_left);
+  EXPECT_LT(error.turn_rad / made::degree, 0.1);
+  EXPECT_LT(error.position_m, 0.002);
+  const Json found = figures();
+  EXPECT_EQ(found["cameras"][1]["views"], 4);
+  EXPECT_LT(found["cameras"][1]["sigma_mm"], 2);
+
+  EXPECT_EQ(run("calibrate rig " + sources + " --lens left=" + path("left.toml") +
+                " --board 8x5 -o " + path("rig.toml"))
+                .status,
+            2);
 }
 
 TEST_F(CalibrateCommands, LensOfTheDeskComesFromItsLinesWithoutBoards) {

@@ -1,0 +1,256 @@
+// platelight calibrate rig: where several cameras stand to each other, from a board that they see.
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <nlohmann/json.hpp>
+
+#include "calibrate/board_detector.h"
+#include "calibrate/corner_refinement.h"
+#include "calibrate/rig.h"
+#include "calibrate/rig_file.h"
+#include "capture/camera.h"
+#include "studio/commands/board_options.h"
+#include "studio/commands/commands.h"
+
+namespace studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr std::size_t most_pictures = 500;  // of a camera
+
+struct RigOptions {
+  std::vector<std::string> sources;  // NAME=DIRECTORY or NAME=VIDEO
+  std::vector<std::string> lenses;   // NAME=FILE
+  BoardOptions board;
+  std::string out;
+  std::optional<std::int64_t> every;
+};
+
+// One camera, as the command line has it.
+struct Source {
+  std::string name;
+  std::string pictures;
+  std::string lens_file;
+};
+
+std::pair<std::string, std::string> named(const std::string& word, const std::string& option) {
+  const std::size_t equals = word.find('=');
+  if (equals == 0 || equals == std::string::npos || equals + 1 == word.size()) {
+    throw UsageError(fmt::format("{} is NAME=FILE, not {}", option, word));
+  }
+  return {word.substr(0, equals), word.substr(equals + 1)};
+}
+
+std::vector<Source> sources_of(const RigOptions& options) {
+  std::map<std::string, std::string> lenses;
+  for (const std::string& word : options.lenses) {
+    const auto [name, file] = named(word, "--lens");
+    if (!lenses.emplace(name, file).second) {
+      throw UsageError(fmt::format("camera {} has two lenses", name));
+    }
+  }
+  std::vector<Source> sources;
+  for (const std::string& word : options.sources) {
+    const auto [name, pictures] = named(word, "a camera");
+    if (std::ranges::find(sources, name, &Source::name) != sources.end()) {
+      throw UsageError(fmt::format("camera {} is there twice", name));
+    }
+    const auto lens = lenses.find(name);
+    if (lens == lenses.end()) {
+      throw UsageError(fmt::format("camera {0} has no lens: add --lens {0}=FILE", name));
+    }
+    sources.push_back({name, pictures, lens->second});
+    lenses.erase(lens);
+  }
+  if (!lenses.empty()) {
+    throw UsageError(fmt::format("--lens {} is of no camera", lenses.begin()->first));
+  }
+  if (sources.size() < 2) throw UsageError("a rig has two cameras or more");
+  return sources;
+}
+
+// Boards that one camera saw, by the word that its instant goes by: a picture's name without its
+// ending, a video's frame number.
+using Instants = std::map<std::string, calibrate::BoardView>;
+
+struct Pictures {
+  std::vector<std::string> instants;
+  std::vector<calibrate::GreyPicture> grey;
+};
+
+Pictures read_pictures(const Source& source, std::int64_t every) {
+  Pictures pictures;
+  const auto add = [&](std::string instant, const capture::Image& image) {
+    if (pictures.grey.size() == most_pictures) {
+      throw std::runtime_error(
+          fmt::format("{}: more than {} pictures; take fewer", source.pictures, most_pictures));
+    }
+    pictures.instants.push_back(std::move(instant));
+    pictures.grey.push_back(calibrate::grey_picture(image));
+  };
+  if (!fs::is_directory(source.pictures)) {
+    const auto camera = capture::open_camera(source.pictures, {});
+    for (std::int64_t number = 0; const auto frame = camera->next(); ++number) {
+      if (frame->image != nullptr && number % every == 0) {
+        add(fmt::format("frame {:09}", number), *frame->image);
+      }
+    }
+    return pictures;
+  }
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(source.pictures)) {
+    const bool hidden = entry.path().filename().string().starts_with('.');
+    if (entry.is_regular_file() && !hidden) files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  for (const fs::path& file : files) {
+    const auto frame = capture::open_camera(file.string(), {})->next();
+    if (frame && frame->image != nullptr) add(file.stem().string(), *frame->image);
+  }
+  return pictures;
+}
+
+Instants find_boards(const Source& source,
+                     const calibrate::Lens& lens,
+                     const calibrate::Board& board,
+                     std::int64_t every,
+                     Console& console) {
+  const Pictures pictures = read_pictures(source, every);
+  std::vector<std::optional<calibrate::BoardView>> views(pictures.grey.size());
+  std::atomic<std::size_t> done = 0;
+  std::mutex speaking;
+  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t i) {
+    const calibrate::GreyPicture& grey = pictures.grey[i];
+    if (grey.width != lens.width || grey.height != lens.height) {
+      throw std::runtime_error(fmt::format("{}: {} is {}x{}, but its lens is for {}x{}",
+                                           source.pictures, pictures.instants[i], grey.width,
+                                           grey.height, lens.width, lens.height));
+    }
+    calibrate::DetectionOptions detection;
+    detection.lens = lens;
+    const auto found = calibrate::detect_board(grey, board, detection);
+    if (found.view) {
+      views[i] = calibrate::refine_corners(grey, *found.view, board, lens);
+      views[i]->name = pictures.instants[i];
+    }
+    const std::lock_guard lock(speaking);
+    console.progress(static_cast<double>(++done) / static_cast<double>(views.size()),
+                     "looking for the board of " + source.name);
+  });
+  Instants instants;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!views[i]) continue;
+    if (!instants.emplace(pictures.instants[i], *views[i]).second) {
+      throw std::runtime_error(
+          fmt::format("{}: two pictures are called {}", source.pictures, pictures.instants[i]));
+    }
+  }
+  if (instants.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: no board in any of {} pictures", source.pictures, views.size()));
+  }
+  return instants;
+}
+
+calibrate::RigProblem problem_of(const std::vector<Source>& sources,
+                                 const calibrate::Board& board,
+                                 const std::vector<calibrate::Lens>& lenses,
+                                 const std::vector<Instants>& seen) {
+  std::map<std::string, int> all;
+  for (const Instants& instants : seen) {
+    for (const auto& [word, view] : instants) ++all[word];
+  }
+  calibrate::RigProblem problem{board, {}};
+  for (std::size_t c = 0; c < sources.size(); ++c) {
+    problem.cameras.push_back({sources[c].name, lenses[c], {}});
+    for (const auto& [word, count] : all) {
+      const auto view = seen[c].find(word);
+      problem.cameras[c].views.push_back(view == seen[c].end() ? calibrate::BoardView{word, {}}
+                                                               : view->second);
+    }
+  }
+  return problem;
+}
+
+void calibrate_rig(const RigOptions& options, Console& console) {
+  if (!options.out.ends_with(".toml")) throw UsageError("--out must end in .toml");
+  const std::vector<Source> sources = sources_of(options);
+  const calibrate::Board board = board_of(options.board);
+  std::vector<calibrate::Lens> lenses;
+  for (const Source& source : sources) lenses.push_back(calibrate::read_lens(source.lens_file));
+  std::vector<Instants> seen;
+  constexpr std::int64_t usual_step = 25;
+  for (std::size_t c = 0; c < sources.size(); ++c) {
+    seen.push_back(
+        find_boards(sources[c], lenses[c], board, options.every.value_or(usual_step), console));
+  }
+  const calibrate::RigFit fit = calibrate::fit_rig(problem_of(sources, board, lenses, seen));
+
+  std::vector<calibrate::RigMember> members;
+  Json cameras = Json::array();
+  console.say("camera                    views  corners  left out  off, px   +- deg     +- mm");
+  for (std::size_t c = 0; c < sources.size(); ++c) {
+    const calibrate::RigCameraFit& camera = fit.cameras[c];
+    members.push_back({sources[c].name, sources[c].lens_file, camera.cam_from_rig, 0, ""});
+    const double sigma_deg = camera.turn_sigma_rad / degree;
+    const double sigma_mm = 1000 * camera.position_sigma_m;
+    const calibrate::Vec3 p = position_of(camera.cam_from_rig);
+    cameras.push_back({{"name", sources[c].name},
+                       {"position_m", {p.x, p.y, p.z}},
+                       {"rotation", camera.cam_from_rig.R.m},
+                       {"sigma_deg", sigma_deg},
+                       {"sigma_mm", sigma_mm},
+                       {"rms_px", camera.rms_px},
+                       {"views", camera.views},
+                       {"corners", camera.corners},
+                       {"left_out", camera.left_out}});
+    console.say(fmt::format("{:<25} {:>5} {:>8} {:>9} {:>8.2f} {:>8.3f} {:>9.2f}", sources[c].name,
+                            camera.views, camera.corners, camera.left_out, camera.rms_px, sigma_deg,
+                            sigma_mm));
+  }
+  calibrate::write_rig(options.out, members,
+                       fmt::format("by platelight calibrate rig, {:.2f} px off", fit.rms_px));
+  console.figures(Json{{"rms_px", fit.rms_px}, {"cameras", cameras}}.dump(2));
+  console.say(
+      fmt::format("{}: {} cameras, {:.2f} px off", options.out, sources.size(), fit.rms_px));
+}
+
+}  // namespace
+
+Command calibrate_rig_command() {
+  return {"calibrate rig", "Find where several cameras stand to each other from a board they see",
+          "platelight calibrate rig plate=plate/ probe=probe/ --lens plate=plate.cameramodel "
+          "--lens probe=probe.toml --board 9x6 --square 0.04 -o rig.toml",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto o = std::make_shared<RigOptions>();
+            arguments.positionals("CAMERAS", o->sources,
+                                  "NAME=DIRECTORY of pictures, those of one name taken at one "
+                                  "instant, or NAME=VIDEO, all of one start and rate");
+            arguments.repeated("--lens", o->lenses, "NAME=FILE: a camera's lens; once for each");
+            arguments.required("--lens");
+            declare(arguments, o->board);
+            arguments.option("--every", o->every, 1, 100000,
+                             "of a video, every so many frames (25)");
+            arguments.option("-o,--out", o->out, "the rig: a .toml file");
+            arguments.required("--out");
+            return [o](Console& console) { calibrate_rig(*o, console); };
+          }};
+}
+
+}  // namespace studio
