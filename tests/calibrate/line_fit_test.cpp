@@ -4,10 +4,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 
+#include "calibrate/grey_picture.h"
 #include "calibrate/pose.h"
+#include "capture/camera.h"
 #include "tests/calibrate/made_markers.h"
+#include "tests/made_files.h"
 
 namespace calibrate {
 namespace {
@@ -210,6 +215,37 @@ TEST(FitLensToLines, CalibratesTheDeskPictureByItsStraightLines) {
       EXPECT_LT(line.heldout_parallel_rad, 0.8 * degree) << marks.lines[i].name;
     }
   }
+}
+
+TEST(ReadLineMarks, HasTheDesksLinesWhereItsPictureIsSteepest) {
+  const auto file = made::real_data() / "brackets/fisheye8mm/IMG_6963.JPG";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
+  const GreyPicture picture = grey_picture(*capture::open_camera(file.string(), {})->next()->image);
+  const LineMarks marks = read_line_marks(PLATELIGHT_SOURCE_DIR "/tests/data/desk_lines.toml");
+  ASSERT_EQ(picture.width, marks.width);
+  ASSERT_EQ(picture.height, marks.height);
+  std::size_t on_edges = 0;
+  for (const MarkedLine& line : marks.lines) {
+    // How steep the picture is across the line, this many pixels beside it.
+    const auto steepness = [&](double beside) {
+      double sum = 0;
+      for (std::size_t i = 0; i < line.pixels.size(); ++i) {
+        const Vec2 a = line.pixels[i == 0 ? 0 : i - 1];
+        const Vec2 b = line.pixels[std::min(i + 1, line.pixels.size() - 1)];
+        const double size = hypotenuse(b.x - a.x, b.y - a.y);
+        const Vec2 across{(a.y - b.y) / size, (b.x - a.x) / size};
+        const auto at = [&](double off) {
+          return value_at(picture,
+                          {line.pixels[i].x + off * across.x, line.pixels[i].y + off * across.y});
+        };
+        sum += at(beside + 2) - at(beside - 2);
+      }
+      return std::abs(sum);
+    };
+    if (steepness(0) > std::max(steepness(-6), steepness(6))) ++on_edges;
+  }
+  // The whiteboard's frame and the keyboard's front have a steeper neighbour.
+  EXPECT_GE(on_edges, marks.lines.size() - 2);
 }
 
 }  // namespace
