@@ -1,5 +1,6 @@
 // platelight calibrate lens: a camera's lens, from pictures of a board.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -248,18 +249,23 @@ void say(const LensCalibration& c, Console& console) {
       100.0 * static_cast<double>(errors.size()) / (across * across), c.coverage_deg));
 }
 
+// mrcal's files, and OpenCV's.
+bool fits_perspective_only(const std::string& file) {
+  return std::ranges::any_of(std::array{".cameramodel", ".yml", ".yaml", ".xml"},
+                             [&](const char* ending) { return file.ends_with(ending); });
+}
+
 LensCalibrationOptions models_of(const LensOptions& options) {
   using Models = LensCalibrationOptions::Models;
   LensCalibrationOptions models;
-  const bool fits_perspective_only = options.out.ends_with(".cameramodel");
   if (options.model == "auto") {
-    models.models = fits_perspective_only ? Models::perspective : Models::any;
+    models.models = fits_perspective_only(options.out) ? Models::perspective : Models::any;
   } else if (options.model == "perspective") {
     models.models = Models::perspective;
   } else if (options.model == "fisheye") {
     models.models = Models::angular;
-    if (fits_perspective_only) {
-      throw UsageError("a fish-eye does not fit into a .cameramodel: let -o name a .toml file");
+    if (fits_perspective_only(options.out)) {
+      throw UsageError("the fish-eyes to choose from fit into a .toml file only: let -o name one");
     }
   } else if (options.model.starts_with("LENSMODEL_")) {
     models.form = calibrate::LensForm{options.model, 0, false};
@@ -275,8 +281,8 @@ LensCalibrationOptions models_of(const LensOptions& options) {
 }
 
 void calibrate_lens(const LensOptions& options, Console& console) {
-  if (!options.out.ends_with(".toml") && !options.out.ends_with(".cameramodel")) {
-    throw UsageError("-o must name a .toml or a .cameramodel file");
+  if (!options.out.ends_with(".toml") && !fits_perspective_only(options.out)) {
+    throw UsageError("-o must name a .toml, a .cameramodel, or OpenCV's .yml, .yaml or .xml file");
   }
   const calibrate::Board board = board_of(options.board);
   LensOptions adjusted = options;
@@ -326,7 +332,8 @@ Command calibrate_lens_command() {
             auto o = std::make_shared<LensOptions>();
             arguments.positionals("IMAGES", o->images, "pictures, or videos of a moving board");
             declare(arguments, o->board);
-            arguments.option("-o,--out", o->out, ".cameramodel, or .toml for any lens");
+            arguments.option("-o,--out", o->out,
+                             ".cameramodel or OpenCV's .yml; .toml for any lens");
             arguments.required("--out");
             arguments.option("--report", o->report, "HTML file; else beside the lens");
             arguments.option("--model", o->model,
