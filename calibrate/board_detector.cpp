@@ -326,7 +326,7 @@ BoardDetection Search::run() {
   const auto end = Clock::now();
   result_.time_ms = std::chrono::duration<double, std::milli>(end - start_).count();
   if (!found) {
-    const bool late = end >= deadline_;
+    const bool late = late_ || end >= deadline_;
     result_.reason = (late ? "no board within the time limit of " + seconds_text(deadline_ - start_)
                            : "no board in " + seconds_text(end - start_)) +
                      ": " + notes_;

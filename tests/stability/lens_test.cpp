@@ -120,8 +120,8 @@ TEST(PredictedOverlayError, CoversTheTrueOneAndIsUnknownWhereNothingWasSeen) {
   const double median = all_ratios[all_ratios.size() / 2];
   RecordProperty("covered", std::to_string(all_covered / all));
   RecordProperty("median_predicted_over_true", std::to_string(median));
-  // The far end of the ellipse is 2.08 times the median of an error that is alike in all directions,
-  // and 3.6 times of one that has one direction only; calibration.md.
+  // The far end of the ellipse is 2.08 times the median of an error that is alike in all
+  // directions, and 3.6 times of one that has one direction only; calibration.md.
   if (PLATELIGHT_FULL_TESTS) {
     EXPECT_GE(median, 1);
     EXPECT_LE(median, 4.5);
