@@ -63,11 +63,6 @@ void leave_out(LensProblem& problem, std::vector<ViewReport>& reports) {
   for (std::size_t i = 0; i < problem.views.size(); ++i) {
     BoardView& view = problem.views[i];
     ViewReport report{view.name, count_corners(view), 0, 0, "", {}};
-    if (view.corners.size() != problem.board.corner_count()) {
-      throw std::invalid_argument(view.name + ": has " + std::to_string(view.corners.size()) +
-                                  " corners, but the board has " +
-                                  std::to_string(problem.board.corner_count()));
-    }
     for (std::size_t j = 0; j < i && report.rejected.empty(); ++j) {
       if (is_same(view, problem.views[j])) {
         report.rejected = "shows the board where " + problem.views[j].name + " does";
@@ -227,22 +222,19 @@ void try_spline(const LensProblem& problem, bool warp, LensCalibration& result) 
   if (agreement_of_neighbours(problem, result.start, best) < suspicious_agreement) return;
   constexpr int knots = 8;
   constexpr std::size_t corners_per_parameter = 40;
-  double farthest_rad = 0;
-  for (std::size_t i = 0; i < best.used.size(); ++i) {
-    if (best.used[i] == 0) continue;
-    const SeenCorner& corner = result.start.corners[i];
-    const Vec3 p = best.bundle.cam_from_board[corner.view] *
-                   corner_of(problem.board, best.bundle.warp_m, corner.index);
-    farthest_rad = std::max(farthest_rad, std::atan2(hypotenuse(p.x, p.y), p.z));
-  }
+  const double farthest_rad = farthest_angle(problem, result.start, best);
   const int field_deg = std::min(2 * static_cast<int>(farthest_rad / degree) + 15, 340);
   const LensForm spline{"LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=" + std::to_string(knots) +
                             "_Ny=" + std::to_string(knots) +
                             "_fov_x_deg=" + std::to_string(field_deg),
                         0, true};
   if (count_used(result.start.used) < corners_per_parameter * free_count(spline)) return;
-  LensSelection more = select_lens(problem, start_of(result.start, best), {&spline, 1}, warp);
-  result.selection.add(std::move(more.candidates.front()));
+  try {
+    LensSelection more = select_lens(problem, start_of(result.start, best), {&spline, 1}, warp);
+    result.selection.add(std::move(more.candidates.front()));
+  } catch (const std::runtime_error&) {
+    // It cannot be solved, and is not needed.
+  }
 }
 
 void fill_reports(const LensProblem& problem, LensCalibration& result) {
@@ -304,7 +296,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   const auto begin = std::chrono::steady_clock::now();
   LensProblem problem = given;
   LensCalibration result;
-  check(problem.board);
+  check(problem);
   leave_out(problem, result.views);
   std::vector<LensForm> forms;
   Robust robust = solve_first(problem, options.models, forms);

@@ -58,11 +58,6 @@ std::vector<SeenCorner> corners_of(const LensProblem& problem, std::size_t& not_
   std::vector<SeenCorner> corners;
   for (std::size_t view = 0; view < problem.views.size(); ++view) {
     const BoardView& seen = problem.views[view];
-    if (seen.corners.size() != problem.board.corner_count()) {
-      throw std::invalid_argument(seen.name + ": has " + std::to_string(seen.corners.size()) +
-                                  " corners, but the board has " +
-                                  std::to_string(problem.board.corner_count()));
-    }
     for (std::size_t index = 0; index < seen.corners.size(); ++index) {
       if (!seen.corners[index]) continue;
       const Vec2 q = *seen.corners[index];
@@ -97,10 +92,7 @@ LensStart start_with(const LensProblem& problem, LensStart start, const LensForm
 
 // The corners, and which of them can be right.
 LensStart smooth_start(const LensProblem& problem) {
-  check(problem.board);
-  if (problem.width < 1 || problem.height < 1) {
-    throw std::invalid_argument("the size of the pictures must be above 0");
-  }
+  check(problem);
   LensStart start;
   start.corners = corners_of(problem, start.not_finite);
   start.used = smooth_corners(problem.board, problem.views.size(), start.corners);
@@ -108,6 +100,19 @@ LensStart smooth_start(const LensProblem& problem) {
 }
 
 }  // namespace
+
+void check(const LensProblem& problem) {
+  check(problem.board);
+  if (problem.width < 1 || problem.height < 1) {
+    throw std::invalid_argument("the size of the pictures must be above 0");
+  }
+  for (const BoardView& view : problem.views) {
+    if (view.corners.size() == problem.board.corner_count()) continue;
+    throw std::invalid_argument(view.name + ": has " + std::to_string(view.corners.size()) +
+                                " corners, but the board has " +
+                                std::to_string(problem.board.corner_count()));
+  }
+}
 
 LensForm one_parameter_form(const LensForm& form) {
   if (form.model.starts_with("LENSMODEL_OPENCV") || form.model == "LENSMODEL_PINHOLE") {
@@ -125,6 +130,7 @@ LensStarts start_lens(const LensProblem& problem) {
 LensStart start_lens(const LensProblem& problem, const LensForm& one_parameter) {
   return start_with(problem, smooth_start(problem), one_parameter);
 }
+
 std::optional<LensSolve> solve_lens(const LensProblem& problem,
                                     const LensForm& form,
                                     const LensStart& start,
@@ -188,6 +194,18 @@ std::optional<LensSolve> solve_lens(const LensProblem& problem,
     return std::nullopt;  // a focal length below 0
   }
   return solve;
+}
+
+double farthest_angle(const LensProblem& problem, const LensStart& start, const LensSolve& solve) {
+  double farthest_rad = 0;
+  for (std::size_t i = 0; i < start.corners.size(); ++i) {
+    if (solve.used[i] == 0) continue;
+    const SeenCorner& corner = start.corners[i];
+    const Vec3 p = solve.bundle.cam_from_board[corner.view] *
+                   corner_of(problem.board, solve.bundle.warp_m, corner.index);
+    farthest_rad = std::max(farthest_rad, std::atan2(hypotenuse(p.x, p.y), p.z));
+  }
+  return farthest_rad;
 }
 
 std::size_t count_used(std::span<const std::uint8_t> used) {

@@ -20,6 +20,10 @@ struct LensProblem {
   std::vector<BoardView> views;
 };
 
+// Throws std::invalid_argument: a bad board, sizes below 1, views whose number of corners is not
+// the board's.
+void check(const LensProblem& problem);
+
 // The corners of a problem, sorted by view, and where to begin. Corners that are not finite or lie
 // outside the picture (by more than half its size) are left out.
 struct LensStart {
@@ -32,8 +36,8 @@ struct LensStart {
 };
 
 // Both projections are tried, as are focal lengths from 0.15 to 12 picture widths; the one with the
-// smaller error comes first. Throws std::invalid_argument: a bad board, sizes below 1, views whose
-// number of corners is not the board's. std::runtime_error: no view shows 6 corners or more.
+// smaller error comes first. Throws as check(), and std::runtime_error: no view shows 6 corners or
+// more.
 struct LensStarts {
   LensStart equidistant, pinhole;
 };
@@ -67,6 +71,9 @@ std::optional<LensSolve> solve_lens(const LensProblem& problem,
                                     const LensForm& form,
                                     const LensStart& start,
                                     const SolveOptions& options = {});
+
+// The largest angle off the axis of a corner in use, by a solve of the start's corners.
+double farthest_angle(const LensProblem& problem, const LensStart& start, const LensSolve& solve);
 
 // How many flags are set.
 std::size_t count_used(std::span<const std::uint8_t> used);

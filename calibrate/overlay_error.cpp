@@ -106,12 +106,10 @@ void OverlayError::cover(const LensProblem& problem,
   cells_x_ = static_cast<int>(problem.width / cell_px_) + 1;
   cells_y_ = static_cast<int>(problem.height / cell_px_) + 1;
   covered_.assign(static_cast<std::size_t>(cells_x_ * cells_y_), 0);
+  max_angle_rad_ = farthest_angle(problem, start, solve);
   for (std::size_t i = 0; i < start.corners.size(); ++i) {
     if (solve.used[i] == 0) continue;
     const SeenCorner& corner = start.corners[i];
-    const Vec3 p = solve.bundle.cam_from_board[corner.view] *
-                   corner_of(problem.board, solve.bundle.warp_m, corner.index);
-    max_angle_rad_ = std::max(max_angle_rad_, std::atan2(hypotenuse(p.x, p.y), p.z));
     const int x = static_cast<int>(corner.q.x / cell_px_);
     const int y = static_cast<int>(corner.q.y / cell_px_);
     for (int dy = -1; dy <= 1; ++dy) {
