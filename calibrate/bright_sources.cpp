@@ -96,11 +96,11 @@ Region region_around(const Brightness& picture,
                      std::vector<std::uint8_t>& taken) {
   Region region;
   const float level = of_peak * picture.light(peak);
-  std::vector<std::size_t> todo{peak};
+  std::vector<std::size_t> pending{peak};
   taken[peak] = 1;
-  while (!todo.empty()) {
-    const std::size_t i = todo.back();
-    todo.pop_back();
+  while (!pending.empty()) {
+    const std::size_t i = pending.back();
+    pending.pop_back();
     region.pixels.push_back(i);
     if (picture.at_rim(i)) {
       region.at_rim = true;
@@ -110,7 +110,7 @@ Region region_around(const Brightness& picture,
       // What was taken from a brighter peak, or is brighter than this one, makes this its flank.
       if (taken[n] != 0 || picture.light(n) < level) continue;
       taken[n] = 1;
-      todo.push_back(n);
+      pending.push_back(n);
     }
   }
   return region;

@@ -9,7 +9,7 @@
 
 #include <toml++/toml.h>
 
-#include "calibrate/text_file.h"
+#include "calibrate/toml_reader.h"
 
 namespace calibrate {
 namespace {
@@ -18,67 +18,21 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr std::size_t most_lines = 1000;
 constexpr std::size_t most_pixels = 10000;  // of a line
 
-std::string quoted(std::string_view text) { return "\"" + std::string(text) + "\""; }
-
-// Complains about places in one file.
-class MarksReader {
+class MarksReader : public TomlReader {
  public:
-  explicit MarksReader(const std::string& path) : path_(path) {}
-
-  [[noreturn]] void fail(const toml::source_region& at, const std::string& why) const {
-    throw std::runtime_error(path_ + ":" + std::to_string(at.begin.line) + ":" +
-                             std::to_string(at.begin.column) + ": " + why);
-  }
-
-  void refuse_unknown(const toml::table& table,
-                      std::initializer_list<std::string_view> known) const {
-    for (const auto& [key, node] : table) {
-      if (std::ranges::find(known, key.str()) != known.end()) continue;
-      std::string names;
-      for (const std::string_view name : known) {
-        names += (names.empty() ? "" : ", ") + std::string(name);
-      }
-      fail(key.source(), "unknown key " + quoted(key.str()) + "; there are " + names);
-    }
-  }
-
-  const toml::node& required(const toml::table& table, std::string_view key) const {
-    const toml::node* node = table.get(key);
-    if (node == nullptr) fail(table.source(), "the key " + quoted(key) + " is missing here");
-    return *node;
-  }
-
-  std::string text(const toml::node& node, std::string_view key) const {
-    const auto value = node.value_exact<std::string>();
-    if (!value || value->empty()) {
-      fail(node.source(), quoted(key) + " must be a text that is not empty");
-    }
-    return *value;
-  }
+  explicit MarksReader(const std::string& path) : TomlReader(path, "table") {}
 
   int size(const toml::table& root, std::string_view key) const {
     const toml::node& node = required(root, key);
     const auto whole = node.is_integer() ? node.value<std::int64_t>() : std::nullopt;
     if (!whole || *whole < 1 || *whole > 65536) {
-      fail(node.source(), quoted(key) + " must be a whole number from 1 to 65536");
+      fail(node.source(), in_quotes(key) + " must be a whole number from 1 to 65536");
     }
     return static_cast<int>(*whole);
   }
 
   Vec2 pixel(const toml::node& node, std::string_view key) const {
-    const toml::array* list = node.as_array();
-    std::array<double, 2> q{};
-    if (list == nullptr || list->size() != q.size()) {
-      fail(node.source(), quoted(key) + " must hold [x, y]");
-    }
-    for (std::size_t i = 0; i < q.size(); ++i) {
-      const toml::node& element = *list->get(i);
-      const auto number = element.is_number() ? element.value<double>() : std::nullopt;
-      if (!number || !(std::abs(*number) <= 1e6)) {
-        fail(element.source(), quoted(key) + " must hold numbers of at most 1e6");
-      }
-      q[i] = *number;
-    }
+    const auto q = numbers<2>(node, key);
     return {q[0], q[1]};
   }
 
@@ -111,14 +65,14 @@ class MarksReader {
       const std::string name = text(*list->get(i), "lines");
       const auto found = std::ranges::find(lines, name, &MarkedLine::name);
       if (found == lines.end()) {
-        fail(list->get(i)->source(), "there is no line " + quoted(name));
+        fail(list->get(i)->source(), "there is no line " + in_quotes(name));
       }
       rectangle.sides[i] = static_cast<std::size_t>(found - lines.begin());
     }
     if (const toml::node* across = table.get("across")) {
       rectangle.across = text(*across, "across");
       if (std::ranges::find(lines, rectangle.across, &MarkedLine::parallel) == lines.end()) {
-        fail(across->source(), "no line is \"parallel\" to " + quoted(rectangle.across));
+        fail(across->source(), "no line is \"parallel\" to " + in_quotes(rectangle.across));
       }
     }
     return rectangle;
@@ -141,9 +95,6 @@ class MarksReader {
     }
     return result;
   }
-
- private:
-  const std::string& path_;
 };
 
 bool is_short(const MarkedLine& line) {
@@ -163,37 +114,32 @@ void check(const LineMarks& marks) {
   if (marks.lines.empty()) throw std::invalid_argument("no straight line is marked");
   for (const MarkedLine& line : marks.lines) {
     if (line.pixels.size() < 3) {
-      throw std::invalid_argument("line " + quoted(line.name) + " needs three pixels or more");
+      throw std::invalid_argument("line " + in_quotes(line.name) + " needs three pixels or more");
     }
     const auto wrong = [](Vec2 q) { return !(std::abs(q.x) <= 1e6 && std::abs(q.y) <= 1e6); };
     if (std::ranges::any_of(line.pixels, wrong)) {
-      throw std::invalid_argument("line " + quoted(line.name) + " has a pixel beyond 1e6");
+      throw std::invalid_argument("line " + in_quotes(line.name) + " has a pixel beyond 1e6");
     }
     if (is_short(line)) {
-      throw std::invalid_argument("line " + quoted(line.name) + " is shorter than 5 px");
+      throw std::invalid_argument("line " + in_quotes(line.name) + " is shorter than 5 px");
     }
     if (!line.parallel.empty() &&
         std::ranges::count(marks.lines, line.parallel, &MarkedLine::parallel) < 2) {
-      throw std::invalid_argument("line " + quoted(line.name) + " is the only one that is " +
-                                  quoted(line.parallel) + ": parallel lines are two or more");
+      throw std::invalid_argument("line " + in_quotes(line.name) + " is the only one that is " +
+                                  in_quotes(line.parallel) + ": parallel lines are two or more");
     }
   }
   for (const MarkedRectangle& rectangle : marks.rectangles) {
     if (std::ranges::any_of(rectangle.sides,
                             [&](std::size_t i) { return i >= marks.lines.size(); })) {
-      throw std::invalid_argument("rectangle " + quoted(rectangle.name) + " has no such line");
+      throw std::invalid_argument("rectangle " + in_quotes(rectangle.name) + " has no such line");
     }
   }
 }
 
 LineMarks read_line_marks(const std::string& path) {
   const MarksReader reader(path);
-  toml::table root;
-  try {
-    root = toml::parse(read_text_file(path));
-  } catch (const toml::parse_error& error) {
-    reader.fail(error.source(), std::string(error.description()));
-  }
+  const toml::table root = reader.parse();
   reader.refuse_unknown(root, {"width", "height", "centre", "max_angle", "line", "rectangle"});
   LineMarks marks;
   marks.width = reader.size(root, "width");
@@ -210,7 +156,7 @@ LineMarks read_line_marks(const std::string& path) {
     marks.lines.push_back(reader.line(*table));
     const std::string& name = marks.lines.back().name;
     if (std::ranges::count(marks.lines, name, &MarkedLine::name) > 1) {
-      reader.fail(table->source(), "line " + quoted(name) + " is here for the second time");
+      reader.fail(table->source(), "line " + in_quotes(name) + " is here for the second time");
     }
   }
   for (const toml::table* table : reader.tables(root, "rectangle")) {

@@ -9,103 +9,35 @@
 
 #include <toml++/toml.h>
 
-#include "calibrate/text_file.h"
+#include "calibrate/toml_reader.h"
 
 namespace calibrate {
 namespace {
 
-// Positions and pixels beyond this are mistakes.
-constexpr double farthest = 1e6;
-
-[[noreturn]] void fail(const std::string& path,
-                       const toml::source_region& at,
-                       const std::string& why) {
-  throw std::runtime_error(path + ":" + std::to_string(at.begin.line) + ":" +
-                           std::to_string(at.begin.column) + ": " + why);
-}
-
-std::string quoted(std::string_view key) { return "\"" + std::string(key) + "\""; }
-
-void refuse_unknown(const std::string& path,
-                    const toml::table& table,
-                    std::initializer_list<std::string_view> known) {
-  for (const auto& [key, node] : table) {
-    if (std::ranges::find(known, key.str()) != known.end()) continue;
-    std::string names;
-    for (const std::string_view name : known) {
-      names += (names.empty() ? "" : ", ") + std::string(name);
-    }
-    fail(path, key.source(), "unknown key " + quoted(key.str()) + "; there are " + names);
-  }
-}
-
-const toml::node& required(const std::string& path,
-                           const toml::table& marker,
-                           std::string_view key) {
-  const toml::node* node = marker.get(key);
-  if (node == nullptr) {
-    fail(path, marker.source(), "this marker has no " + quoted(key));
-  }
-  return *node;
-}
-
-std::string text_of(const std::string& path, const toml::node& node, std::string_view key) {
-  const auto text = node.value_exact<std::string>();
-  if (!text || text->empty()) {
-    fail(path, node.source(), quoted(key) + " must be a text that is not empty");
-  }
-  return *text;
-}
-
-template <std::size_t count>
-std::array<double, count> numbers_of(const std::string& path,
-                                     const toml::node& node,
-                                     std::string_view key) {
-  const toml::array* list = node.as_array();
-  if (list == nullptr || list->size() != count) {
-    fail(path, node.source(),
-         quoted(key) + " must be a list of " + std::to_string(count) + " numbers");
-  }
-  std::array<double, count> numbers{};
-  for (std::size_t i = 0; i < count; ++i) {
-    const toml::node& element = *list->get(i);
-    const auto number = element.is_number() ? element.value<double>() : std::nullopt;
-    if (!number || !(std::abs(*number) <= farthest)) {
-      fail(path, element.source(), quoted(key) + " must hold numbers of at most 1e6");
-    }
-    numbers[i] = *number;
-  }
-  return numbers;
-}
-
-Marker marker_of(const std::string& path, const toml::table& table) {
-  refuse_unknown(path, table, {"name", "position", "pixel", "picture"});
+Marker marker_of(const TomlReader& reader, const toml::table& table) {
+  reader.refuse_unknown(table, {"name", "position", "pixel", "picture"});
   Marker marker;
-  marker.name = text_of(path, required(path, table, "name"), "name");
-  const auto p = numbers_of<3>(path, required(path, table, "position"), "position");
+  marker.name = reader.text(reader.required(table, "name"), "name");
+  const auto p = reader.numbers<3>(reader.required(table, "position"), "position");
   marker.p_set = {p[0], p[1], p[2]};
-  const auto q = numbers_of<2>(path, required(path, table, "pixel"), "pixel");
+  const auto q = reader.numbers<2>(reader.required(table, "pixel"), "pixel");
   marker.q = {q[0], q[1]};
   if (const toml::node* picture = table.get("picture")) {
-    marker.picture = text_of(path, *picture, "picture");
+    marker.picture = reader.text(*picture, "picture");
   }
   return marker;
 }
 
 std::string named(const std::string& picture) {
-  return picture.empty() ? "no picture's name" : "picture " + quoted(picture);
+  return picture.empty() ? "no picture's name" : "picture " + in_quotes(picture);
 }
 
 }  // namespace
 
 std::vector<Marker> read_markers(const std::string& path) {
-  toml::table root;
-  try {
-    root = toml::parse(read_text_file(path));
-  } catch (const toml::parse_error& error) {
-    fail(path, error.source(), std::string(error.description()));
-  }
-  refuse_unknown(path, root, {"marker"});
+  const TomlReader reader(path, "marker");
+  const toml::table root = reader.parse();
+  reader.refuse_unknown(root, {"marker"});
   const toml::node* node = root.get("marker");
   const toml::array* tables = node == nullptr ? nullptr : node->as_array();
   if (tables == nullptr || tables->empty()) {
@@ -114,19 +46,18 @@ std::vector<Marker> read_markers(const std::string& path) {
   std::vector<Marker> markers;
   for (const toml::node& entry : *tables) {
     const toml::table* table = entry.as_table();
-    if (table == nullptr) fail(path, entry.source(), "a marker must be a table: [[marker]]");
-    const Marker marker = marker_of(path, *table);
+    if (table == nullptr) reader.fail(entry.source(), "a marker must be a table: [[marker]]");
+    const Marker marker = marker_of(reader, *table);
     for (const Marker& other : markers) {
       if (other.name != marker.name) continue;
       if (other.picture == marker.picture) {
-        fail(path, table->source(),
-             "marker " + quoted(marker.name) + " is here for the second " + "time with " +
-                 named(marker.picture));
+        reader.fail(table->source(), "marker " + in_quotes(marker.name) +
+                                         " is here for the second " + "time with " +
+                                         named(marker.picture));
       }
       if (other.p_set != marker.p_set) {
-        fail(path, table->source(),
-             "marker " + quoted(marker.name) + " has another " + "position than with " +
-                 named(other.picture));
+        reader.fail(table->source(), "marker " + in_quotes(marker.name) + " has another " +
+                                         "position than with " + named(other.picture));
       }
     }
     markers.push_back(marker);
@@ -173,7 +104,7 @@ std::vector<Sight> sights_of(const Lens& lens, std::span<const Marker> markers) 
   for (const Marker& marker : markers) {
     const auto sight = sight_of(lens, marker.q, marker.p_set);
     if (!sight) {
-      throw std::runtime_error("marker " + quoted(marker.name) + ": the lens sees nothing at [" +
+      throw std::runtime_error("marker " + in_quotes(marker.name) + ": the lens sees nothing at [" +
                                to_text(marker.q.x) + ", " + to_text(marker.q.y) +
                                "]; check the pixel, that the lens is this camera's, and that its " +
                                "boards reached so far out");

@@ -12,37 +12,15 @@
 #include <toml++/toml.h>
 
 #include "calibrate/text_file.h"
+#include "calibrate/toml_reader.h"
 
 namespace calibrate {
 namespace {
 
-constexpr double farthest_m = 1e6;
-constexpr double largest_offset_s = 1e6;
-
-std::string in_quotes(std::string_view text) { return "\"" + std::string(text) + "\""; }
-
-// Complains about places in one file.
-class RigReader {
+class RigReader : public TomlReader {
  public:
   explicit RigReader(const std::string& path)
-      : path_(path), folder_(std::filesystem::path(path).parent_path()) {}
-
-  [[noreturn]] void fail(const toml::source_region& at, const std::string& why) const {
-    throw std::runtime_error(path_ + ":" + std::to_string(at.begin.line) + ":" +
-                             std::to_string(at.begin.column) + ": " + why);
-  }
-
-  void refuse_unknown(const toml::table& table,
-                      std::initializer_list<std::string_view> known) const {
-    for (const auto& [key, node] : table) {
-      if (std::ranges::find(known, key.str()) != known.end()) continue;
-      std::string names;
-      for (const std::string_view name : known) {
-        names += (names.empty() ? "" : ", ") + std::string(name);
-      }
-      fail(key.source(), "unknown key " + in_quotes(key.str()) + "; there are " + names);
-    }
-  }
+      : TomlReader(path, "camera"), folder_(std::filesystem::path(path).parent_path()) {}
 
   RigMember camera(const toml::table& table) const {
     refuse_unknown(table, {"name", "lens", "position", "rotation", "time_offset", "response"});
@@ -59,7 +37,7 @@ class RigReader {
       fail(rotation.source(), "\"rotation\": " + std::string(error.what()));
     }
     if (const toml::node* offset = table.get("time_offset")) {
-      member.time_offset_s = number(*offset, "time_offset", largest_offset_s);
+      member.time_offset_s = number(*offset, "time_offset");
     }
     if (const toml::node* response = table.get("response")) {
       member.response = file(*response, "response");
@@ -68,45 +46,10 @@ class RigReader {
   }
 
  private:
-  const toml::node& required(const toml::table& table, std::string_view key) const {
-    const toml::node* node = table.get(key);
-    if (node == nullptr) fail(table.source(), "this camera has no " + in_quotes(key));
-    return *node;
-  }
-
-  std::string text(const toml::node& node, std::string_view key) const {
-    const auto value = node.value_exact<std::string>();
-    if (!value || value->empty()) {
-      fail(node.source(), in_quotes(key) + " must be a text that is not empty");
-    }
-    return *value;
-  }
-
   std::string file(const toml::node& node, std::string_view key) const {
     return (folder_ / text(node, key)).lexically_normal().string();
   }
 
-  double number(const toml::node& node, std::string_view key, double largest) const {
-    const auto value = node.is_number() ? node.value<double>() : std::nullopt;
-    if (!value || !(std::abs(*value) <= largest)) {
-      fail(node.source(), in_quotes(key) + " must hold numbers of at most 1e6");
-    }
-    return *value;
-  }
-
-  template <std::size_t count>
-  std::array<double, count> numbers(const toml::node& node, std::string_view key) const {
-    const toml::array* list = node.as_array();
-    if (list == nullptr || list->size() != count) {
-      fail(node.source(),
-           in_quotes(key) + " must be a list of " + std::to_string(count) + " numbers");
-    }
-    std::array<double, count> result{};
-    for (std::size_t i = 0; i < count; ++i) result[i] = number(*list->get(i), key, farthest_m);
-    return result;
-  }
-
-  const std::string& path_;
   std::filesystem::path folder_;
 };
 
@@ -136,12 +79,7 @@ std::string within(const std::filesystem::path& folder, const std::string& file)
 
 std::vector<RigMember> read_rig(const std::string& path) {
   const RigReader reader(path);
-  toml::table root;
-  try {
-    root = toml::parse(read_text_file(path));
-  } catch (const toml::parse_error& error) {
-    reader.fail(error.source(), std::string(error.description()));
-  }
+  const toml::table root = reader.parse();
   reader.refuse_unknown(root, {"camera"});
   const toml::node* node = root.get("camera");
   const toml::array* tables = node == nullptr ? nullptr : node->as_array();
