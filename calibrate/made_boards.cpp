@@ -135,6 +135,22 @@ LensProblem make_board_views(const MadeLens& truth, const MadeBoards& options) {
   return problem;
 }
 
+std::vector<MadeRay> even_rays(const MadeLens& truth, double max_deg) {
+  std::vector<MadeRay> rays;
+  for (double off = 1; off <= max_deg; off += 2) {
+    const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
+    for (int i = 0; i < around; ++i) {
+      const double a = 2 * std::numbers::pi * (i + 0.5) / around;
+      const Vec3 v{std::sin(off * degree) * std::cos(a), std::sin(off * degree) * std::sin(a),
+                   std::cos(off * degree)};
+      const Vec2 q = truth.project(v);
+      if (q.x < 0 || q.y < 0 || q.x > truth.lens.width - 1 || q.y > truth.lens.height - 1) continue;
+      rays.push_back({v, q});
+    }
+  }
+  return rays;
+}
+
 double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg) {
   return ray_error_mrad(
       truth, [&](Vec2 q) { return unproject(solved, q); }, max_deg);
@@ -144,19 +160,11 @@ double ray_error_mrad(const MadeLens& truth,
                       const std::function<std::optional<Vec3>(Vec2)>& solved,
                       double max_deg) {
   std::vector<Vec3> expected, found;
-  for (double off = 1; off <= max_deg; off += 2) {
-    const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
-    for (int i = 0; i < around; ++i) {
-      const double a = 2 * std::numbers::pi * (i + 0.5) / around;
-      const Vec3 v{std::sin(off * degree) * std::cos(a), std::sin(off * degree) * std::sin(a),
-                   std::cos(off * degree)};
-      const Vec2 q = truth.project(v);
-      if (q.x < 0 || q.y < 0 || q.x > truth.lens.width - 1 || q.y > truth.lens.height - 1) continue;
-      const auto u = solved(q);
-      if (!u) return HUGE_VAL;
-      expected.push_back(v);
-      found.push_back(*u);
-    }
+  for (const auto& [v, q] : even_rays(truth, max_deg)) {
+    const auto u = solved(q);
+    if (!u) return HUGE_VAL;
+    expected.push_back(v);
+    found.push_back(*u);
   }
   const Mat3 turn = best_rotation(found, expected);
   double sum = 0;

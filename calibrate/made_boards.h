@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "calibrate/lens.h"
 #include "calibrate/lens_solve.h"
@@ -52,9 +53,17 @@ MadeBoards normal_boards();
 // direction. The same options always give the same corners.
 LensProblem make_board_views(const MadeLens& truth, const MadeBoards& boards);
 
-// RMS angle in milliradians between true and solved directions of the pixels that the lens shows up
-// to an angle off the axis, evenly over the sphere, once the best rotation between the two cameras
-// is taken out (no picture of boards can tell that). Infinite if the solved lens does not see one.
+// A direction, and the pixel in which the camera shows it.
+struct MadeRay {
+  Vec3 v;
+  Vec2 q;
+};
+// What the picture shows up to an angle off the axis, evenly over the sphere.
+std::vector<MadeRay> even_rays(const MadeLens& truth, double max_deg);
+
+// RMS angle in milliradians between true and solved directions of even_rays(), once the best
+// rotation between the two cameras is taken out (no picture of boards can tell that). Infinite if
+// the solved lens does not see one.
 double ray_error_mrad(const MadeLens& truth, const Lens& solved, double max_deg);
 // The same of any camera: `unproject` gives the direction of a pixel.
 double ray_error_mrad(const MadeLens& truth,

@@ -38,25 +38,18 @@ struct RayErrors {
 double foretold_mrad(const MadeLens& truth, const LensCalibration& c, double max_deg) {
   double sum = 0;
   double count = 0;
-  for (double off = 1; off <= max_deg; off += 2) {
-    const int around = std::max(6, static_cast<int>(60 * std::sin(off * degree)));
-    for (int i = 0; i < around; ++i) {
-      const double a = 2 * std::numbers::pi * (i + 0.5) / around;
-      const Vec3 v{std::sin(off * degree) * std::cos(a), std::sin(off * degree) * std::sin(a),
-                   std::cos(off * degree)};
-      const Vec2 q = truth.project(v);
-      if (q.x < 0 || q.y < 0 || q.x > truth.lens.width - 1 || q.y > truth.lens.height - 1) continue;
-      const auto noise = c.overlay->noise(q);
-      const auto here = unproject(c.lens, q);
-      const auto right = unproject(c.lens, {q.x + 0.1, q.y});
-      const auto below = unproject(c.lens, {q.x, q.y + 0.1});
-      if (!noise || !here || !right || !below) continue;
-      const Vec3 by_x = (*right - *here) / 0.1;
-      const Vec3 by_y = (*below - *here) / 0.1;
-      sum += noise->xx * dot(by_x, by_x) + 2 * noise->xy * dot(by_x, by_y) +
-             noise->yy * dot(by_y, by_y);
-      ++count;
-    }
+  for (const MadeRay& ray : even_rays(truth, max_deg)) {
+    const Vec2 q = ray.q;
+    const auto noise = c.overlay->noise(q);
+    const auto here = unproject(c.lens, q);
+    const auto right = unproject(c.lens, {q.x + 0.1, q.y});
+    const auto below = unproject(c.lens, {q.x, q.y + 0.1});
+    if (!noise || !here || !right || !below) continue;
+    const Vec3 by_x = (*right - *here) / 0.1;
+    const Vec3 by_y = (*below - *here) / 0.1;
+    sum +=
+        noise->xx * dot(by_x, by_x) + 2 * noise->xy * dot(by_x, by_y) + noise->yy * dot(by_y, by_y);
+    ++count;
   }
   return 1000 * std::sqrt(sum / count);
 }
