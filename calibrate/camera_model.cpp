@@ -96,6 +96,14 @@ class Reader {
     return result;
   }
 
+  double number(const std::string& key) {
+    skip_space();
+    const std::string_view token = word();
+    double value = 0;
+    if (!parse_number(token, value) || !std::isfinite(value)) fail(key + " must be a number");
+    return value;
+  }
+
   // Passes over any value: string, number, name, or nested lists of them.
   void skip_value() {
     int depth = 0;
@@ -151,6 +159,9 @@ class Reader {
   int line_ = 1;
 };
 
+// Ours: mrcal passes over it.
+constexpr const char* error_key = "platelight_error_px";
+
 // A value and the line that it began on, for later complaints.
 template <class T>
 struct Found {
@@ -161,6 +172,7 @@ struct Found {
 struct Contents {
   std::optional<Found<std::string>> lens_model;
   std::optional<Found<std::vector<double>>> intrinsics, extrinsics, imager_size;
+  std::optional<Found<double>> error_px;
 };
 
 template <class T>
@@ -188,6 +200,8 @@ Contents read_contents(Reader& reader) {
       set_once(reader, contents.extrinsics, key, {reader.numbers(key), line});
     } else if (key == "imagersize") {
       set_once(reader, contents.imager_size, key, {reader.numbers(key), line});
+    } else if (key == error_key) {
+      set_once(reader, contents.error_px, key, {reader.number(key), line});
     } else {
       reader.skip_value();
     }
@@ -227,6 +241,12 @@ CameraModel read_camera_model(const std::string& path) {
   model.lens.width = static_cast<int>(size.value[0]);
   model.lens.height = static_cast<int>(size.value[1]);
   model.lens.parameters = contents.intrinsics->value;
+  if (contents.error_px) {
+    model.lens.error_px = contents.error_px->value;
+    if (model.lens.error_px < 0) {
+      reader.fail_at(contents.error_px->line, std::string(error_key) + " must be 0 or above");
+    }
+  }
   if (!is_mrcal_model(model.lens.model)) {
     reader.fail_at(contents.lens_model->line,
                    "'" + model.lens.model + "' is not the name of a model of mrcal");
@@ -265,14 +285,19 @@ void write_camera_model(const std::string& path, const CameraModel& model) {
     const Vec3 t = model.cam_from_ref->t;
     rt = {r.x, r.y, r.z, t.x, t.y, t.z};
   }
-  write_text_file(
-      path, "{\n    'lensmodel':  '" + (pinhole ? "LENSMODEL_PINHOLE" : model.lens.model) +
-                "',\n    # fx, fy, cx, cy, then the model's own\n    'intrinsics': " +
-                list(model.lens.parameters) +
-                ",\n    # rotation vector and translation from the reference to the camera\n"
-                "    'extrinsics': " +
-                list(rt) + ",\n    'imagersize': [ " + std::to_string(model.lens.width) + ", " +
-                std::to_string(model.lens.height) + " ]\n}\n");
+  const std::string error =
+      model.lens.error_px > 0
+          ? "    '" + std::string(error_key) + "': " + to_text(model.lens.error_px) + ",\n"
+          : "";
+  write_text_file(path,
+                  "{\n    'lensmodel':  '" + (pinhole ? "LENSMODEL_PINHOLE" : model.lens.model) +
+                      "',\n    # fx, fy, cx, cy, then the model's own\n    'intrinsics': " +
+                      list(model.lens.parameters) +
+                      ",\n    # rotation vector and translation from the reference to the camera\n"
+                      "    'extrinsics': " +
+                      list(rt) + ",\n" + error + "    'imagersize': [ " +
+                      std::to_string(model.lens.width) + ", " + std::to_string(model.lens.height) +
+                      " ]\n}\n");
 }
 
 }  // namespace calibrate

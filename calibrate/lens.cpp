@@ -72,6 +72,9 @@ void check(const Lens& lens) {
   if (!(lens.max_angle_rad > 0 && lens.max_angle_rad <= std::numbers::pi)) {
     throw std::invalid_argument("a lens's largest angle must be above 0 and at most 180 degrees");
   }
+  if (!(lens.error_px >= 0) || !std::isfinite(lens.error_px)) {
+    throw std::invalid_argument("a lens's error must be 0 or above, and finite");
+  }
 }
 
 std::optional<Vec2> project(const Lens& lens, Vec3 v_cam) {
@@ -141,6 +144,7 @@ Lens resized(const Lens& lens, int width, int height) {
   }
   p[centre] = (p[centre] + 0.5) * sx - 0.5;
   p[centre + 1] = (p[centre + 1] + 0.5) * sy - 0.5;
+  result.error_px *= std::sqrt(sx * sy);
   check(result);
   return result;
 }

@@ -26,6 +26,9 @@ struct Lens {
   std::vector<double> parameters;
   // Fish-eyes see up to this angle off the axis; beyond it both directions return nothing.
   double max_angle_rad = 3.14159265358979;
+  // How far off its pixels are thought to be along each axis, where it was calibrated: a smooth
+  // error, alike in neighbouring pixels. RMS over the picture, 0 = unknown.
+  double error_px = 0;
   friend bool operator==(const Lens&, const Lens&) = default;
 };
 

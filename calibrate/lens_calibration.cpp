@@ -342,6 +342,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
     result.lens.max_angle_rad =
         std::min(result.overlay->max_angle_rad() + guess_rad, std::numbers::pi);
   }
+  result.lens.error_px = result.overlay->rms_px();
   fill_reports(problem, result);
   result.warnings = warnings_of(problem, result);
   result.time_ms =

@@ -149,6 +149,10 @@ Lens read_toml_lens(const std::string& path) {
     }
     lens.max_angle_rad = std::min(max_angle_deg * degree, std::numbers::pi);
   }
+  if (table.has("error_px")) {
+    lens.error_px = table.number("error_px");
+    if (lens.error_px < 0) table.fail_at_key("error_px", "\"error_px\" must be 0 or above");
+  }
   if (const auto kind = AxialLens::kind_of(lens.model)) {
     const ParameterNames expected = names_of(*kind);
     const std::size_t required = expected.names.size() - expected.optional;
@@ -175,6 +179,7 @@ void write_toml_lens(const std::string& path, const Lens& lens) {
   if (lens.max_angle_rad < Lens{}.max_angle_rad) {
     text += "max_angle = " + to_text(lens.max_angle_rad / degree) + "  # degrees off the axis\n";
   }
+  if (lens.error_px > 0) text += "error_px = " + to_text(lens.error_px) + "\n";
   if (const auto kind = AxialLens::kind_of(lens.model)) {
     const ParameterNames expected = names_of(*kind);
     for (std::size_t i = 0; i < lens.parameters.size(); ++i) {

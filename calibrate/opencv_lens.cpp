@@ -207,6 +207,10 @@ Lens lens_of(const OpencvStorage& file,
     }
     lens.max_angle_rad = std::min(angle_deg * degree, std::numbers::pi);
   }
+  if (const StoredValue* error = file.find("error_px")) {
+    lens.error_px = number_of(file, *error);
+    if (!(lens.error_px >= 0)) file.fail(error->line, "\"error_px\" must be 0 or above");
+  }
   try {
     check(lens);
   } catch (const std::invalid_argument& error) {
@@ -330,6 +334,7 @@ void write_opencv_lens(const std::string& path, const Lens& lens) {
   if (lens.max_angle_rad < Lens{}.max_angle_rad) {
     text += value("max_angle", to_text(lens.max_angle_rad / degree));
   }
+  if (lens.error_px > 0) text += value("error_px", to_text(lens.error_px));
   text += matrix_text(xml, "camera_matrix", 3, 3,
                       std::array{p[0], 0.0, p[2], 0.0, p[1], p[3], 0.0, 0.0, 1.0});
   if (!coefficients.empty()) {

@@ -188,6 +188,19 @@ std::optional<OverlayError::Covariance> OverlayError::noise(Vec2 q) const {
   return v ? noise_of(members_.front(), *v) : std::nullopt;
 }
 
+double OverlayError::rms_px() const {
+  double squares = 0, count = 0;
+  for (int y = 0; y < cells_y_; ++y) {
+    for (int x = 0; x < cells_x_; ++x) {
+      const auto error = at({(x + 0.5) * cell_px_, (y + 0.5) * cell_px_});
+      if (!error) continue;
+      squares += *error * *error / (ellipse_95 * ellipse_95);
+      ++count;
+    }
+  }
+  return count > 0 ? std::sqrt(squares / count) : 0;
+}
+
 std::optional<double> OverlayError::at(Vec2 q) const {
   if (!covered(q)) return std::nullopt;
   const auto v = unproject(members_.front().lens, q);

@@ -46,6 +46,9 @@ class OverlayError {
   // 95 % error in pixels; nothing where it is unknown: outside of coverage.
   std::optional<double> at(Vec2 q) const;
 
+  // RMS over the covered picture of a pixel's standard deviation along its worst direction.
+  double rms_px() const;
+
   // Its part from noise alone: the covariance (xx, xy, yy) of a pixel, pixels^2, also outside of
   // coverage. Nothing where the lens sees nothing.
   struct Covariance {

@@ -71,24 +71,13 @@ struct Normal {
 
 Normal normal_equations(std::span<const Sight> sights, const Pose& pose, double s) {
   Normal normal;
-  const Mat3 set_from_cam = pose.R.transposed();
   for (const Sight& sight : sights) {
     const Vec3 p = pose * sight.p_set;
-    const double distance = length(p);
-    if (distance < nearest_m) continue;
-    const Vec3 u = p / distance;
-    const double cosine = dot(sight.v_cam, u);
-    const double arc = arc_over_sine(length(u - sight.v_cam * cosine), cosine);
-    const Vec2 r = residual_of_direction(sight, u);
+    if (length(p) < nearest_m) continue;
+    const Vec2 r = residual_of_direction(sight, normalize(p));
     const double weight = std::isinf(s) ? 1 : 1 / (1 + squared(r) / (s * s));
-    Eigen::Matrix<double, 2, 6> j;
-    Eigen::Index row = 0;
-    for (const Vec3 axis : {sight.right, sight.down}) {
-      const Vec3 e = (axis - u * dot(axis, u)) * (arc / distance);
-      const Vec3 turn = cross(p, e);
-      const Vec3 move = -(set_from_cam * e);
-      j.row(row++) << turn.x, turn.y, turn.z, move.x, move.y, move.z;
-    }
+    const SightSlopes slopes = slopes_of(sight, pose);
+    const Eigen::Map<const Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> j(slopes.data());
     normal.matrix.noalias() += weight * j.transpose() * j;
     normal.gradient.noalias() += weight * j.transpose() * Eigen::Vector2d(r.x, r.y);
   }
@@ -137,6 +126,27 @@ Sight sight_of(Vec3 v_cam, Vec3 p_set) {
 
 Vec2 residual_of(const Sight& sight, const Pose& cam_from_set) {
   return residual_of_direction(sight, normalize(cam_from_set * sight.p_set));
+}
+
+SightSlopes slopes_of(const Sight& sight, const Pose& cam_from_set) {
+  SightSlopes slopes{};
+  const Vec3 p = cam_from_set * sight.p_set;
+  const double distance = length(p);
+  if (distance < nearest_m) return slopes;
+  const Vec3 u = p / distance;
+  const double cosine = dot(sight.v_cam, u);
+  const double arc = arc_over_sine(length(u - sight.v_cam * cosine), cosine);
+  const Mat3 set_from_cam = cam_from_set.R.transposed();
+  std::size_t at = 0;
+  for (const Vec3 axis : {sight.right, sight.down}) {
+    const Vec3 e = (axis - u * dot(axis, u)) * (arc / distance);
+    const Vec3 turn = cross(p, e);
+    const Vec3 move = -(set_from_cam * e);
+    for (const double slope : {turn.x, turn.y, turn.z, move.x, move.y, move.z}) {
+      slopes[at++] = slope;
+    }
+  }
+  return slopes;
 }
 
 RefinedPose refine_pose(std::span<const Sight> sights,

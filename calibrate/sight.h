@@ -35,6 +35,11 @@ Vec2 residual_of(const Sight& sight, const Pose& cam_from_set);
 // p + move in metres.
 using PoseMatrix = std::array<double, 36>;
 
+// Derivatives of residual_of by the pose's six, row by row: right, then down. Zero for a point at
+// the camera's own place.
+using SightSlopes = std::array<double, 12>;
+SightSlopes slopes_of(const Sight& sight, const Pose& cam_from_set);
+
 // What least squares found.
 struct RefinedPose {
   Pose cam_from_set;

@@ -39,6 +39,7 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
   if (double max_angle_deg = 180; table.number("max_angle", max_angle_deg, {0.01, 180})) {
     lens.max_angle_rad = std::min(max_angle_deg * std::numbers::pi / 180, std::numbers::pi);
   }
+  table.number("error_px", lens.error_px, {0, 1e4});
   if (std::array<int, 2> whole{}; table.integers("size", whole, 1, 65536)) {
     lens.width = whole[0];
     lens.height = whole[1];

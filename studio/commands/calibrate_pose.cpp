@@ -107,8 +107,9 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
       by_board ? find_board(options, lens) : read_markers_of(options.markers, options.picture);
   const calibrate::Registration found = [&] {
     try {
-      return calibrate::register_camera(calibrate::sights_of(lens, markers),
-                                        {options.noise_px.value_or(usual_noise_px)});
+      return calibrate::register_camera(
+          calibrate::sights_of(lens, markers),
+          {options.noise_px.value_or(usual_noise_px), error_of(lens)});
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("{}: {}", source, error.what()));
     }
@@ -119,6 +120,7 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   figures.update(Json{{"sigma_deg", sigma_deg},
                       {"sigma_mm", sigma_mm},
                       {"rms_px", found.rms_px},
+                      {"lens_error_px", lens.error_px},
                       {"ambiguous", found.ambiguous}});
   if (found.rival) {
     figures["rival"] = pose_json(*found.rival);
@@ -134,6 +136,10 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   say_markers(markers, found, !by_board, console);
   say_pose(found.cam_from_set, sigma_deg, sigma_mm, console);
   console.figures(figures.dump(2));
+  if (!(lens.error_px > 0)) {
+    console.warn(options.lens +
+                 ": does not tell its own error (error_px), which is left out of +-");
+  }
   for (const std::string& warning : found.warnings) console.warn(warning);
   console.say(fmt::format("{}: from {} {}, {:.2f} px off", options.out, markers.size(), what,
                           found.rms_px));

@@ -96,8 +96,10 @@ Found turn_by_markers(const std::vector<calibrate::Marker>& markers,
 
 Found place_by_markers(const std::vector<calibrate::Marker>& markers,
                        const std::vector<calibrate::Sight>& sights,
+                       const calibrate::Lens& lens,
                        double noise_px) {
-  const calibrate::Registration fit = calibrate::register_camera(sights, {noise_px});
+  const calibrate::Registration fit =
+      calibrate::register_camera(sights, {noise_px, calibrate::error_of(lens)});
   Found found;
   found.probe_from_set = fit.cam_from_set;
   found.sigma_deg = fit.turn_sigma_rad / degree;
@@ -121,7 +123,7 @@ Found find_by_markers(const ProbeOptions& options, const calibrate::Lens& lens) 
   try {
     const auto sights = calibrate::sights_of(lens, markers);
     Found found = position ? turn_by_markers(markers, sights, *position, noise_px)
-                           : place_by_markers(markers, sights, noise_px);
+                           : place_by_markers(markers, sights, lens, noise_px);
     found.from = fmt::format("{} markers", markers.size());
     return found;
   } catch (const std::exception& error) {

@@ -22,6 +22,7 @@ CameraModel made_model() {
                 768,
                 576,
                 {1184.97, 1194.57, 324.222, 282.566, -0.15662, 0.06178, 0, 1.0 / 3}};
+  model.lens.error_px = 0.1 / 3;
   model.cam_from_ref = look_at({-28.94, -19.529, 7.066}, {-9.54, -5.61, 0}, 0.05);
   return model;
 }
@@ -152,6 +153,7 @@ TEST(ReadCameraModel, RefusesEveryBadFileWithLineAndReason) {
        {"negative_size.cameramodel", ":5: 'imagersize' must be"},
        {"size_of_three.cameramodel", ":5: 'imagersize' must be"},
        {"five_extrinsics.cameramodel", ":4: 'extrinsics' must be 6 numbers"},
+       {"negative_error.cameramodel", ":5: platelight_error_px must be 0 or above"},
        {"open_quote.cameramodel", ":2: a string has no closing quote"},
        {"key_twice.cameramodel", ":4: 'intrinsics' stands here for the second time"},
        {"text_after_the_end.cameramodel", ":7: something follows"},

@@ -14,7 +14,7 @@ TEST(WriteLens, IsUndoneByReadLens) {
   const std::vector<Lens> lenses{
       {"pinhole", 640, 480, {500.5, 501.25, 319.5, 1.0 / 3}},
       {"equisolid", 2808, 1872, {622.4, 1412.5, 932.0}, 1.62},
-      {"kannala_brandt", 1024, 1024, {331, 332, 513.3, 509.1, -.02, .003}, 1.5},
+      {"kannala_brandt", 1024, 1024, {331, 332, 513.3, 509.1, -.02, .003}, 1.5, 0.1 / 3},
       {"kannala_brandt", 1024, 1024, {331, 332, 513.3, 509.1}},
       {"decentred_kannala_brandt", 640, 480, {200, 201, 320, 240, 1e-4, 2e-4, -.02}, 1.4},
       {"LENSMODEL_OPENCV4", 768, 576, {1184.97, 1194.57, 324.222, 282.566, -.15662, .06178, 0, 0}},
@@ -62,6 +62,7 @@ TEST(ReadLens, RefusesEveryBadTomlFileWithLineColumnAndReason) {
        {"lens_number_for_text.toml", ":1:9: \"model\" must be a string"},
        {"lens_size_with_fraction.toml", ":2:9: \"width\" must be a whole number"},
        {"lens_size_negative.toml", ":3:10: \"height\" must be a whole number"},
+       {"lens_error_negative.toml", ":7:12: \"error_px\" must be 0 or above"},
        {"lens_angle_too_large.toml", ":7:13: \"max_angle\" must be above 0 and at most 180"},
        {"lens_not_finite.toml", ":4:5: \"f\" must be finite"},
        {"lens_focal_length_negative.toml", ":1:9: a focal length must be above 0"},
