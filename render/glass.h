@@ -1,0 +1,48 @@
+// Solid glass and other clear bodies: the shader "glass".
+//
+// At each surface both rays are followed, mirrored and refracted, with the exact shares of
+// Fresnel's equations for unpolarised light; beyond the critical angle all is mirrored. Inside,
+// light is absorbed by Beer's law. Bodies may be nested (a bulb in glass in air), or overlap a
+// little where they touch: of two at the same place, the one of higher priority is the one that is
+// there (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", JGT 7(2), 2002).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "render/environment.h"
+#include "render/mesh.h"
+
+namespace render {
+
+// Parameter block of the shader "glass".
+struct GlassParameters {
+  float index = 1.5F;               // of refraction, 1 to 4, at 587.6 nm
+  float absorption[3] = {0, 0, 0};  // per metre, 0 or more
+  float abbe = 0;                   // (n_d - 1) / (n_F - n_C); 0 = no dispersion, else 5 or more
+  std::int32_t priority = 0;        // of overlapping bodies, the higher is there
+  // Share of light that goes straight through one surface to what lies behind, for shadows: glass
+  // bends light, and what it gathers elsewhere as caustics is not followed.
+  float shadow[3] = {0.92F, 0.92F, 0.92F};
+};
+
+// The block in a material of the shader "glass", and back. Throws std::invalid_argument, naming the
+// material, if the block is not one, or a number is out of range.
+GlassParameters glass_parameters(const Material& material);
+Material make_glass_material(std::string name, const GlassParameters& parameters);
+
+// Share of unpolarised light that a surface mirrors: `cosine` of the angle to its normal on the
+// side that the light comes from, 0..1; `ratio` of the index of that side to the other's. 1 beyond
+// the critical angle.
+float fresnel(float cosine, float ratio);
+
+// `incoming` (unit) refracted at a surface of unit normal `normal` that faces it. Zero beyond the
+// critical angle.
+Vec3f refracted(Vec3f incoming, Vec3f normal, float ratio);
+
+// The index at the wavelengths that stand for red, green, blue (611, 549, 464 nm, the primaries'
+// dominant ones), by Cauchy's equation through the index and Abbe's number.
+std::array<float, 3> indices_of(const GlassParameters& parameters);
+
+}  // namespace render
