@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t frame_job_magic = 0x324A4650;  // "PFJ2"
+constexpr std::uint32_t frame_job_magic = 0x334A4650;  // "PFJ3"
 constexpr std::uint32_t tile_job_magic = 0x314A5450;   // "PTJ1"
 
 // Calls visit on every single number of an Effort, so that writing and reading cannot differ.
@@ -47,7 +47,7 @@ std::vector<std::byte> serialize(const FrameJob& job) {
   out.put_all(job.lights.lamps);
   out.put(job.lights.version);
   out.put(job.lights.unseen_share), out.put(job.lights.error_estimate);
-  for (const float gain : job.match) out.put(gain);
+  for (const float value : job.match) out.put(value);
   for (const float parameter : job.tone) out.put(parameter);
   return out.take();
 }
@@ -75,7 +75,7 @@ FrameJob parse_frame_job(std::span<const std::byte> bytes) {
   in.get_all(job.lights.lamps);
   in.get(job.lights.version);
   in.get(job.lights.unseen_share), in.get(job.lights.error_estimate);
-  for (float& gain : job.match) in.get(gain);
+  for (float& value : job.match) in.get(value);
   for (float& parameter : job.tone) in.get(parameter);
   in.expect_end();
   return job;

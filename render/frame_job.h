@@ -10,6 +10,7 @@
 #include "calibrate/pose.h"
 #include "capture/frame.h"
 #include "capture/half.h"
+#include "render/colour_matrix.h"
 #include "render/light_table.h"
 
 namespace render {
@@ -50,8 +51,8 @@ struct FrameJob {
   Effort effort;
   std::vector<TextureTime> textures;  // [0] is the plate, [1] the environment
   LightTable lights;
-  std::array<float, 3> match{1, 1, 1};  // probe radiance to plate units, already in `lights`
-  std::array<float, 2> tone{1, 0};      // parameters of the tone curve (later issues)
+  ColourMatrix match = same_colours;  // probe radiance to plate units, already in `lights`
+  std::array<float, 2> tone{1, 0};    // parameters of the tone curve (later issues)
   friend bool operator==(const FrameJob&, const FrameJob&) = default;
 };
 

@@ -221,11 +221,22 @@ MatchResult match_by_patch(const capture::Image& plate,
   return result;
 }
 
-MatchResult match_given(std::array<float, 3> gain) {
+MatchResult match_given(std::array<float, 3> gain, double exposure) {
   MatchResult result;
-  result.gain = gain;
+  for (std::size_t c = 0; c < 3; ++c) result.gain[c] = gain[c] * static_cast<float>(exposure);
+  result.exposure = exposure;
   result.note = "given";
   return result;
+}
+
+MatchResult match_by_matrix(const ColourMatrix& matrix, double exposure) {
+  MatchResult result = match_given(gain_of_grey(matrix), exposure);
+  result.matrix = scaled(matrix, static_cast<float>(exposure));
+  return result;
+}
+
+ColourMatrix matrix_of(const MatchResult& match) {
+  return match.matrix ? *match.matrix : diagonal(match.gain);
 }
 
 void imply_albedo(const capture::Image& plate,

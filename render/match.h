@@ -2,17 +2,21 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
+#include "render/colour_matrix.h"
 #include "render/environment.h"
 
 namespace render {
 
 struct MatchResult {
-  std::array<float, 3> gain{1, 1, 1};            // plate = gain * probe, per channel
+  std::array<float, 3> gain{1, 1, 1};  // plate = gain * probe, per channel
+  std::optional<ColourMatrix> matrix;  // in its place; then `gain` is that of greys
+  double exposure = 1;                 // of the plate, over that of a given match: in both
   std::array<float, 3> implied_albedo{0, 0, 0};  // of the patch that was looked at; 0 = none was
   int pixels = 0;                                // of the plate that the gain rests on; 0 = on none
   double spread = 0;  // relative robust standard deviation of what was averaged
@@ -65,8 +69,12 @@ MatchResult match_by_patch(const capture::Image& plate,
                            Vec3f irradiance,
                            const MatchSettings& settings = {});
 
-// A given gain.
-MatchResult match_given(std::array<float, 3> gain);
+// A given gain, or matrix, of a plate whose exposure is another by this factor.
+MatchResult match_given(std::array<float, 3> gain, double exposure = 1);
+MatchResult match_by_matrix(const ColourMatrix& matrix, double exposure = 1);
+
+// Either of a result's.
+ColourMatrix matrix_of(const MatchResult& match);
 
 // Sets the result's implied albedo of a patch: pi * plate / (gain * irradiance), irradiance at
 // gain 1. Throws as match_by_patch.

@@ -118,6 +118,12 @@ void ProbeMapper::find_mirrored(const Pose& probe_from_set) {
   }
 }
 
+int ProbeMapper::texels_below_zero() const {
+  int texels = 0;
+  for (const RowSum& row : row_sums_) texels += row.below_zero;
+  return texels;
+}
+
 double ProbeMapper::seen_part() const {
   double sum = 0;
   for (int y = 0; y < settings_.height; ++y) {
@@ -192,6 +198,7 @@ void ProbeMapper::gather_row(int row, const ProbeFrame& frame, Environment& out)
   const auto width = static_cast<std::size_t>(2 * settings_.height);
   const std::size_t begin = static_cast<std::size_t>(row) * width;
   std::array<double, 3> sum{};
+  int below_zero = 0;
   for (std::size_t t = begin; t < begin + width; ++t) {
     FourFloats radiance{};
     for (std::uint32_t i = gather_.first[t]; i < gather_.first[t + 1]; ++i) {
@@ -200,13 +207,15 @@ void ProbeMapper::gather_row(int row, const ProbeFrame& frame, Environment& out)
                   sizeof pixel);
       radiance += gather_.weight[i] * pixel;
     }
+    const Recoloured texel = recolour(frame.match, {radiance[0], radiance[1], radiance[2]});
+    below_zero += texel.below_zero ? 1 : 0;
     for (std::size_t c = 0; c < 3; ++c) {
-      const float value = radiance[c] * frame.gain[c];
-      out.radiance.pixels[3 * t + c] = value;
-      sum[c] += value;
+      out.radiance.pixels[3 * t + c] = texel.radiance[c];
+      sum[c] += texel.radiance[c];
     }
   }
   row_sums_[static_cast<std::size_t>(row)].seen = sum;
+  row_sums_[static_cast<std::size_t>(row)].below_zero = below_zero;
 }
 
 Vec3f ProbeMapper::floor_of_light_from_above() const {

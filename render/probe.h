@@ -7,6 +7,7 @@
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
+#include "render/colour_matrix.h"
 #include "render/environment.h"
 #include "render/probe_gather.h"
 
@@ -23,7 +24,7 @@ struct ProbeSettings {
 
 // What belongs to one frame.
 struct ProbeFrame {
-  std::array<float, 3> gain{1, 1, 1};  // probe radiance to plate units
+  ColourMatrix match = same_colours;  // probe radiance to plate units
   std::optional<Vec3f>
       floor_radiance;  // Unseen::floor: the plate's mean colour instead of an albedo
 };
@@ -53,6 +54,9 @@ class ProbeMapper {
   // size.
   void map(const capture::Image& probe, const ProbeFrame& frame, Environment& out);
 
+  // Texels of the last map() that its match took below 0; they count as 0.
+  int texels_below_zero() const;
+
   // The part of the sphere that the probe sees, 0..1.
   double seen_part() const;
 
@@ -60,6 +64,7 @@ class ProbeMapper {
   // What a row of one frame adds up to: radiance of seen and of filled texels.
   struct RowSum {
     std::array<double, 3> seen{}, filled{};
+    int below_zero = 0;
   };
 
   void correct_vignetting(const calibrate::Lens& lens);

@@ -92,6 +92,7 @@ std::string show_figures(const Set& set,
             {"delay_frames_p99", s.delay_frames_p99},
             {"probe", probe_json(s)},
             {"match", s.match.gain},
+            {"match_exposure", s.match.exposure},
             {"match_note", s.match.note},
             {"match_pixels", s.match.pixels},
             {"match_spread", s.match.spread},
@@ -111,6 +112,7 @@ std::string show_figures(const Set& set,
             {"recorder", record_json(s.recorder)},
             {"peak_memory_mb", peak_memory_mb()},
             {"notes", s.notes}};
+  if (s.match.matrix) json["match_matrix"] = *s.match.matrix;
   if (error) {
     json["error"] = {
         {"relative_rms", error->relative_rms},

@@ -208,6 +208,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     }
     prepared.plate = half_plate(*frame);
     prepared.plate_status = frame->status;
+    prepared.plate_exposure_s = frame->exposure_s;
     prepared.sound = plate_->take_sound();
   }
 
@@ -217,8 +218,8 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   Light light;
   {
     const StageTimer timer(prepared, Stage::probe);
-    light = light_->at(
-        {time, frame->image.get(), directions_.get(), job.cam_from_set, set_.effort.light_samples});
+    light = light_->at({time, frame->image.get(), directions_.get(), job.cam_from_set,
+                        frame->exposure_s, set_.effort.light_samples});
   }
 
   {
@@ -230,7 +231,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     job.textures = {{0, frame->time}, {1, light.time}};
     job.lights = std::move(light.table);
     job.lights.lamps.insert(job.lights.lamps.end(), lamps_.begin(), lamps_.end());
-    job.match = light.match.gain;
+    job.match = render::matrix_of(light.match);
     prepared.match = std::move(light.match);
     prepared.probe = std::move(light.probe);
     prepared.environment = std::move(light.environment);

@@ -37,6 +37,7 @@ struct PreparedFrame {
   render::MatchResult match;
   ProbeStatus probe;
   capture::FrameStatus plate_status = capture::FrameStatus::good;
+  double plate_exposure_s = 0;            // 0 = not told
   std::array<double, stages> stage_ms{};  // capture, probe and job are set
 
   render::FrameInputs inputs() const {

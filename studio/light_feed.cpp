@@ -4,6 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "studio/light_pairs.h"
 
 namespace studio {
 namespace {
@@ -26,11 +31,6 @@ std::shared_ptr<render::Environment> darkness() {
   env->seen.assign(8 * 16, 0);
   render::smooth_for_reflections(*env);
   return env;
-}
-
-void scale(render::Environment& env, const std::array<float, 3>& gain) {
-  std::vector<float>& pixels = env.radiance.pixels;
-  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] *= gain[i % 3];
 }
 
 // The mean of the plate's pixels that look down: what the floor sends. Every eighth row and column
@@ -68,8 +68,9 @@ LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
   }
   source_ = std::make_unique<ProbeSource>(set);
   const capture::Image& first = *source_->at(capture::Time::min() / 2).image;
-  if (settings_->match.method == MatchSettings::Method::gains) {
-    match_ = render::match_given(settings_->match.gains);
+  if (settings_->match.method == MatchSettings::Method::given) {
+    match_ = given_match(1);
+    exposure_ = ExposureFollower(settings_->match.exposure_s);
   }
   if (!settings_->lens) {
     if (first.width != 2 * first.height) {
@@ -112,15 +113,19 @@ const capture::Image* LightFeed::even_plate(const LightRequest& request) {
 
 void LightFeed::build_environment(const LightRequest& request) {
   std::shared_ptr<render::Environment> env = environments_.lend();
+  const render::ColourMatrix match = render::matrix_of(match_);
+  int below_zero = 0;
   if (mapper_) {
-    render::ProbeFrame frame{match_.gain, {}};
+    render::ProbeFrame frame{match, {}};
     if (settings_->unseen == render::Unseen::floor)
       frame.floor_radiance = floor_of_plate(plate_, request);
     mapper_->map(*radiance_, frame, *env);
+    below_zero = mapper_->texels_below_zero();
   } else {
     *env = render::environment_from_map(*radiance_, settings_->yaw_rad, environment_height);
-    scale(*env, match_.gain);
+    below_zero = render::recolour(match, *env);
   }
+  share_below_zero_ = 3.0 * below_zero / static_cast<double>(env->radiance.pixels.size());
   environment_ = std::move(env);
 }
 
@@ -137,11 +142,39 @@ render::MatchResult LightFeed::measure_match(const LightRequest& request) const 
                                   *environment_);
 }
 
+render::MatchResult LightFeed::given_match(double exposure) const {
+  const MatchSettings& match = settings_->match;
+  return match.matrix ? render::match_by_matrix(*match.matrix, exposure)
+                      : render::match_given(match.gain, exposure);
+}
+
+// Follows the plate's exposure with a given match. True if the gain has changed.
+bool LightFeed::follow_exposure(const LightRequest& request) {
+  std::vector<calibrate::LightPair> pairs;
+  int pixels = 0;
+  if (exposure_.needs_pairs(request.exposure_s)) {
+    const auto overlap =
+        render::find_overlap(*plate_, *request.directions, request.cam_from_set, *environment_);
+    for (const render::OverlapTexel& both : overlap) pixels += both.pixels;
+    pairs = light_pairs_of(overlap);
+  }
+  exposure_.follow(request.exposure_s, match_.exposure, pairs);
+  const bool changed = std::abs(exposure_.level() / match_.exposure - 1) > gain_step;
+  match_ = given_match(changed ? exposure_.level() : match_.exposure);
+  match_.pixels = pixels;
+  match_.spread = exposure_.spread();
+  match_.note += "; " + exposure_.note();
+  return changed;
+}
+
 // Follows the plate's exposure and white. True if the gain has changed.
 bool LightFeed::follow_match(const LightRequest& request) {
-  if (settings_->match.method == MatchSettings::Method::gains) return false;
-  if (request.plate == nullptr || (matched_ && request.plate == matched_plate_)) return false;
+  const bool given = settings_->match.method == MatchSettings::Method::given;
+  if (given && !settings_->match.follow) return false;
+  const bool looked_at = (given || matched_) && request.plate == matched_plate_;
+  if (request.plate == nullptr || looked_at) return false;
   matched_plate_ = request.plate;
+  if (given) return follow_exposure(request);
   render::MatchResult measured = measure_match(request);
   const bool found = measured.pixels > 0;
   bool changed = false;
@@ -200,6 +233,12 @@ Light LightFeed::at(const LightRequest& request) {
   light.environment = environment_;
   light.planned = planned_ ? planned_ : light.environment;
   light.match = match_;
+  if (share_below_zero_ > 0) {
+    light.match.note += fmt::format(
+        "; in {:.2g} % of the light's directions it takes colours below "
+        "0, which count as 0",
+        100 * share_below_zero_);
+  }
   return light;
 }
 

@@ -15,6 +15,7 @@
 #include "render/light_table.h"
 #include "render/match.h"
 #include "render/probe.h"
+#include "studio/exposure_follower.h"
 #include "studio/probe_source.h"
 #include "studio/set.h"
 
@@ -36,6 +37,7 @@ struct LightRequest {
   const capture::Image* plate = nullptr;  // (height, width, 3); null = none arrived yet
   const calibrate::DirectionTable* directions = nullptr;
   calibrate::Pose cam_from_set;
+  double exposure_s = 0;  // of the plate, 0 = not told
   int light_samples = 64;
 };
 
@@ -53,6 +55,8 @@ class LightFeed {
   void build_environment(const LightRequest& request);
   render::MatchResult measure_match(const LightRequest& request) const;
   bool follow_match(const LightRequest& request);
+  render::MatchResult given_match(double exposure) const;
+  bool follow_exposure(const LightRequest& request);
 
   std::optional<ProbeSettings> settings_;
   capture::Image evened_;                  // the present plate without its lens's vignetting
@@ -64,7 +68,9 @@ class LightFeed {
   const capture::Image* matched_plate_ = nullptr;
   bool matched_ = false;
   std::array<double, 3> averaged_gain_{1, 1, 1};
+  ExposureFollower exposure_;  // of a given match
   render::MatchResult match_;
+  double share_below_zero_ = 0;  // of the probe's directions, by the match
   // Another one for every change, never touched once it was handed out.
   std::shared_ptr<render::Environment> environment_;
   capture::Pool<render::Environment> environments_;

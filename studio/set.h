@@ -13,6 +13,7 @@
 #include "calibrate/pose.h"
 #include "capture/colour.h"
 #include "capture/frame.h"
+#include "render/colour_matrix.h"
 #include "render/environment.h"
 #include "render/frame_job.h"
 #include "studio/section.h"
@@ -60,12 +61,15 @@ struct CameraSettings {
 
 // How probe radiance is brought to the plate's units.
 struct MatchSettings {
-  enum class Method { automatic, patch, gains };
+  enum class Method { automatic, patch, given };
   Method method = Method::automatic;
-  std::array<float, 3> gains{1, 1, 1};  // of `gains`
-  std::array<int, 4> patch{};           // of `patch`: x, y, width, height in the show's picture
-  std::array<float, 3> albedo{};        // of `patch`: what it is painted
-  calibrate::Vec3 normal{0, 0, 1};      // of `patch`: where it faces in the set
+  std::array<float, 3> gain{1, 1, 1};          // of `given`
+  std::optional<render::ColourMatrix> matrix;  // of `given`: in place of the gain
+  bool follow = false;               // of `given`: goes with the plate's exposure from then on
+  std::optional<double> exposure_s;  // of `given`: the plate's that it was calibrated at
+  std::array<int, 4> patch{};        // of `patch`: x, y, width, height in the show's picture
+  std::array<float, 3> albedo{};     // of `patch`: what it is painted
+  calibrate::Vec3 normal{0, 0, 1};   // of `patch`: where it faces in the set
 };
 
 struct ProbeSettings {

@@ -66,24 +66,6 @@ void read_camera_pose(Section table, const fs::path& base, PoseSettings& pose) {
   table.finish();
 }
 
-// A rectangle [x, y, width, height] of a picture; its size is 0 where it is not known here.
-void read_rectangle(Section& section,
-                    std::string_view key,
-                    std::array<int, 2> picture,
-                    std::optional<std::array<int, 4>>& rectangle) {
-  std::array<int, 4> given{};
-  if (!section.integers(key, given, 0, 65535)) return;
-  if (given[2] < 1 || given[3] < 1) {
-    section.fault(key, "must be [x, y, width, height] with width and height at least 1");
-    return;
-  }
-  if (picture[0] > 0 && (given[0] + given[2] > picture[0] || given[1] + given[3] > picture[1])) {
-    section.fault(key, fmt::format("reaches beyond the picture of {}x{}", picture[0], picture[1]));
-    return;
-  }
-  rectangle = given;
-}
-
 // The lens of the show's picture from the lens of the source's: cropped, then resized.
 void fit_lens(Section& section, const SetContext& context, CameraSettings& camera) {
   const ShowSettings& show = context.show;
@@ -112,30 +94,6 @@ void read_colour(Section& section, capture::Transfer& colour) {
     colour = capture::transfer_from_name(name);
   } catch (const std::invalid_argument& error) {
     section.fault("colour", fmt::format("\"{}\": {}", name, error.what()));
-  }
-}
-
-void read_match(Section& section, std::array<int, 2> picture, MatchSettings& match) {
-  const TomlValue* given = section.value("match");
-  if (given == nullptr) return;
-  if (given->kind == TomlValue::Kind::array) {
-    match.method = MatchSettings::Method::gains;
-    section.colour("match", match.gains, {1e-9, 1e9});
-  } else if (given->kind == TomlValue::Kind::table) {
-    match.method = MatchSettings::Method::patch;
-    auto table = section.table("match");
-    table->need("patch", "[x, y, width, height] of a painted spot in the picture");
-    table->need("albedo", "what the spot reflects, 0 to 1");
-    std::optional<std::array<int, 4>> patch;
-    read_rectangle(*table, "patch", picture, patch);
-    if (patch) match.patch = *patch;
-    table->colour("albedo", match.albedo, {0.001, 1});
-    table->vector("normal", match.normal, {-1, 1});
-    if (calibrate::length(match.normal) < 0.5) table->fault("normal", "must be about of length 1");
-    table->finish();
-  } else {
-    std::string word;
-    section.word("match", word, {"auto"});
   }
 }
 

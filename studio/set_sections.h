@@ -32,6 +32,15 @@ std::optional<calibrate::Lens> read_lens_key(Section& section,
                                              std::array<int, 2> size,
                                              const std::filesystem::path& base);
 
+// How the probe is matched to the plate: `match`.
+void read_match(Section& section, std::array<int, 2> picture, MatchSettings& match);
+
+// A rectangle [x, y, width, height] of a picture; its size is 0 where it is not known here.
+void read_rectangle(Section& section,
+                    std::string_view key,
+                    std::array<int, 2> picture,
+                    std::optional<std::array<int, 4>>& rectangle);
+
 // A source's URI with its path made absolute and, where it names a file or directory, found.
 bool read_source_key(Section& section,
                      std::string_view key,

@@ -2,11 +2,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -16,6 +19,7 @@
 #include "render/match.h"
 #include "studio/commands/commands.h"
 #include "studio/frame_maker.h"
+#include "studio/light_pairs.h"
 #include "studio/section.h"
 
 namespace studio {
@@ -25,6 +29,8 @@ using Json = nlohmann::ordered_json;
 using Colour = std::array<double, 3>;
 
 constexpr std::int64_t default_frames = 25;
+// Frames whose exposures differ by this factor come from a camera that sets its own.
+constexpr double follows_from = 1.03;
 
 struct LightOptions {
   std::string set;
@@ -85,17 +91,6 @@ capture::Image even_plate(const PreparedFrame& frame) {
   return plate;
 }
 
-bool is_light(const Colour& colour) {
-  return std::ranges::all_of(colour, [](double v) { return v > 0 && std::isfinite(v); });
-}
-
-void add_pair(const Colour& probe,
-              const Colour& plate,
-              std::size_t frame,
-              std::vector<calibrate::LightPair>& pairs) {
-  if (is_light(probe) && is_light(plate)) pairs.push_back({probe, plate, frame});
-}
-
 // What each patch sends by the probe's light, and what the plate shows of it. One that is clipped,
 // dark or unlit tells nothing.
 void add_patches(const std::vector<PaintedPatch>& patches,
@@ -115,7 +110,7 @@ void add_patches(const std::vector<PaintedPatch>& patches,
       sent[c] = patch.albedo[c] * irradiance[c] / std::numbers::pi;
       shown[c] = sent[c] * match.gain[c];
     }
-    add_pair(sent, shown, frame, pairs);
+    add_light_pair({sent, shown, frame}, pairs);
   }
 }
 
@@ -125,34 +120,34 @@ void add_overlap(const PreparedFrame& prepared,
                  std::vector<calibrate::LightPair>& pairs) {
   const auto overlap = render::find_overlap(plate, *prepared.directions, prepared.job.cam_from_set,
                                             *prepared.environment);
-  for (const render::OverlapTexel& both : overlap) {
-    Colour probe{};
-    Colour shown{};
-    std::ranges::copy(both.probe, probe.begin());
-    std::ranges::copy(both.plate, shown.begin());
-    add_pair(probe, shown, frame, pairs);
-  }
+  std::ranges::copy(light_pairs_of(overlap, frame), std::back_inserter(pairs));
 }
 
-std::vector<calibrate::LightPair> collect(const Set& set,
-                                          const std::vector<PaintedPatch>& patches,
-                                          std::int64_t frames) {
+// What the frames tell.
+struct Collected {
+  std::vector<calibrate::LightPair> pairs;
+  double exposure_s = 0;  // of the plate's first frame that tells anything; 0 = not told
+};
+
+Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std::int64_t frames) {
   FrameMaker maker(set);
   const std::int64_t count = maker.is_endless() ? 1 : frames;
-  std::vector<calibrate::LightPair> pairs;
+  Collected collected;
+  std::vector<calibrate::LightPair>& pairs = collected.pairs;
   for (std::int64_t n = 0; n < count; ++n) {
     const auto prepared =
         maker.plate().is_live() ? maker.make_at(maker.wait_for_plate()) : maker.make(n);
     if (!prepared) break;
     const capture::Image plate = even_plate(*prepared);
     const auto frame = static_cast<std::size_t>(n);
+    if (pairs.empty()) collected.exposure_s = prepared->plate_exposure_s;
     if (patches.empty()) {
       add_overlap(*prepared, plate, frame, pairs);
     } else {
       add_patches(patches, plate, *prepared->environment, frame, pairs);
     }
   }
-  return pairs;
+  return collected;
 }
 
 // What the probe did not see is filled from the plate, in its units: with the gain of a first
@@ -160,24 +155,53 @@ std::vector<calibrate::LightPair> collect(const Set& set,
 calibrate::LightGain fit(Set set,
                          const std::vector<PaintedPatch>& patches,
                          std::int64_t frames,
-                         std::size_t& pair_count) {
+                         Collected& collected) {
   const bool fills =
       !patches.empty() && set.probe->lens.has_value() && set.probe->unseen == render::Unseen::floor;
   Colour before{1, 1, 1};
   calibrate::LightGain found;
   for (int round = 0; round < (fills ? 3 : 1); ++round) {
-    set.probe->match.method = MatchSettings::Method::gains;
+    set.probe->match = MatchSettings{};
+    set.probe->match.method = MatchSettings::Method::given;
     for (std::size_t c = 0; c < 3; ++c) {
       if (round > 0) before[c] = found.gain[c];
-      set.probe->match.gains[c] = static_cast<float>(before[c]);
+      set.probe->match.gain[c] = static_cast<float>(before[c]);
     }
-    const auto pairs = collect(set, patches, frames);
-    pair_count = pairs.size();
-    found = calibrate::fit_light_gain(pairs);
+    collected = collect(set, patches, frames);
+    found = calibrate::fit_light_gain(collected.pairs);
     for (std::size_t c = 0; c < 3; ++c) found.gain[c] *= before[c];
     for (std::size_t i = 0; found.matrix && i < 9; ++i) (*found.matrix)[i] *= before[i % 3];
   }
   return found;
+}
+
+std::string list_of(std::span<const double> numbers) {
+  std::string list;
+  for (const double number : numbers) {
+    list += fmt::format("{}{:.6g}", list.empty() ? "" : ", ", number);
+  }
+  return "[" + list + "]";
+}
+
+// The least and greatest exposure of the plate's frames that have one.
+std::pair<double, double> exposures_of(const calibrate::LightGain& found) {
+  std::pair<double, double> range{1, 1};
+  for (const double exposure : found.exposures) {
+    if (!(exposure > 0)) continue;
+    range = {std::min(range.first, exposure), std::max(range.second, exposure)};
+  }
+  return range;
+}
+
+// As a set's [probe] takes it.
+std::string match_line(const calibrate::LightGain& found, double exposure_s) {
+  const std::span<const double> numbers =
+      found.matrix ? std::span<const double>(*found.matrix) : std::span<const double>(found.gain);
+  const auto [low, high] = exposures_of(found);
+  if (high / low < follows_from) return "match = " + list_of(numbers);
+  return fmt::format("match = {{ {} = {}, follow = true{} }}", found.matrix ? "matrix" : "gain",
+                     list_of(numbers),
+                     exposure_s > 0 ? fmt::format(", exposure_s = {:.9g}", exposure_s) : "");
 }
 
 void calibrate_light(const LightOptions& options, Console& console) {
@@ -196,22 +220,21 @@ void calibrate_light(const LightOptions& options, Console& console) {
   set.lamps.clear();
   const auto patches =
       options.patches.empty() ? std::vector<PaintedPatch>{} : read_patches(options.patches);
-  std::size_t pairs = 0;
+  Collected collected;
   calibrate::LightGain found;
   try {
-    found = fit(set, patches, options.frames.value_or(default_frames), pairs);
+    found = fit(set, patches, options.frames.value_or(default_frames), collected);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", set.path, error.what()));
   }
-  if (found.matrix) {
-    found.warnings.emplace_back(
-        "a matrix would match better than gains: the cameras' colours differ; sets take gains");
-  }
+  const std::size_t pairs = collected.pairs.size();
+  const std::string match = match_line(found, collected.exposure_s);
   Json figures{
       {"gain", found.gain}, {"sigma", found.sigma},       {"heldout_error", found.heldout_error},
       {"pairs", pairs},     {"left_out", found.left_out}, {"exposures", found.exposures}};
   if (found.matrix_heldout_error) figures["matrix_heldout_error"] = *found.matrix_heldout_error;
   if (found.matrix) figures["matrix"] = *found.matrix;
+  figures["match"] = match;
   figures["warnings"] = found.warnings;
   console.figures(figures.dump(2));
   for (const std::string& warning : found.warnings) console.warn(warning);
@@ -221,13 +244,16 @@ void calibrate_light(const LightOptions& options, Console& console) {
                           std::isfinite(found.heldout_error)
                               ? fmt::format("; held-out error {:.1f} %", 100 * found.heldout_error)
                               : ""));
-  if (found.exposures.size() > 1) {
-    const auto [low, high] = std::ranges::minmax_element(found.exposures);
-    console.say(fmt::format("the plate's exposure goes from {:.3f} to {:.3f} of its first frame's",
-                            *low, *high));
+  if (found.matrix) {
+    console.say(fmt::format("the cameras' colours differ: with a matrix, held-out error {:.1f} %",
+                            100 * found.matrix_heldout_error.value_or(0)));
   }
-  console.say(
-      fmt::format("match = [{:.6g}, {:.6g}, {:.6g}]", found.gain[0], found.gain[1], found.gain[2]));
+  if (found.exposures.size() > 1) {
+    const auto [low, high] = exposures_of(found);
+    console.say(fmt::format("the plate's exposure goes from {:.3f} to {:.3f} of its first frame's",
+                            low, high));
+  }
+  console.say(match);
 }
 
 }  // namespace

@@ -77,9 +77,15 @@ void report_end(const ShowStatus& status, const Set& set, Console& console) {
                   "{:.1f} ms (p99 {:.1f}), delay {:.1f} frames",
                   status.frames, status.fps, status.dropped, status.lost_plate_frames,
                   status.frame_ms_p50, status.frame_ms_p99, status.delay_frames));
-  console.say(fmt::format("match {:.4g} {:.4g} {:.4g}, {} lights, {:.1f} % of the light unseen",
-                          status.match.gain[0], status.match.gain[1], status.match.gain[2],
-                          status.lights, status.unseen_share * 100));
+  std::string match;
+  for (const float gain : status.match.gain) match += fmt::format(" {:.4g}", gain);
+  if (status.match.matrix) {
+    match += " (of grey; by the matrix";
+    for (const float value : *status.match.matrix) match += fmt::format(" {:.4g}", value);
+    match += ")";
+  }
+  console.say(fmt::format("match{}, {} lights, {:.1f} % of the light unseen", match, status.lights,
+                          status.unseen_share * 100));
   if (status.probe.live) {
     console.say(fmt::format(
         "light {:.1f} frames old (p99 {:.1f}) of {} shots a bracket; of {} probe frames {} lost, "

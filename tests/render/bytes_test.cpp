@@ -26,7 +26,7 @@ FrameJob made_job() {
   job.lights.lights[1].compact = 1;
   job.lights.lamps = {{{1, 2, 3}, {0, 0, -1}, {7, 8, 9}}};
   job.lights.version = 5;
-  job.match = {1.5F, 1, 0.5F};
+  job.match = {1.5F, 0.1F, -0.2F, 0.3F, 1, -0.1F, 0.05F, 0.15F, 0.5F};
   return job;
 }
 

@@ -138,8 +138,17 @@ TEST(MatchByPatch, RefusesPatchesOutsideThePlateAndAlbedosThatAreNone) {
   EXPECT_THROW(match_by_patch(plate, {0, 0, 2, 2}, {1.2F, 1, 1}, {1, 1, 1}), std::invalid_argument);
 }
 
-TEST(MatchGiven, IsTheGain) {
+TEST(MatchGiven, IsTheGainTimesTheExposure) {
   EXPECT_EQ(match_given({1, 2, 3}).gain, (std::array<float, 3>{1, 2, 3}));
+  EXPECT_EQ(match_given({1, 2, 3}, 0.5).gain, (std::array<float, 3>{0.5F, 1, 1.5F}));
+  EXPECT_EQ(matrix_of(match_given({1, 2, 3})), (ColourMatrix{1, 0, 0, 0, 2, 0, 0, 0, 3}));
+}
+
+TEST(MatchByMatrix, IsTheMatrixTimesTheExposureAndTheGainOfGrey) {
+  const MatchResult match = match_by_matrix({1, 0.5F, 0, 0, 1, 0, 0.25F, 0, 1}, 2);
+  EXPECT_EQ(matrix_of(match), (ColourMatrix{2, 1, 0, 0, 2, 0, 0.5F, 0, 2}));
+  EXPECT_EQ(match.gain, (std::array<float, 3>{3, 2, 2.5F}));
+  EXPECT_EQ(match.exposure, 2);
 }
 
 }  // namespace

@@ -137,10 +137,48 @@ TEST(ProbeMapper, AppliesTheGainPerChannel) {
   const Lens lens = fisheye(100);
   ProbeMapper mapper(lens, looking_up(), {.height = 16, .unseen = Unseen::mean});
   Environment env;
-  mapper.map(photograph_sky(lens, looking_up(), white), {{2, 3, 0.5F}, {}}, env);
+  mapper.map(photograph_sky(lens, looking_up(), white), {diagonal({2, 3, 0.5F}), {}}, env);
   EXPECT_NEAR(env.radiance.at(2, 3, 0), 2, 1e-5F);
   EXPECT_NEAR(env.radiance.at(2, 3, 1), 3, 1e-5F);
   EXPECT_NEAR(env.radiance.at(15, 3, 2), 0.5F, 1e-5F);
+}
+
+TEST(ProbeMapper, AppliesAMatrixToEveryTexel) {
+  const ColourMatrix matrix{0.9F, 0.2F, -0.1F, 0.1F, 1.1F, 0.05F, -0.05F, 0.3F, 0.7F};
+  const Lens lens = fisheye(200);
+  ProbeMapper mapper(lens, looking_up(), {.height = 32, .unseen = Unseen::mean});
+  const capture::Image sky = photograph_sky(lens, looking_up(), smooth_sky);
+  Environment plain;
+  mapper.map(sky, {}, plain);
+  Environment env;
+  mapper.map(sky, {matrix, {}}, env);
+  EXPECT_EQ(mapper.texels_below_zero(), 0);
+  for (std::size_t i = 0; i < plain.seen.size(); ++i) {
+    const float* p = &plain.radiance.pixels[3 * i];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float* row = &matrix[3 * c];
+      ASSERT_NEAR(env.radiance.pixels[3 * i + c], row[0] * p[0] + row[1] * p[1] + row[2] * p[2],
+                  1e-5F);
+    }
+  }
+  Environment diagonal_env;
+  mapper.map(sky, {diagonal({1, 1, 1}), {}}, diagonal_env);
+  EXPECT_EQ(diagonal_env.radiance.pixels, plain.radiance.pixels);
+}
+
+TEST(ProbeMapper, CountsColoursThatAMatrixTakesBelowZeroAsNoLight) {
+  const ColourMatrix matrix{2, -0.9F, 0, 0, 1, 0, 0, 0, 1};
+  const Lens lens = fisheye(200);
+  ProbeMapper mapper(lens, looking_up(), {.height = 32, .unseen = Unseen::mean});
+  Environment env;
+  mapper.map(photograph_sky(lens, looking_up(),
+                            [](Vec3f d) {
+                              return d.x > 0 ? Vec3f{0.1F, 1, 1}
+                                             : Vec3f{1, std::numeric_limits<float>::infinity(), 1};
+                            }),
+             {matrix, {}}, env);
+  EXPECT_GT(mapper.texels_below_zero(), 32 * 64 * 2 / 5);
+  for (const float value : env.radiance.pixels) ASSERT_TRUE(value >= 0 && std::isfinite(value));
 }
 
 TEST(ProbeMapper, FillsTheFloorByTheLightThatFallsOnIt) {

@@ -177,6 +177,31 @@ TEST_F(SetFile, TakesADirectoryOfShotsInOrderOfTheirNames) {
   EXPECT_EQ(set.probe->exposure_error, 0.1);
 }
 
+TEST_F(SetFile, TakesAMatchAsGainsOrAsAMatrixAndLetsItFollowThePlate) {
+  write("map.exr", "x");
+  const auto match_of = [&](const std::string& match) {
+    return read_set(write("a.toml", std::string(plain) +
+                                        "[probe]\nsource = \"map.exr\"\nmatch = " + match + "\n"))
+        .probe->match;
+  };
+  const std::array<float, 3> gain{1, 2, 3};
+  const render::ColourMatrix matrix{1, 2, 3, 4, 5, 6, 7, 8, -9};
+  EXPECT_EQ(match_of("[1, 2, 3]").method, MatchSettings::Method::given);
+  EXPECT_EQ(match_of("[1, 2, 3]").gain, gain);
+  EXPECT_FALSE(match_of("[1, 2, 3]").matrix);
+  EXPECT_FALSE(match_of("[1, 2, 3]").follow);
+  EXPECT_EQ(match_of("[1, 2, 3, 4, 5, 6, 7, 8, -9]").matrix, matrix);
+  const MatchSettings follows = match_of("{ gain = [1, 2, 3], follow = true, exposure_s = 0.02 }");
+  EXPECT_EQ(follows.method, MatchSettings::Method::given);
+  EXPECT_EQ(follows.gain, gain);
+  EXPECT_TRUE(follows.follow);
+  EXPECT_EQ(follows.exposure_s, 0.02);
+  const MatchSettings both = match_of("{ matrix = [1, 2, 3, 4, 5, 6, 7, 8, -9], follow = true }");
+  EXPECT_EQ(both.matrix, matrix);
+  EXPECT_TRUE(both.follow);
+  EXPECT_FALSE(both.exposure_s);
+}
+
 TEST_F(SetFile, CountsInstancesOverAllObjects) {
   std::string content = plain;
   content += "model = \"pinhole\"\nfocal_px = 80\n";

@@ -1,0 +1,79 @@
+// The plate's exposure over the calibrated one.
+#include "studio/exposure_follower.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace studio {
+namespace {
+
+// Averaged over about this many frames, anew on a change beyond noise: this many standard
+// deviations of the mean of all directions, which is not known better than `least_change`. So an
+// exposure that creeps does not run ahead of its average.
+constexpr double average_frames = 12;
+constexpr double deviations = 4;
+constexpr double least_change = 0.01;
+// Fewer directions may be one thing that moves.
+constexpr std::size_t fewest_pairs = 10;
+
+double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// By how much the pairs differ from what is common to them, relative and robust.
+double spread_of(std::span<const calibrate::LightPair> pairs, double common) {
+  std::vector<double> off;
+  for (const calibrate::LightPair& pair : pairs) {
+    double sum = 0;
+    for (std::size_t c = 0; c < 3; ++c) sum += std::log(pair.plate[c] / (common * pair.probe[c]));
+    off.push_back(std::abs(sum / 3));
+  }
+  return 1.4826 * median_of(off);
+}
+
+}  // namespace
+
+void ExposureFollower::follow(double exposure_s,
+                              double level_of_pairs,
+                              std::span<const calibrate::LightPair> pairs) {
+  const bool told = exposure_s > 0;
+  if (told && calibrated_s_) {
+    level_ = exposure_s / *calibrated_s_;
+    note_ = fmt::format("the plate's {:.4g} s are {:.3f} of the calibrated exposure", exposure_s,
+                        level_);
+    return;
+  }
+  const double unit = told ? exposure_s : 1;
+  if (told != timed_) {
+    per_second_ = level_ / unit;
+    timed_ = told;
+  }
+  const bool found = pairs.size() >= fewest_pairs;
+  if (found) {
+    const double over = calibrate::follow_exposure(calibrate::LightGain{}, pairs);
+    const double now = level_of_pairs * over / unit;
+    spread_ = spread_of(pairs, over);
+    const double sudden =
+        std::max(least_change, deviations * spread_ / std::sqrt(static_cast<double>(pairs.size())));
+    const bool anew = !measured_ || std::abs(now / per_second_ - 1) > sudden;
+    per_second_ = anew ? now : per_second_ + (now - per_second_) / average_frames;
+    measured_ = true;
+  }
+  level_ = per_second_ * unit;
+  note_ = found ? fmt::format(
+                      "the plate's exposure is {:.3f} of the calibrated one, by {} "
+                      "directions that both cameras see",
+                      level_, pairs.size())
+                : fmt::format(
+                      "too little is seen by both cameras, unclipped and not dark, to "
+                      "follow the plate's exposure: {} at {:.3f} of the calibrated one",
+                      told ? "by its time alone" : "held", level_);
+}
+
+}  // namespace studio
