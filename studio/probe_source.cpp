@@ -270,8 +270,9 @@ void ProbeSource::take(const std::vector<capture::Frame>& frames) {
 
 ProbeSource::Radiance ProbeSource::at(capture::Time time) {
   if (camera_) {
-    take(camera_->advance(time - offset_));
-    status_.age = time - offset_ - newest_.time;
+    const capture::Time on_its_clock = time + offset_;
+    take(camera_->advance(on_its_clock));
+    status_.age = on_its_clock - newest_.time;
   }
   return newest_;
 }

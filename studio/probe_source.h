@@ -46,7 +46,8 @@ class ProbeSource {
     std::shared_ptr<const capture::Image> image;  // (height, width, 3)
     capture::Time time{};                         // of the newest shot in it
   };
-  // The newest at a time of the show, which must not fall. The same pointer as before if there is
+  // The newest at a time of the show, which must not fall: what was taken by then, not what is
+  // stamped by then. The same pointer as before if there is
   // nothing newer; when the camera has ended, its last. Where the newest shots tell nothing, since
   // all is saturated or all is black, the last good one stays.
   Radiance at(capture::Time time);
@@ -64,7 +65,7 @@ class ProbeSource {
   double exposure_s_of(const capture::Frame& frame) const;
 
   std::vector<double> exposures_s_;
-  capture::Time offset_{};
+  capture::Time offset_{};                // its clock less the show's
   capture::WindowMergeSettings merging_;  // with the camera's noise, if calibration has told it
   std::unique_ptr<Source> camera_;        // null = the radiance stays
   std::unique_ptr<RollingBracket> bracket_;

@@ -97,6 +97,34 @@ class ProbeSourceTest : public testing::Test {
   std::vector<ProbeStatus> statuses_;
 };
 
+// Light changes at an instant; a probe that stamps it later shows it at that instant all the same.
+TEST(ProbeSource, ShowsWhatWasTakenByThenWhateverItsClock) {
+  constexpr std::int64_t change = 30;  // its frame
+  for (const double offset_s : {-0.2, 0.0, 0.2}) {
+    capture::register_camera("scripted", [&](std::string_view, const capture::CameraOptions&) {
+      return std::make_unique<ScriptedCamera>(
+          [](std::int64_t n) { return Moment{.radiance = n < change ? 100.0 : 2500.0}; });
+    });
+    Set set;
+    set.probe.emplace();
+    set.probe->kind = ProbeSettings::Kind::camera;
+    set.probe->source = "scripted:";
+    set.probe->offset_s = offset_s;
+    ProbeSource source(set);
+    const auto offset =
+        std::chrono::duration_cast<capture::Time>(std::chrono::duration<double>(offset_s));
+    for (std::int64_t n = 0; n < 60; ++n) {  // of the probe, on the plate's clock
+      const capture::Time time = capture::time_of_frame(n, rate) - offset + 1us;
+      const double light = source.at(time).image->pixels.front();
+      if (n < change) {
+        EXPECT_NEAR(light, 100, 1) << offset_s << ", " << n;
+      } else if (n >= change + 3) {
+        EXPECT_NEAR(light, 2500, 40) << offset_s << ", " << n;
+      }
+    }
+  }
+}
+
 TEST_F(ProbeSourceTest, FollowsLightWithinOneBracket) {
   constexpr std::int64_t change = 15;
   const auto light = light_over(
