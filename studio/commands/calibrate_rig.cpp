@@ -10,6 +10,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -21,6 +22,7 @@
 #include "calibrate/corner_refinement.h"
 #include "calibrate/rig.h"
 #include "calibrate/rig_file.h"
+#include "calibrate/text_file.h"
 #include "capture/camera.h"
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
@@ -35,8 +37,10 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr std::size_t most_pictures = 500;  // of a camera
 
 struct RigOptions {
-  std::vector<std::string> sources;  // NAME=DIRECTORY or NAME=VIDEO
-  std::vector<std::string> lenses;   // NAME=FILE
+  std::vector<std::string> sources;    // NAME=DIRECTORY or NAME=VIDEO
+  std::vector<std::string> lenses;     // NAME=FILE
+  std::vector<std::string> offsets;    // NAME=SECONDS
+  std::vector<std::string> responses;  // NAME=FILE
   BoardOptions board;
   std::string out;
   std::optional<std::int64_t> every;
@@ -47,40 +51,80 @@ struct Source {
   std::string name;
   std::string pictures;
   std::string lens_file;
+  double time_offset_s = 0;
+  std::string response;
 };
 
-std::pair<std::string, std::string> named(const std::string& word, const std::string& option) {
+std::pair<std::string, std::string> named(const std::string& word,
+                                          const std::string& option,
+                                          std::string_view what = "FILE") {
   const std::size_t equals = word.find('=');
   if (equals == 0 || equals == std::string::npos || equals + 1 == word.size()) {
-    throw UsageError(fmt::format("{} is NAME=FILE, not {}", option, word));
+    throw UsageError(fmt::format("{} is NAME={}, not {}", option, what, word));
   }
   return {word.substr(0, equals), word.substr(equals + 1)};
 }
 
-std::vector<Source> sources_of(const RigOptions& options) {
-  std::map<std::string, std::string> lenses;
-  for (const std::string& word : options.lenses) {
-    const auto [name, file] = named(word, "--lens");
-    if (!lenses.emplace(name, file).second) {
-      throw UsageError(fmt::format("camera {} has two lenses", name));
+using ByName = std::map<std::string, std::string>;
+
+// What an option says of each camera.
+ByName by_name(const std::vector<std::string>& words,
+               const std::string& option,
+               std::string_view what = "FILE") {
+  ByName all;
+  for (const std::string& word : words) {
+    const auto [name, value] = named(word, option, what);
+    if (!all.emplace(name, value).second) {
+      throw UsageError(fmt::format("camera {} has {} twice", name, option));
     }
   }
+  return all;
+}
+
+// The value of a camera, which is taken out; "" = it has none.
+std::string take(ByName& all, const std::string& name) {
+  const auto node = all.extract(name);
+  return node.empty() ? "" : node.mapped();
+}
+
+void expect_none_left(const ByName& all, const std::string& option) {
+  if (all.empty()) return;
+  throw UsageError(fmt::format("{} {} is of no camera", option, all.begin()->first));
+}
+
+double offset_of(const std::string& name, const std::string& text) {
+  double offset_s = 0;
+  if (text.empty()) return 0;
+  if (!calibrate::parse_number(text, offset_s) || !(std::abs(offset_s) <= 60)) {
+    throw UsageError(fmt::format("--offset {}={} must be seconds from -60 to 60", name, text));
+  }
+  return offset_s;
+}
+
+std::vector<Source> sources_of(const RigOptions& options) {
+  ByName lenses = by_name(options.lenses, "--lens");
+  ByName offsets = by_name(options.offsets, "--offset", "SECONDS");
+  ByName responses = by_name(options.responses, "--response");
   std::vector<Source> sources;
   for (const std::string& word : options.sources) {
     const auto [name, pictures] = named(word, "a camera");
     if (std::ranges::find(sources, name, &Source::name) != sources.end()) {
       throw UsageError(fmt::format("camera {} is there twice", name));
     }
-    const auto lens = lenses.find(name);
-    if (lens == lenses.end()) {
+    const std::string lens = take(lenses, name);
+    if (lens.empty()) {
       throw UsageError(fmt::format("camera {0} has no lens: add --lens {0}=FILE", name));
     }
-    sources.push_back({name, pictures, lens->second});
-    lenses.erase(lens);
+    sources.push_back(
+        {name, pictures, lens, offset_of(name, take(offsets, name)), take(responses, name)});
+    if (const std::string& response = sources.back().response;
+        !response.empty() && !fs::is_regular_file(response)) {
+      throw std::runtime_error(response + ": there is no such response file");
+    }
   }
-  if (!lenses.empty()) {
-    throw UsageError(fmt::format("--lens {} is of no camera", lenses.begin()->first));
-  }
+  expect_none_left(lenses, "--lens");
+  expect_none_left(offsets, "--offset");
+  expect_none_left(responses, "--response");
   if (sources.size() < 2) throw UsageError("a rig has two cameras or more");
   return sources;
 }
@@ -207,7 +251,8 @@ void calibrate_rig(const RigOptions& options, Console& console) {
   console.say("camera                    views  corners  left out  off, px   +- deg     +- mm");
   for (std::size_t c = 0; c < sources.size(); ++c) {
     const calibrate::RigCameraFit& camera = fit.cameras[c];
-    members.push_back({sources[c].name, sources[c].lens_file, camera.cam_from_rig, 0, ""});
+    members.push_back({sources[c].name, sources[c].lens_file, camera.cam_from_rig,
+                       sources[c].time_offset_s, sources[c].response});
     const double sigma_deg = camera.turn_sigma_rad / degree;
     const double sigma_mm = 1000 * camera.position_sigma_m;
     const calibrate::Vec3 p = position_of(camera.cam_from_rig);
@@ -244,6 +289,11 @@ Command calibrate_rig_command() {
                                   "instant, or NAME=VIDEO, all of one start and rate");
             arguments.repeated("--lens", o->lenses, "NAME=FILE: a camera's lens; once for each");
             arguments.required("--lens");
+            arguments.repeated("--offset", o->offsets,
+                               "NAME=SECONDS that a camera stamps its frames later than the first "
+                               "one does, as calibrate offset FIRST CAMERA tells; 0 if not said");
+            arguments.repeated("--response", o->responses,
+                               "NAME=FILE of calibrate response, where there is one");
             declare(arguments, o->board);
             arguments.option("--every", o->every, 1, 100000,
                              "of a video, every so many frames (25)");

@@ -81,6 +81,7 @@ TEST_F(CalibrateCommands, RigComesFromPicturesOfTheSameNames) {
   const std::string sources = "left=" + path("left") + " right=" + path("right");
   const std::string command = "calibrate rig " + sources + " --lens left=" + path("left.toml") +
                               " --lens right=" + path("right.yml") +
+                              " --offset right=-0.0125 --response left=" + write("left.rsp", "x") +
                               " --board 8x5 --square 0.04 -o " + path("rig.toml");
   const Outcome outcome = run_with_figures(command);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
@@ -89,6 +90,10 @@ TEST_F(CalibrateCommands, RigComesFromPicturesOfTheSameNames) {
   ASSERT_EQ(rig.size(), 2U);
   EXPECT_EQ(rig[1].name, "right");
   EXPECT_EQ(rig[1].lens, path("right.yml"));
+  EXPECT_EQ(rig[0].time_offset_s, 0);
+  EXPECT_EQ(rig[1].time_offset_s, -0.0125);
+  EXPECT_EQ(rig[0].response, path("left.rsp"));
+  EXPECT_EQ(rig[1].response, "");
   const made::PoseError error = made::error_of(rig[1].cam_from_rig, right_from_left);
   EXPECT_LT(error.turn_rad / made::degree, 0.1);
   EXPECT_LT(error.position_m, 0.002);
@@ -100,6 +105,14 @@ TEST_F(CalibrateCommands, RigComesFromPicturesOfTheSameNames) {
                 " --board 8x5 -o " + path("rig.toml"))
                 .status,
             2);
+  for (const char* wrong : {"--offset middle=1", "--offset right=soon",
+                            "--offset left=1 --offset "
+                            "left=2"}) {
+    EXPECT_EQ(run(command + " " + wrong).status, 2) << wrong;
+  }
+  const Outcome no_response = run(command + " --response right=" + path("none.rsp"));
+  EXPECT_EQ(no_response.status, 1);
+  expect_one_line(no_response.err);
 }
 
 TEST_F(CalibrateCommands, LensOfTheDeskComesFromItsLinesWithoutBoards) {
