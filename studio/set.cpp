@@ -156,8 +156,10 @@ Set read_set(const std::string& path) {
   }
   context.has_scene = !set.objects.empty() || !set.stand_ins.empty();
 
+  if (auto section = root.table("rig")) context.rig = read_rig_section(*section, context.base);
   root.need("camera", "every set has [camera] with a source");
   if (auto section = root.table("camera")) set.camera = read_camera_section(*section, context);
+  context.plate_offset_s = set.camera.rig_offset_s;
   if (auto section = root.table("probe")) set.probe = read_probe_section(*section, context);
   if (auto section = root.table("effort")) set.effort = read_effort_section(*section);
   if (auto section = root.table("display")) set.display = read_display_section(*section);

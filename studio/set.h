@@ -56,6 +56,8 @@ struct CameraSettings {
   std::string response;              // .rsp file; "" = none
   std::vector<double> vignetting;    // of the lens (calibrate/vignetting.h); empty = even
   std::optional<double> exposure_s;  // where the source does not tell it
+  // Of a rig: how much later than the rig's clock its frames are stamped.
+  std::optional<double> rig_offset_s;
   bool loop = false;
 };
 

@@ -35,6 +35,25 @@ std::optional<calibrate::Pose> read_rotation(Section& table, calibrate::Vec3 pos
   }
 }
 
+// Position, and the way that it looks; `track` is a third way where a camera may move.
+calibrate::Pose read_way(Section& table) {
+  calibrate::Vec3 position;
+  table.vector("position", position, metres);
+  double roll_deg = 0;
+  table.number("roll", roll_deg, angle_range);
+  calibrate::Pose cam_from_set;
+  calibrate::Vec3 target;
+  if (table.vector("look_at", target, metres)) {
+    try {
+      cam_from_set = calibrate::look_at(position, target, roll_deg * degree);
+    } catch (const std::invalid_argument& error) {
+      table.fault("look_at", fmt::format("cannot be used: {}", error.what()));
+    }
+  }
+  if (const auto rotated = read_rotation(table, position)) cam_from_set = *rotated;
+  return cam_from_set;
+}
+
 void read_camera_pose(Section table, const fs::path& base, PoseSettings& pose) {
   const int ways = int{table.has("look_at")} + int{table.has("rotation")} + int{table.has("track")};
   if (ways != 1) {
@@ -42,20 +61,8 @@ void read_camera_pose(Section table, const fs::path& base, PoseSettings& pose) {
                 "must have exactly one of look_at = [x, y, z], rotation = [nine numbers], "
                 "track = \"poses.csv\"");
   }
-  calibrate::Vec3 position;
-  table.vector("position", position, metres);
   if (!table.has("track")) table.need("position", "where the camera stands, in metres");
-  double roll_deg = 0;
-  table.number("roll", roll_deg, angle_range);
-  calibrate::Vec3 target;
-  if (table.vector("look_at", target, metres)) {
-    try {
-      pose.cam_from_set = calibrate::look_at(position, target, roll_deg * degree);
-    } catch (const std::invalid_argument& error) {
-      table.fault("look_at", fmt::format("cannot be used: {}", error.what()));
-    }
-  }
-  if (const auto rotated = read_rotation(table, position)) pose.cam_from_set = *rotated;
+  pose.cam_from_set = read_way(table);
   if (table.file("track", base, pose.track)) {
     try {
       static_cast<void>(calibrate::read_track(pose.track));
@@ -70,7 +77,9 @@ void read_camera_pose(Section table, const fs::path& base, PoseSettings& pose) {
 void fit_lens(Section& section, const SetContext& context, CameraSettings& camera) {
   const ShowSettings& show = context.show;
   if (show.width < 1 || show.height < 1) return;  // a fault already
-  const std::string_view key = section.has("lens") ? "lens" : "model";
+  const std::string_view key = section.has("rig_camera") ? "rig_camera"
+                               : section.has("lens")     ? "lens"
+                                                         : "model";
   if (camera.crop) {
     const auto [x, y, width, height] = *camera.crop;
     if (x + width > camera.lens.width || y + height > camera.lens.height) {
@@ -188,6 +197,16 @@ void read_probe_source(Section& section, const fs::path& base, ProbeSettings& pr
 
 }  // namespace
 
+calibrate::Pose read_fixed_pose(Section table) {
+  if (table.has("look_at") == table.has("rotation")) {
+    table.fault("", "must have either look_at = [x, y, z] or rotation = [nine numbers]");
+  }
+  table.need("position", "where it stands, in metres");
+  const calibrate::Pose pose = read_way(table);
+  table.finish();
+  return pose;
+}
+
 bool read_source_key(Section& section,
                      std::string_view key,
                      const fs::path& base,
@@ -213,6 +232,61 @@ bool read_source_key(Section& section,
   return true;
 }
 
+namespace {
+
+// The lens, the pose and the response of a camera that is of no rig.
+void read_own_camera(Section& section,
+                     const SetContext& context,
+                     bool cropped,
+                     CameraSettings& camera) {
+  const ShowSettings& show = context.show;
+  const std::array<int, 2> size = cropped ? std::array{0, 0} : std::array{show.width, show.height};
+  if (auto lens = read_lens_key(section, size, context.base)) {
+    camera.lens = *lens;
+    fit_lens(section, context, camera);
+  } else if (context.has_scene && !section.has("lens") && !section.has("model")) {
+    section.need("lens", "objects are seen through it: a file, or model and focal_px");
+  }
+  section.file("response", context.base, camera.response);
+  camera.pose_place = section.place_of("pose");
+  if (context.has_scene) section.need("pose", "where the camera is in the set");
+  if (auto table = section.table("pose")) read_camera_pose(*table, context.base, camera.pose);
+}
+
+// The same of a probe; what a map is turned by is apart.
+void read_own_probe(Section& section, const SetContext& context, ProbeSettings& probe) {
+  const bool is_map = probe.kind == ProbeSettings::Kind::map;
+  const TomlValue* lens = section.value("lens");
+  const bool latlong =
+      lens != nullptr && lens->kind == TomlValue::Kind::text && lens->text == "latlong";
+  if (!latlong) probe.lens = read_lens_key(section, {0, 0}, context.base);
+  if (!is_map && lens == nullptr && !section.has("model")) {
+    section.need("lens", "how the probe sees: a file, a table, or \"latlong\"");
+  }
+  if (auto table = section.table("pose")) read_probe_pose(*table, probe.probe_from_set);
+  if (!is_map && !latlong) section.need("pose", "how the probe is turned");
+  section.file("response", context.base, probe.response);
+}
+
+// Of two cameras of one rig, clocks and all.
+void read_probe_of_rig(Section& section, const SetContext& context, ProbeSettings& probe) {
+  const auto of_rig = read_rig_camera(section, context);
+  if (of_rig) {
+    probe.lens = of_rig->lens;
+    probe.probe_from_set = of_rig->cam_from_set;
+    probe.response = of_rig->response;
+  }
+  if (!of_rig || !context.plate_offset_s) return;
+  probe.offset_s = of_rig->time_offset_s - *context.plate_offset_s;
+  if (section.value("offset_s") != nullptr) {
+    section.fault("offset_s",
+                  "is the rig's already, which both cameras are of: leave out either it or "
+                  "rig_camera");
+  }
+}
+
+}  // namespace
+
 CameraSettings read_camera_section(Section section, const SetContext& context) {
   CameraSettings camera;
   section.need("source", "the plate: a file or a camera's URI");
@@ -223,26 +297,24 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
   std::int64_t frame = 0;
   if (section.integer("frame", frame, std::int64_t{0}, std::int64_t{1} << 40)) camera.frame = frame;
   read_colour(section, camera.colour);
-  section.file("response", context.base, camera.response);
   double exposure_s = 0;
   if (section.number("exposure_s", exposure_s, exposure_range)) camera.exposure_s = exposure_s;
   section.boolean("loop", camera.loop);
 
-  const ShowSettings& show = context.show;
-  const std::array<int, 2> size = cropped ? std::array{0, 0} : std::array{show.width, show.height};
-  if (auto lens = read_lens_key(section, size, context.base)) {
-    camera.lens = *lens;
-    fit_lens(section, context, camera);
-  } else if (context.has_scene && !section.has("lens") && !section.has("model")) {
-    section.need("lens", "objects are seen through it: a file, or model and focal_px");
+  if (section.has("rig_camera")) {
+    if (const auto of_rig = read_rig_camera(section, context)) {
+      if (of_rig->lens) camera.lens = *of_rig->lens;
+      if (of_rig->lens) fit_lens(section, context, camera);
+      camera.pose.cam_from_set = of_rig->cam_from_set;
+      camera.pose_place = section.place_of("rig_camera");
+      camera.response = of_rig->response;
+      camera.rig_offset_s = of_rig->time_offset_s;
+    }
+  } else {
+    read_own_camera(section, context, cropped, camera);
   }
-
   read_vignetting(section, camera.vignetting);
   if (camera.lens.width > 0) check_vignetting(section, camera);
-
-  camera.pose_place = section.place_of("pose");
-  if (context.has_scene) section.need("pose", "where the camera is in the set");
-  if (auto table = section.table("pose")) read_camera_pose(*table, context.base, camera.pose);
   section.finish();
   return camera;
 }
@@ -250,17 +322,12 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
 ProbeSettings read_probe_section(Section section, const SetContext& context) {
   ProbeSettings probe;
   read_probe_source(section, context.base, probe);
-  const bool is_map = probe.kind == ProbeSettings::Kind::map;
-
-  const TomlValue* lens = section.value("lens");
-  const bool latlong =
-      lens != nullptr && lens->kind == TomlValue::Kind::text && lens->text == "latlong";
-  if (!latlong) probe.lens = read_lens_key(section, {0, 0}, context.base);
-  if (!is_map && lens == nullptr && !section.has("model")) {
-    section.need("lens", "how the probe sees: a file, a table, or \"latlong\"");
+  section.number("offset_s", probe.offset_s, {-60, 60});
+  if (section.has("rig_camera")) {
+    read_probe_of_rig(section, context, probe);
+  } else {
+    read_own_probe(section, context, probe);
   }
-  if (auto table = section.table("pose")) read_probe_pose(*table, probe.probe_from_set);
-  if (!is_map && !latlong) section.need("pose", "how the probe is turned");
   if (double yaw_deg = 0; section.number("yaw", yaw_deg, angle_range)) {
     probe.yaw_rad = yaw_deg * degree;
   }
@@ -280,9 +347,7 @@ ProbeSettings read_probe_section(Section section, const SetContext& context) {
   read_match(section, picture, probe.match);
   read_rectangle(section, "albedo_patch", picture, probe.albedo_patch);
   read_vignetting(section, probe.vignetting);
-  section.file("response", context.base, probe.response);
   read_colour(section, probe.colour);
-  section.number("offset_s", probe.offset_s, {-60, 60});
   section.finish();
   return probe;
 }

@@ -2,17 +2,38 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "calibrate/rig_file.h"
 #include "studio/section.h"
 #include "studio/set.h"
 
 namespace studio {
+
+// A set's rig: cameras that stand firmly to each other.
+struct RigContext {
+  bool is_there = false;
+  std::optional<std::vector<calibrate::RigMember>> cameras;  // nothing = none, or a fault was added
+  calibrate::Pose rig_from_set;
+};
+
+// What a camera's name in the rig stands for.
+struct RigCamera {
+  std::optional<calibrate::Lens> lens;  // nothing = a fault was added
+  calibrate::Pose cam_from_set;
+  std::string response;      // file; "" = none
+  double time_offset_s = 0;  // how much later than the rig's clock its frames are stamped
+};
 
 // What the sections need to know of their surroundings.
 struct SetContext {
   std::filesystem::path base;  // relative paths start here
   ShowSettings show;
   bool has_scene = false;  // objects or stand-ins: then a lens and a pose are needed
+  RigContext rig;
+  std::optional<double> plate_offset_s;  // of the plate's camera to its rig's clock
 };
 
 // Positions and sizes beyond this many metres are mistakes.
@@ -40,6 +61,15 @@ void read_rectangle(Section& section,
                     std::string_view key,
                     std::array<int, 2> picture,
                     std::optional<std::array<int, 4>>& rectangle);
+
+RigContext read_rig_section(Section section, const std::filesystem::path& base);
+
+// The camera of the rig that `rig_camera` names, with faults for keys that it stands for. Nothing
+// if there is no such key, or it is bad and a fault was added.
+std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& context);
+
+// The pose of a camera that stays where it is: position, and look_at or rotation.
+calibrate::Pose read_fixed_pose(Section table);
 
 // A source's URI with its path made absolute and, where it names a file or directory, found.
 bool read_source_key(Section& section,
