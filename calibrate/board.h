@@ -46,4 +46,8 @@ struct BoardView {
 // How many corners were seen.
 std::size_t count_corners(const BoardView& view);
 
+// Where the middle of all the board's corners lies in the picture, whichever of them were seen: by
+// their homography. Nothing unless some were seen on either side of it, along rows and columns.
+std::optional<Vec2> middle_of(const Board& board, const BoardView& view);
+
 }  // namespace calibrate

@@ -127,6 +127,7 @@ class Search {
       : picture_(picture),
         board_(board),
         lens_(options.lens),
+        quick_(options.quick),
         start_(Clock::now()),
         deadline_(start_ + options.time_limit) {
     if (!lens_ && options.fisheye) lens_ = made_fisheye(picture);
@@ -154,6 +155,7 @@ class Search {
   const GreyPicture& picture_;
   const Board& board_;
   std::optional<Lens> lens_;
+  bool quick_ = false;
   int dictionary_ = 0;
   Clock::time_point start_;
   Clock::time_point deadline_;
@@ -309,6 +311,12 @@ BoardDetection Search::run() {
   // Shares of the time that is left, so that what one finder does not use goes to the next ones.
   const bool bent = lens_ && lens_->model != "pinhole";
   const auto found = [&] {
+    if (quick_) {
+      return board_.kind == Board::Kind::charuco
+                 ? try_whole("detectMarkers", wire::Finder::markers, picture_, 1)
+                 : try_whole("findChessboardCorners", wire::Finder::chessboard,
+                             limited(picture_, quick_side), 1);
+    }
     if (board_.kind == Board::Kind::charuco) {
       return try_markers(bent);
     }

@@ -17,6 +17,7 @@ struct DetectionOptions {
   // picture are straightened with it. It need not be right, only of the picture's size.
   std::optional<Lens> lens = std::nullopt;
   bool fisheye = false;  // without such a guess, make one: equidistant, 180 degrees across
+  bool quick = false;  // the fast finder alone: for frames of a video, of which some may be missed
 };
 
 struct BoardDetection {

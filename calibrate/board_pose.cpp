@@ -7,9 +7,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
+
+#include "calibrate/homography.h"
 
 namespace calibrate {
 namespace {
@@ -30,49 +31,6 @@ Pose pose_of(const Matrix3d& R, const Vector3d& t) {
   for (int i = 0; i < 9; ++i) pose.R.m[static_cast<std::size_t>(i)] = R(i / 3, i % 3);
   pose.t = {t.x(), t.y(), t.z()};
   return pose;
-}
-
-// Moves points to mean 0 and mean distance sqrt(2) (Hartley's normalisation).
-struct Normalisation {
-  double x = 0, y = 0, scale = 1;
-
-  explicit Normalisation(const std::vector<Vec2>& points) {
-    const auto n = static_cast<double>(points.size());
-    for (const Vec2 p : points) x += p.x / n, y += p.y / n;
-    double distance = 0;
-    for (const Vec2 p : points) distance += hypotenuse(p.x - x, p.y - y) / n;
-    scale = distance > 0 ? std::sqrt(2.0) / distance : 0;
-  }
-  Vec2 operator()(Vec2 p) const { return {(p.x - x) * scale, (p.y - y) * scale}; }
-  Matrix3d matrix() const {
-    Matrix3d m;
-    m << scale, 0, -x * scale, 0, scale, -y * scale, 0, 0, 1;
-    return m;
-  }
-};
-
-// The homography from board to plane; nothing where the points do not tell it.
-std::optional<Matrix3d> find_homography(const std::vector<Vec2>& board,
-                                        const std::vector<Vec2>& plane) {
-  const Normalisation from(board);
-  const Normalisation to(plane);
-  if (!(from.scale > 0) || !(to.scale > 0)) return std::nullopt;
-  Eigen::Matrix<double, 9, 9> sum = Eigen::Matrix<double, 9, 9>::Zero();
-  for (std::size_t i = 0; i < board.size(); ++i) {
-    const Vec2 a = from(board[i]);
-    const Vec2 b = to(plane[i]);
-    Eigen::Matrix<double, 9, 2> rows;
-    rows << a.x, 0, a.y, 0, 1, 0, 0, a.x, 0, a.y, 0, 1, -b.x * a.x, -b.y * a.x, -b.x * a.y,
-        -b.y * a.y, -b.x, -b.y;
-    sum.selfadjointView<Eigen::Lower>().rankUpdate(rows);
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(sum);
-  const auto& values = solver.eigenvalues();
-  if (!(values(1) > 1e-12 * values(8))) return std::nullopt;  // several homographies do
-  const Eigen::Matrix<double, 9, 1> h = solver.eigenvectors().col(0);
-  Matrix3d normalised;
-  normalised << h(0), h(1), h(2), h(3), h(4), h(5), h(6), h(7), h(8);
-  return to.matrix().inverse() * normalised * from.matrix();
 }
 
 // RMS angle; steps the pose towards less of it if `steps` is above 0.
@@ -141,18 +99,21 @@ std::optional<BoardPose> find_board_pose(std::span<const Vec3> bearings,
     plane.push_back({b.x() / b.z(), b.y() / b.z()});
   }
   if (board.size() < min_corners) return std::nullopt;
-  auto H = find_homography(board, plane);
-  if (!H || !H->allFinite()) return std::nullopt;
+  const auto plane_from_board = find_homography(board, plane);
+  if (!plane_from_board) return std::nullopt;
+  Matrix3d H =
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(plane_from_board->m.data());
+  if (!H.allFinite()) return std::nullopt;
 
   // Columns: the board's x and y axes, and its origin, all in one unknown scale.
-  const double scale = 0.5 * (H->col(0).norm() + H->col(1).norm());
+  const double scale = 0.5 * (H.col(0).norm() + H.col(1).norm());
   if (!(scale > 0)) return std::nullopt;
-  *H /= (*H)(2, 2) < 0 ? -scale : scale;
+  H /= H(2, 2) < 0 ? -scale : scale;
   Matrix3d axes;
-  axes << H->col(0), H->col(1), H->col(0).cross(H->col(1));
+  axes << H.col(0), H.col(1), H.col(0).cross(H.col(1));
   const Eigen::JacobiSVD<Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Matrix3d R = plane_from_cam.transpose() * svd.matrixU() * svd.matrixV().transpose();
-  Vector3d t = plane_from_cam.transpose() * H->col(2);
+  Vector3d t = plane_from_cam.transpose() * H.col(2);
   if (!R.allFinite() || !t.allFinite() || R.determinant() < 0) return std::nullopt;
   const bool rough = effort == PoseEffort::rough;
   double error_rad = refine(bearings, p_board, R, t, rough ? rough_steps : refinement_steps);

@@ -91,6 +91,19 @@ TEST(DetectBoard, FindsBoardsThroughAPinhole) {
   }
 }
 
+TEST(DetectBoard, TriesTheFastFinderAloneIfItMustBeQuick) {
+  DetectionOptions quick = patient;
+  quick.quick = true;
+  std::mt19937 random(2);
+  const Pose pose = pose_off_axis(chessboard, 0, 6, .6, random);
+  EXPECT_EQ(detect_board(made::render_board(chessboard, pose, pinhole), chessboard, quick).finder,
+            "findChessboardCorners");
+  const BoardDetection none = detect_board(noise_picture(320, 240), chessboard, quick);
+  EXPECT_FALSE(none.view);
+  EXPECT_THAT(none.reason, HasSubstr("findChessboardCorners found"));
+  EXPECT_THAT(none.reason, testing::Not(HasSubstr("findChessboardCornersSB")));
+}
+
 TEST(DetectBoard, FindsBoardsThroughAFisheyeUpTo55Degrees) {
   for (unsigned seed = 0; seed < 4; ++seed) {
     std::mt19937 random(seed);

@@ -18,6 +18,29 @@ TEST(Board, KnowsHowManyCornersWereSeen) {
   EXPECT_EQ(count_corners({"a.png", {Vec2{1, 2}, std::nullopt, Vec2{3, 4}}}), 2u);
 }
 
+// Whichever corners a ChArUco board shows, its middle is where it is.
+TEST(Board, KnowsItsMiddleFromThoseCornersThatWereSeen) {
+  const Board board{Board::Kind::charuco, 9, 6, .025, .018, "DICT_5X5_100"};
+  const auto seen = [](Vec3 p) {  // tilted, before a pinhole
+    const double depth = 0.6 + 0.7 * p.x - 0.4 * p.y;
+    return Vec2{400 + 900 * (p.x - .1) / depth, 300 + 900 * (p.y + .2 * p.x) / depth};
+  };
+  const Vec2 truth = seen({.1, .0625, 0});
+  BoardView view{"", {}};
+  for (std::size_t i = 0; i < board.corner_count(); ++i)
+    view.corners.push_back(seen(corner_of(board, i)));
+  for (const std::size_t first : {0U, 8U, 20U}) {
+    BoardView part = view;
+    for (std::size_t i = 0; i < first; ++i) part.corners[i].reset();
+    const auto middle = middle_of(board, part);
+    ASSERT_TRUE(middle) << first;
+    EXPECT_NEAR(middle->x, truth.x, 1e-6) << first;
+    EXPECT_NEAR(middle->y, truth.y, 1e-6) << first;
+  }
+  for (std::size_t i = 0; i < 27; ++i) view.corners[i].reset();  // the upper half
+  EXPECT_FALSE(middle_of(board, view));
+}
+
 TEST(Board, IsRefusedIfItCannotBe) {
   const Board good{Board::Kind::charuco, 9, 6, .025, .018, "DICT_5X5_100"};
   EXPECT_NO_THROW(check(good));
