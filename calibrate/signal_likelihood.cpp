@@ -8,6 +8,8 @@
 
 #include <Eigen/Dense>
 
+#include "calibrate/signal_search.h"
+
 namespace calibrate {
 namespace {
 
@@ -50,18 +52,14 @@ class AveragedCovariance {
   double scale_ = 1;
 };
 
-double mean_interval(std::span<const SignalSample> signal) {
-  return (signal.back().time_s - signal.front().time_s) / static_cast<double>(signal.size() - 1);
-}
-
 }  // namespace
 
 SignalLikelihood::SignalLikelihood(std::span<const SignalSample> a,
                                    std::span<const SignalSample> b,
                                    double about_offset_s,
                                    double gain_b) {
-  const double interval_a = mean_interval(a);
-  const double interval_b = mean_interval(b);
+  const double interval_a = frame_interval_s(a);
+  const double interval_b = frame_interval_s(b);
   interval_s_ = std::max(interval_a, interval_b);
   const double length_s = samples_of_stretch / (1 / interval_a + 1 / interval_b);
   const double begin = std::max(a.front().time_s, b.front().time_s - about_offset_s);

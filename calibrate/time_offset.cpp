@@ -8,25 +8,40 @@
 #include <stdexcept>
 #include <string>
 
+#include "calibrate/common_motion.h"
+#include "calibrate/golden_section.h"
 #include "calibrate/signal_edges.h"
 #include "calibrate/signal_likelihood.h"
+#include "calibrate/signal_search.h"
 
 namespace calibrate {
 namespace {
 
 constexpr std::size_t fewest_frames = 20;
-// Part of the shorter signal that must be in common.
-constexpr double least_overlap = 0.4;
 constexpr double least_correlation = 0.4;
+// What sigma is larger by if exposures are guessed: measured, a lamp at 25 frames a second.
+constexpr double guessed_exposures = 2;
 // Correlation elsewhere, in parts of the best, at which the signals repeat themselves.
 constexpr double repeats_itself = 0.9;
+// Of motions: what both see in common is the same but for noise.
+constexpr double least_common = 0.99;
+constexpr double far_worse = 4;  // share that is not in common elsewhere, over that at the best
+constexpr double frames_apart = 2;
+constexpr double most_sigma_frames = 0.15;
 
 [[noreturn]] void refuse(const std::string& why) { throw std::runtime_error(why); }
 
-void check(std::span<const SignalSample> signal, const char* name) {
+bool is_finite(const SignalSample& sample) {
+  return std::isfinite(sample.value) && std::isfinite(sample.exposure_s);
+}
+bool is_finite(const SeenPoint& point) {
+  return std::isfinite(point.q.x) && std::isfinite(point.q.y);
+}
+
+template <class Sample>
+void check(std::span<const Sample> signal, const char* name) {
   for (std::size_t i = 0; i < signal.size(); ++i) {
-    if (!std::isfinite(signal[i].time_s) || !std::isfinite(signal[i].value) ||
-        !std::isfinite(signal[i].exposure_s)) {
+    if (!std::isfinite(signal[i].time_s) || !is_finite(signal[i])) {
       throw std::invalid_argument("a signal needs finite numbers");
     }
     if (i > 0 && !(signal[i].time_s > signal[i - 1].time_s)) {
@@ -39,6 +54,24 @@ void check(std::span<const SignalSample> signal, const char* name) {
   }
 }
 
+void check(const TimeOffsetOptions& options) {
+  if (!(options.largest_s > 0) || !std::isfinite(options.largest_s)) {
+    throw std::invalid_argument("the largest offset must be above 0 and finite");
+  }
+}
+
+std::string repeated(const std::string& what, double every_s, const std::string& otherwise) {
+  return "the " + what + " repeats itself every " +
+         std::to_string(std::lround(1000 * std::abs(every_s))) +
+         " ms or so, so that the offset could be off by that: " + otherwise +
+         " at random, or look for smaller offsets";
+}
+
+std::string only_to(const std::string& what, double sigma_s) {
+  return "the " + what + " that both cameras saw tells the offset to no better than " +
+         std::to_string(std::lround(1000 * std::min(sigma_s, 1.0))) + " ms";
+}
+
 // With mean 0 and variance 1.
 std::vector<SignalSample> normalized(std::span<const SignalSample> signal, const char* name) {
   const auto n = static_cast<double>(signal.size());
@@ -48,140 +81,24 @@ std::vector<SignalSample> normalized(std::span<const SignalSample> signal, const
   for (const SignalSample& s : signal) variance += (s.value - mean) * (s.value - mean) / n;
   if (!(variance > 1e-18 * mean * mean)) {
     refuse("nothing changes in what camera " + std::string(name) +
-           " saw: switch a lamp on and off before both, at random, or move something");
+           " saw: switch a lamp on and off before both, at random, or move a board");
   }
   std::vector<SignalSample> result(signal.begin(), signal.end());
   for (SignalSample& s : result) s.value = (s.value - mean) / std::sqrt(variance);
   return result;
 }
 
-// Straight between samples.
-double value_at(std::span<const SignalSample> signal, double time_s) {
-  const auto after = std::ranges::upper_bound(signal, time_s, {}, &SignalSample::time_s);
-  if (after == signal.begin()) return signal.front().value;
-  if (after == signal.end()) return signal.back().value;
-  const SignalSample& before = *(after - 1);
-  const double f = (time_s - before.time_s) / (after->time_s - before.time_s);
-  return before.value + f * (after->value - before.value);
-}
-
-std::vector<double> resampled(std::span<const SignalSample> signal, double step_s) {
-  const double length_s = signal.back().time_s - signal.front().time_s;
-  std::vector<double> values(static_cast<std::size_t>(length_s / step_s) + 1);
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    values[i] = value_at(signal, signal.front().time_s + static_cast<double>(i) * step_s);
-  }
-  return values;
-}
-
-// The correlation of a with b, b's first sample lying `shift` steps after a's.
-double correlation_at(std::span<const double> a, std::span<const double> b, std::ptrdiff_t shift) {
-  const auto begin = std::max<std::ptrdiff_t>(0, shift);
-  const auto end = std::min(std::ssize(a), std::ssize(b) + shift);
-  if (end - begin < static_cast<std::ptrdiff_t>(
-                        least_overlap * static_cast<double>(std::min(a.size(), b.size())))) {
-    return 0;
-  }
-  double sa = 0, sb = 0, saa = 0, sbb = 0, sab = 0;
-  for (std::ptrdiff_t i = begin; i < end; ++i) {
-    const double x = a[static_cast<std::size_t>(i)];
-    const double y = b[static_cast<std::size_t>(i - shift)];
-    sa += x;
-    sb += y;
-    saa += x * x;
-    sbb += y * y;
-    sab += x * y;
-  }
-  const auto n = static_cast<double>(end - begin);
-  // A stretch in which little happens correlates with anything.
-  constexpr double least_variance = 0.1;
-  const double va = saa / n - sa * sa / (n * n);
-  const double vb = sbb / n - sb * sb / (n * n);
-  if (va < least_variance || vb < least_variance) return 0;
-  return (sab / n - sa * sb / (n * n)) / std::sqrt(va * vb);
-}
-
-struct Coarse {
-  double offset_s = 0;
-  double correlation = 0;  // signed
-  double next_best = 0;
-  double next_offset_s = 0;
-};
-
-Coarse search_coarsely(std::span<const SignalSample> a,
-                       std::span<const SignalSample> b,
-                       const TimeOffsetOptions& options) {
-  constexpr double step_s = 0.01;
-  const std::vector<double> fine_a = resampled(a, step_s);
-  const std::vector<double> fine_b = resampled(b, step_s);
-  // b's first sample lies begin - offset after a's.
-  const double begin_s = b.front().time_s - a.front().time_s;
-  const auto count = static_cast<std::ptrdiff_t>(options.largest_s / step_s);
-  const auto middle = static_cast<std::ptrdiff_t>(std::lround(begin_s / step_s));
-  const double rest_s = begin_s - static_cast<double>(middle) * step_s;
-  std::vector<double> correlations;
-  for (std::ptrdiff_t i = -count; i <= count; ++i) {
-    correlations.push_back(correlation_at(fine_a, fine_b, middle - i));
-  }
-  const auto height = [&](double c) { return options.any_sign ? std::abs(c) : c; };
-  const auto best = std::ranges::max_element(correlations, {}, height);
-  const auto offset_of = [&](auto at) {
-    return static_cast<double>(at - correlations.begin() - count) * step_s + rest_s;
-  };
-  Coarse coarse{offset_of(best), *best, 0, 0};
-  // Down both flanks of the best: what rises again beyond is another.
-  auto left = best;
-  auto right = best;
-  while (left != correlations.begin() && height(*(left - 1)) <= height(*left)) --left;
-  while (right + 1 != correlations.end() && height(*(right + 1)) <= height(*right)) ++right;
-  for (auto at = correlations.begin(); at != correlations.end(); ++at) {
-    if (at >= left && at <= right) continue;
-    if (height(*at) <= coarse.next_best) continue;
-    coarse.next_best = height(*at);
-    coarse.next_offset_s = offset_of(at);
-  }
-  return coarse;
-}
-
-void check(const Coarse& coarse) {
-  const double best = std::abs(coarse.correlation);
+void check(const std::vector<SignalMatch>& matches) {
+  const double best = matches.empty() ? 0 : matches.front().correlation;
   if (best < least_correlation) {
     refuse("the cameras do not show the same change (their signals correlate by " +
            std::to_string(best).substr(0, 4) +
-           " at best): let one lamp or one motion be the largest change in both, or look for "
-           "larger offsets");
+           " at best): let one lamp be the largest change in both, look for larger offsets, or "
+           "move a board before both");
   }
-  if (coarse.next_best > repeats_itself * best) {
-    const double every_ms = 1000 * std::abs(coarse.next_offset_s - coarse.offset_s);
-    refuse("the change repeats itself every " + std::to_string(std::lround(every_ms)) +
-           " ms or so, so that the offset could be off by that: flash or move at random, or look "
-           "for smaller offsets");
+  if (matches.size() > 1 && matches[1].correlation > repeats_itself * best) {
+    refuse(repeated("change", matches[1].offset_s - matches[0].offset_s, "flash"));
   }
-}
-
-// The place of the greatest value between two bounds.
-double maximize(double low, double high, double tolerance, const std::function<double(double)>& f) {
-  const double golden = (std::sqrt(5.0) - 1) / 2;
-  double x1 = high - golden * (high - low);
-  double x2 = low + golden * (high - low);
-  double f1 = f(x1);
-  double f2 = f(x2);
-  while (high - low > tolerance) {
-    if (f1 >= f2) {
-      high = x2;
-      x2 = x1;
-      f2 = f1;
-      x1 = high - golden * (high - low);
-      f1 = f(x1);
-    } else {
-      low = x1;
-      x1 = x2;
-      f1 = f2;
-      x2 = low + golden * (high - low);
-      f2 = f(x2);
-    }
-  }
-  return (low + high) / 2;
 }
 
 // That of the greatest likelihood, by a grid and then one parameter at a time.
@@ -249,20 +166,23 @@ void refine(const SignalLikelihood& signals, double reach_s, TimeOffset& result)
   result.sigma_s = std::max(bend_sigma_s, bend_sigma_s * bend_sigma_s * std::sqrt(squares));
 }
 
+bool tells_exposures(std::span<const SignalSample> signal) {
+  return std::ranges::any_of(signal, [](const SignalSample& s) { return s.exposure_s > 0; });
+}
+
 // A lamp's switching tells more than its covariance.
 void refine_by_edges(std::span<const SignalSample> a,
                      std::span<const SignalSample> b,
-                     bool mirrored,
                      double interval_s,
                      TimeOffset& result) {
   // Without exposures, frames tell of a jump only which two it lies between; at equal rates their
   // limits then all lie in step, and promise more than they hold.
-  const auto tells_exposure = [](const SignalSample& sample) { return sample.exposure_s > 0; };
-  if (std::ranges::none_of(a, tells_exposure) || std::ranges::none_of(b, tells_exposure)) return;
-  std::vector<SignalEdge> edges_b = find_edges(b);
-  for (SignalEdge& edge : edges_b) edge.rising = edge.rising != mirrored;
+  if (!tells_exposures(a) || !tells_exposures(b)) {
+    result.sigma_s *= guessed_exposures;
+    return;
+  }
   const double reach_s = 0.75 * interval_s;
-  const auto found = offset_of_edges(find_edges(a), edges_b, result.offset_s, reach_s);
+  const auto found = offset_of_edges(find_edges(a), find_edges(b), result.offset_s, reach_s);
   // Exposures other than told, or other changes, would show.
   constexpr double enough_agree = 0.85;
   constexpr std::size_t enough_pairs = 10;
@@ -272,59 +192,81 @@ void refine_by_edges(std::span<const SignalSample> a,
   result.edges = found->pairs;
 }
 
-}  // namespace
-
-std::vector<SignalSample> along_main_axis(std::span<const SeenPoint> points) {
-  Vec2 mean;
-  const double share = 1 / static_cast<double>(points.size());
-  for (const SeenPoint& point : points) {
-    mean.x += share * point.q.x;
-    mean.y += share * point.q.y;
-  }
-  double xx = 0, xy = 0, yy = 0;
-  for (const SeenPoint& point : points) {
-    const double x = point.q.x - mean.x;
-    const double y = point.q.y - mean.y;
-    xx += x * x;
-    xy += x * y;
-    yy += y * y;
-  }
-  const double angle = std::atan2(2 * xy, xx - yy) / 2;
-  std::vector<SignalSample> signal;
-  for (const SeenPoint& point : points) {
-    signal.push_back(
-        {point.time_s,
-         (point.q.x - mean.x) * std::cos(angle) + (point.q.y - mean.y) * std::sin(angle),
-         point.exposure_s});
-  }
-  return signal;
+double overlap_s(const auto& a, const auto& b, double offset_s) {
+  return std::min(a.back().time_s, b.back().time_s - offset_s) -
+         std::max(a.front().time_s, b.front().time_s - offset_s);
 }
+
+}  // namespace
 
 TimeOffset find_time_offset(std::span<const SignalSample> a,
                             std::span<const SignalSample> b,
                             const TimeOffsetOptions& options) {
   check(a, "A");
   check(b, "B");
-  if (!(options.largest_s > 0) || !std::isfinite(options.largest_s)) {
-    throw std::invalid_argument("the largest offset must be above 0 and finite");
-  }
+  check(options);
   const std::vector<SignalSample> one = normalized(a, "A");
   const std::vector<SignalSample> other = normalized(b, "B");
-  const Coarse coarse = search_coarsely(one, other, options);
-  check(coarse);
+  const std::vector<SignalMatch> matches = match_signals(one, other, options.largest_s);
+  check(matches);
+  const SignalMatch& coarse = matches.front();
 
   TimeOffset result;
   result.offset_s = coarse.offset_s;
-  result.correlation = std::abs(coarse.correlation);
-  result.next_best = coarse.next_best;
-  result.overlap_s = std::min(a.back().time_s, b.back().time_s - coarse.offset_s) -
-                     std::max(a.front().time_s, b.front().time_s - coarse.offset_s);
-  const SignalLikelihood signals(one, other, coarse.offset_s, coarse.correlation > 0 ? 1 : -1);
+  result.correlation = coarse.correlation;
+  result.next_best = matches.size() > 1 ? matches[1].correlation : 0;
+  result.overlap_s = overlap_s(a, b, coarse.offset_s);
+  const SignalLikelihood signals(one, other, coarse.offset_s, coarse.gain_b);
   if (signals.stretches() == 0) refuse("the cameras saw too little at one time: record longer");
   // Interpolated signals are off by a share of a frame.
   refine(signals, signals.interval_s(), result);
   refine(signals, signals.interval_s() / 4, result);
-  refine_by_edges(one, other, coarse.correlation < 0, signals.interval_s(), result);
+  refine_by_edges(one, other, signals.interval_s(), result);
+  if (!(result.sigma_s < signals.interval_s())) {
+    refuse(only_to("change", result.sigma_s) +
+           ": switch one lamp before both, often and at random, so that nothing else changes as "
+           "much");
+  }
+  return result;
+}
+
+TimeOffset find_time_offset(std::span<const SeenPoint> a,
+                            std::span<const SeenPoint> b,
+                            const TimeOffsetOptions& options) {
+  check(a, "A");
+  check(b, "B");
+  check(options);
+  std::vector<MotionOffset> offsets;
+  for (const SignalMatch& match : match_places(a, b, options.largest_s)) {
+    offsets.push_back(refine_motion_offset(a, b, match.offset_s));
+  }
+  std::ranges::sort(offsets, std::greater<>(), &MotionOffset::correlation);
+  const auto unexplained = [](const MotionOffset& offset) {
+    return 1 - offset.correlation * offset.correlation;
+  };
+  if (offsets.empty() || offsets[0].correlation < least_common) {
+    refuse("the cameras do not show the same motion (what they may have in common correlates by " +
+           std::to_string(offsets.empty() ? 0 : offsets[0].correlation).substr(0, 5) +
+           " at best): move one thing before both for longer, or look for larger offsets");
+  }
+  TimeOffset result;
+  result.offset_s = offsets[0].offset_s;
+  result.correlation = offsets[0].correlation;
+  for (const MotionOffset& other : offsets) {
+    // Others may have come to the same.
+    if (std::abs(other.offset_s - result.offset_s) < frames_apart * frame_interval_s(a)) continue;
+    if (unexplained(other) < far_worse * unexplained(offsets[0])) {
+      refuse(repeated("motion", other.offset_s - result.offset_s, "move"));
+    }
+    result.next_best = std::max(result.next_best, other.correlation);
+  }
+  result.overlap_s = overlap_s(a, b, result.offset_s);
+  result.sigma_s = motion_sigma_s(a, b, result.offset_s);
+  // What is alike by chance does not hold for parts of the time.
+  if (!(result.sigma_s < most_sigma_frames * frame_interval_s(a))) {
+    refuse(only_to("motion", result.sigma_s) +
+           ": move it faster, for longer, and so that both see it all the time");
+  }
   return result;
 }
 

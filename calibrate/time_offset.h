@@ -16,20 +16,14 @@ struct SignalSample {
   double exposure_s = 0;  // over which it is averaged; 0 = unknown, half the time between frames
 };
 
-// Where something that moves, as a board, is seen in a frame.
+// Where a point that moves, as a board's middle, is seen in a frame.
 struct SeenPoint {
-  double time_s = 0;
-  Vec2 q;  // pixels
-  double exposure_s = 0;
+  double time_s = 0;  // middle of the exposure, on the camera's clock
+  Vec2 q;             // pixels
 };
 
-// The points' places along the line on which they move most, in pixels; which way is positive is
-// open (TimeOffsetOptions::any_sign). Empty for no points.
-std::vector<SignalSample> along_main_axis(std::span<const SeenPoint> points);
-
 struct TimeOffsetOptions {
-  double largest_s = 5;   // offsets to either side that are looked for
-  bool any_sign = false;  // signals may be mirror images of each other: motion, not brightness
+  double largest_s = 5;  // offsets to either side that are looked for
 };
 
 struct TimeOffset {
@@ -46,15 +40,24 @@ struct TimeOffset {
 // 5/2) and time scale are those of the greatest likelihood, and so is the offset: Rasmussen and
 // Williams, "Gaussian Processes for Machine Learning", 2006, sections 4.2 and 5.4. So neither a
 // lamp that jumps between frames nor a smooth motion biases it, as interpolation would. sigma_s is
-// the likelihood's width, or what stretches of the signals differ by, if that is more. Where both
+// the likelihood's width, or what stretches of the signals differ by, if that is more, and twice as
+// much where a camera does not tell its exposures. Where both
 // saw a lamp switched, the moments of its switching take over (signal_edges.h). Correlation of the
 // signals, interpolated, finds the way there.
 //
 // Times rise strictly. Throws std::invalid_argument for values that are not finite, or times that
 // do not rise; std::runtime_error, saying what to do, if there are fewer than 20 frames in common,
-// if nothing changes, if the signals are not alike, or alike at several offsets.
+// if nothing changes, if the signals are not alike, or alike at several offsets, or tell the offset
+// to no better than a frame.
 TimeOffset find_time_offset(std::span<const SignalSample> a,
                             std::span<const SignalSample> b,
+                            const TimeOffsetOptions& options = {});
+
+// The same from where a point was seen that moves in any way (common_motion.h); frames in which it
+// was not seen are left out. From two directions, perspective and lenses do not bias it. Refused as
+// above, and if what both saw in common correlates by less than 0.99. `edges` is 0.
+TimeOffset find_time_offset(std::span<const SeenPoint> a,
+                            std::span<const SeenPoint> b,
                             const TimeOffsetOptions& options = {});
 
 }  // namespace calibrate
