@@ -279,56 +279,6 @@ TEST_F(CalibrateCommands, ProbeIsTurnedByLampsThatTheSceneCameraSeesToo) {
   EXPECT_EQ(run(command).status, 2);
 }
 
-// A folder of frames that see a lamp, switched at these times of a clock that is `offset_s` behind.
-void write_lamp(const fs::path& folder,
-                const std::vector<double>& switched_s,
-                double begin_s,
-                double offset_s) {
-  constexpr double exposure_s = 0.02;
-  fs::create_directories(folder);
-  std::ofstream list(folder / "frames.csv");
-  list << "file,time_s,exposure_s,status\n";
-  for (int i = 0; i < 300; ++i) {
-    const double t = begin_s + 0.04 * i;
-    double on_s = 0;
-    for (std::size_t k = 0; k + 1 < switched_s.size(); k += 2) {
-      on_s += std::max(0.0, std::min(t + exposure_s / 2, switched_s[k + 1]) -
-                                std::max(t - exposure_s / 2, switched_s[k]));
-    }
-    capture::Image image = capture::make_image(4, 6);
-    for (float& value : image.pixels) value = static_cast<float>(0.1 + on_s / exposure_s);
-    const std::string name = fmt::format("{:03}.exr", i);
-    capture::write_exr(folder / name, image);
-    list << fmt::format("{},{:.9f},{},good\n", name, t + offset_s, exposure_s);
-  }
-}
-
-TEST_F(CalibrateCommands, OffsetOfTwoRecordingsIsThatOfTheirFirstFrames) {
-  made::Random random(2);
-  std::vector<double> switched_s{0.1};
-  while (switched_s.back() < 14) {
-    switched_s.push_back(switched_s.back() + random.uniform(0.15, 0.6));
-  }
-  write_lamp(dir_ / "a", switched_s, 0, 0);
-  write_lamp(dir_ / "b", switched_s, 0.713, 100);
-  const std::string command =
-      "calibrate offset replay:" + path("a") + " replay:" + path("b") + " --seconds 15";
-  const Outcome outcome = run_with_figures(command);
-  ASSERT_EQ(outcome.status, 0) << outcome.err;
-  // Recordings begin at 0: what A sees at t, B sees at t - 0.713.
-  EXPECT_THAT(outcome.out, HasSubstr("offset_s = -0.71"));
-  EXPECT_NEAR(figures()["offset_ms"], -713, 1);
-  EXPECT_LT(figures()["sigma_ms"], 1);
-  EXPECT_GT(figures()["edges"], 10);
-  EXPECT_EQ(figures()["frames"], (Json{300, 300}));
-
-  write_lamp(dir_ / "dark", {}, 0, 0);
-  const Outcome dark = run("calibrate offset replay:" + path("a") + " replay:" + path("dark"));
-  EXPECT_EQ(dark.status, 1);
-  expect_one_line(dark.err);
-  EXPECT_THAT(dark.err, HasSubstr("nothing changes"));
-}
-
 // A set whose plate is `gain` times the probe's light, by colour, but for a clipped lamp, and a
 // level card of albedo 0.4 in its corner.
 class CalibrateLight : public CalibrateCommands {
