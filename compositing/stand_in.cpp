@@ -46,12 +46,12 @@ class StandInShader final : public render::Shader {
              std::span<ShadePoint* const> points,
              render::RaySink& rays) const override {
     for (ShadePoint* p : points) {
-      if (p->kind != RayKind::camera) continue;
+      if (p->kind != RayKind::camera && p->kind != RayKind::bent) continue;
       const StandInParameters block = block_of(context.scene->materials[p->hit.material]);
       p->light_normal = p->hit.normal;
       p->plate_share = {1, 1, 1};
       p->catches_shadow = block.catches_shadow != 0;
-      p->catches_lamps = block.catches_light != 0;
+      p->catches_lamps = block.catches_light != 0 && p->kind == RayKind::camera;
       p->albedo = {block.albedo[0], block.albedo[1], block.albedo[2]};
       if (block.catches_reflection && block.reflectance > 0) push_reflection(*p, block, rays);
     }

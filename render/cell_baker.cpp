@@ -19,6 +19,8 @@ void clear_answer(ShadePoint& p) {
   p.catches_shadow = p.catches_lamps = false;
 }
 
+bool sees_stand_ins(RayKind kind) { return kind == RayKind::camera || kind == RayKind::bent; }
+
 // Whether the table's light matters to a point.
 bool receives_light(const ShadePoint& p) {
   return p.diffuse != Vec3f{} || p.catches_shadow || p.catches_lamps;
@@ -95,7 +97,8 @@ void CellBaker::pack() {
   CellTransport& t = *transport_;
   std::copy_n(base_.begin(), cell_pixels, t.base.begin());
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
-  t.empty = t.receiving == CellMask{} && t.environment.empty() && t.lights.empty();
+  t.empty =
+      t.receiving == CellMask{} && t.environment.empty() && t.lights.empty() && t.bent.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;
@@ -208,6 +211,7 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
   p.slot = slot;
   p.kind = RayKind::camera;
   p.depth = 0;
+  p.media.count = 0;
 }
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.
@@ -231,7 +235,7 @@ void CellBaker::for_each_shader(int count, F&& call) {
 // Answers, then light, at the first `count` points; in a grid each is its pixel's centre.
 void CellBaker::shade_points(int count, bool grid) {
   if (count == 0) return;
-  const ShadeContext context{&frame_->inputs.scene->description()};
+  const ShadeContext context{&frame_->inputs.scene->description(), frame_->inputs.scene};
   lobes_.clear();
   pushing_ = nullptr;
   for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
@@ -251,7 +255,7 @@ void CellBaker::shade_points(int count, bool grid) {
 
 void CellBaker::run_background(std::span<ShadePoint* const> leaving) {
   if (leaving.empty()) return;
-  const ShadeContext context{&frame_->inputs.scene->description()};
+  const ShadeContext context{&frame_->inputs.scene->description(), frame_->inputs.scene};
   for (ShadePoint* p : leaving) {
     clear_answer(*p);
     p->hit = {};
@@ -276,8 +280,11 @@ void CellBaker::collect(const ShadePoint& p) {
     add_environment(p.slot, target_of(p), p.incoming, 0, {}, false,
                     p.throughput * p.environment_share);
   }
-  if (p.kind != RayKind::camera) return;
   const Vec3f share = p.throughput * p.plate_share;
+  if (p.kind == RayKind::bent && !p.catches_shadow && share != Vec3f{}) {
+    add_bent(p, share, CellTransport::BentPlate::lit);
+  }
+  if (p.kind != RayKind::camera) return;
   if (!p.catches_shadow) {
     base.plate += share;
     base.passed += mean(share);
@@ -411,9 +418,15 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
       if (l.point != k) continue;
       t.shadow_lights.push_back({l.light, l.weight, (Vec3f{1, 1, 1} - l.passed) * l.weight});
     }
+    const bool bent = p.kind == RayKind::bent;
     t.shadow_points.push_back({static_cast<std::uint16_t>(target_of(p)), first,
                                static_cast<std::uint32_t>(t.shadow_lights.size()) - first,
-                               p.catches_shadow ? p.throughput * p.plate_share : Vec3f{}});
+                               p.catches_shadow && !bent ? p.throughput * p.plate_share : Vec3f{}});
+    if (bent) {
+      add_bent(p, p.throughput * p.plate_share,
+               static_cast<std::uint32_t>(t.shadow_points.size()) - 1);
+      continue;
+    }
     add_lamps(p, cell_pixels + t.shadow_points.size() - 1);
   }
 }
@@ -451,6 +464,77 @@ void CellBaker::add_lamps(const ShadePoint& p, std::size_t light_point) {
   }
 }
 
+// What a ray that clear bodies bent sees where it leaves the scene: as the background says, the
+// plate, if that lies in the picture, or the environment. What the plate adds is planned by the
+// environment, so that what is decided by it does not change with the plate.
+void CellBaker::leave_bent(
+    std::size_t slot, std::uint32_t pixel, Vec3f direction, const Spread& spread, Vec3f weight) {
+  ShadePoint p{};
+  p.incoming = direction;
+  p.throughput = weight;
+  p.kind = RayKind::bent;
+  p.pixel = pixel;
+  p.slot = static_cast<std::uint32_t>(slot);
+  ShadePoint* const leaving = &p;
+  const Scene& scene = *frame_->inputs.scene;
+  scene.background().shade({&scene.description(), &scene}, {&leaving, 1});
+  Vec3f sees_environment = p.environment_share;
+  if (p.plate_share != Vec3f{}) {
+    const float width_rad = std::sqrt(length(spread.a) * length(spread.b));
+    if (!add_plate(slot, target_of(p), direction, width_rad, direction, weight * p.plate_share,
+                   CellTransport::BentPlate::lit)) {
+      sees_environment += p.plate_share;
+    }
+  }
+  if (sees_environment != Vec3f{}) {
+    add_environment(slot, target_of(p), direction, 0, spread, false, weight * sees_environment);
+  }
+}
+
+// The same where it meets a stand-in.
+void CellBaker::add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point) {
+  const Vec3f from_camera = p.hit.position - frame_->camera;
+  const float distance_m = length(from_camera);
+  const float width_rad = p.footprint_m / std::max(distance_m, 1e-6F);
+  if (!add_plate(p.slot, target_of(p), from_camera, width_rad, p.incoming, weight, shadow_point)) {
+    add_environment(p.slot, target_of(p), p.incoming, 0, {}, false, weight);
+  }
+}
+
+// False if the camera does not see that way.
+bool CellBaker::add_plate(std::size_t slot,
+                          std::size_t target,
+                          Vec3f from_camera,
+                          float width_rad,
+                          Vec3f planned_direction,
+                          Vec3f weight,
+                          std::uint32_t shadow_point) {
+  if (!frame_->lens) return false;
+  const auto& m = frame_->set_from_cam;
+  const Vec3f& d = from_camera;
+  const auto q = calibrate::project(
+      *frame_->lens, calibrate::to_double(Vec3f{m[0] * d.x + m[3] * d.y + m[6] * d.z,
+                                                m[1] * d.x + m[4] * d.y + m[7] * d.z,
+                                                m[2] * d.x + m[5] * d.y + m[8] * d.z}));
+  const auto& whole = frame_->plate_levels.front();
+  if (!q || !(q->x >= -0.5 && q->x <= whole.width - 0.5) ||
+      !(q->y >= -0.5 && q->y <= whole.height - 0.5)) {
+    return false;
+  }
+  const float width_px = width_rad / frame_->pixel_angle;
+  const int last = static_cast<int>(frame_->plate_levels.size()) - 1;
+  const int level =
+      width_px > 1 ? std::min(static_cast<int>(std::lround(std::log2(width_px))), last) : 0;
+  const double shrunk = 1.0 / (1 << level);
+  transport_->bent.push_back(
+      {weight, static_cast<float>((q->x + 0.5) * shrunk - 0.5),
+       static_cast<float>((q->y + 0.5) * shrunk - 0.5), static_cast<std::uint16_t>(target),
+       static_cast<std::uint16_t>(frame_->first_plate_level + static_cast<std::size_t>(level)),
+       shadow_point});
+  samples_[slot].added += weight * radiance_of(*frame_->planned, planned_direction, 0);
+  return true;
+}
+
 void CellBaker::bounce() {
   while (!queue_.empty()) {
     const std::size_t n = std::min<std::size_t>(queue_.size(), stream_rays);
@@ -460,7 +544,7 @@ void CellBaker::bounce() {
       stream_.ox[i] = q.origin.x, stream_.oy[i] = q.origin.y, stream_.oz[i] = q.origin.z;
       stream_.dx[i] = q.direction.x, stream_.dy[i] = q.direction.y, stream_.dz[i] = q.direction.z;
       stream_.near_m[i] = 0;
-      stream_.mask[i] = q.kind == RayKind::camera ? mask_virtual | mask_stand_in : mask_virtual;
+      stream_.mask[i] = sees_stand_ins(q.kind) ? mask_virtual | mask_stand_in : mask_virtual;
     }
     trace(static_cast<int>(n), false, RayKind::reflection);
     statistics_->secondary_rays += n;
@@ -471,7 +555,9 @@ void CellBaker::bounce() {
       const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
       const std::size_t target = q.slot < cell_pixels ? q.pixel : cell_pixels + q.pixel;
       if (!hit && q.kind != RayKind::camera) {
-        if (q.kind == RayKind::reflection) {
+        if (q.kind == RayKind::bent) {
+          leave_bent(q.slot, q.pixel, q.direction, q.spread, q.throughput);
+        } else if (q.kind == RayKind::reflection) {
           add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
                           q.throughput);
         }
@@ -488,7 +574,12 @@ void CellBaker::bounce() {
       p.spread_rad = q.spread_rad;
       p.footprint_m = q.footprint_m + (hit ? stream_.far_m[i] * q.spread_rad : 0);
       p.throughput = q.throughput;
-      p.kind = q.kind == RayKind::camera ? RayKind::camera : RayKind::reflection;
+      if (hit && q.media.count > 0) {
+        p.throughput =
+            p.throughput * passed_through(*frame_->inputs.scene, q.media, stream_.far_m[i]);
+      }
+      p.media = q.media;
+      p.kind = q.kind == RayKind::difference ? RayKind::reflection : q.kind;
       p.depth = q.depth;
     }
     queue_.resize(from);

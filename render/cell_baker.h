@@ -52,6 +52,7 @@ class CellBaker final : public RaySink {
     RayKind kind;
     std::uint8_t depth;
     bool one_of_many;  // of rays all over a rough lobe: its compact light is found apart
+    Media media;
   };
 
   // A lobe, whose compact light waits until it is known who sees which.
@@ -130,6 +131,16 @@ class CellBaker final : public RaySink {
   void add_shared(const ShadePoint& p, std::size_t centre);
   void add_lamps(const ShadePoint& p, std::size_t light_point);
   void collect(const ShadePoint& p);
+  void leave_bent(
+      std::size_t slot, std::uint32_t pixel, Vec3f direction, const Spread& spread, Vec3f weight);
+  void add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point);
+  bool add_plate(std::size_t slot,
+                 std::size_t target,
+                 Vec3f from_camera,
+                 float width_rad,
+                 Vec3f planned_direction,
+                 Vec3f weight,
+                 std::uint32_t shadow_point);
   void bounce();
   void pack();
   void pack_lights();

@@ -110,6 +110,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
       base.plate += ray.throughput;
       base.passed += mean(ray.throughput);
       base.seen += mean(ray.throughput);
+    } else if (ray.kind == RayKind::bent) {
+      leave_bent(from.slot, from.pixel, ray.direction, ray.spread, ray.throughput);
     } else if (ray.kind == RayKind::reflection) {
       add_environment(from.slot, target_of(from), ray.direction, ray.roughness, ray.spread,
                       one_of_many, ray.throughput);
@@ -118,7 +120,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   }
   queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.footprint_m,
                     spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1), one_of_many});
+                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, ray.media});
 }
 
 void CellBaker::add_environment(std::size_t slot,

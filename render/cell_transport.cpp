@@ -97,6 +97,7 @@ void light_lamps(const CellTransport& cell,
 // Shadows on points that are no centres.
 void light_shadow_points(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
   w.open_at_points.clear();
+  w.passing_at_points.clear();
   for (const CellTransport::ShadowPoint& point : cell.shadow_points) {
     Vec3f open{}, lost{};
     for (std::uint32_t i = point.first; i < point.first + point.count; ++i) {
@@ -105,7 +106,8 @@ void light_shadow_points(const CellTransport& cell, const FrameLight& light, Rel
       open += e * s.open;
       lost += e * s.lost;
     }
-    const Vec3f share = point.share * passing(open, lost);
+    w.passing_at_points.push_back(passing(open, lost));
+    const Vec3f share = point.share * w.passing_at_points.back();
     w.share[point.slot] += share;
     w.passed[point.slot] += mean(share);
     w.open_at_points.push_back(open);
@@ -113,6 +115,20 @@ void light_shadow_points(const CellTransport& cell, const FrameLight& light, Rel
 }
 
 }  // namespace
+
+Vec3f plate_at(const capture::Image& level, float x, float y) {
+  const float cx = std::clamp(x, 0.0F, static_cast<float>(level.width - 1));
+  const float cy = std::clamp(y, 0.0F, static_cast<float>(level.height - 1));
+  const int x0 = std::min(static_cast<int>(cx), std::max(level.width - 2, 0));
+  const int y0 = std::min(static_cast<int>(cy), std::max(level.height - 2, 0));
+  const int x1 = std::min(x0 + 1, level.width - 1), y1 = std::min(y0 + 1, level.height - 1);
+  const float u = cx - static_cast<float>(x0), v = cy - static_cast<float>(y0);
+  const auto texel = [&](int row, int column) {
+    return Vec3f{level.at(row, column, 0), level.at(row, column, 1), level.at(row, column, 2)};
+  };
+  return (texel(y0, x0) * (1 - u) + texel(y0, x1) * u) * (1 - v) +
+         (texel(y1, x0) * (1 - u) + texel(y1, x1) * u) * v;
+}
 
 void CellTransport::clear() {
   empty = true;
@@ -124,7 +140,7 @@ void CellTransport::clear() {
   visibility.lit.clear(), visibility.seen.clear(), visibility.tints.clear();
   shared.clear(), lights.clear();
   environment.clear(), shadow_points.clear(), shadow_lights.clear(), lamps.clear();
-  borrowed.clear(), further.clear();
+  bent.clear(), borrowed.clear(), further.clear();
   rays = 0;
 }
 
@@ -132,7 +148,7 @@ std::size_t CellTransport::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
          of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
-         of(lamps) + of(borrowed) + of(further);
+         of(lamps) + of(bent) + of(borrowed) + of(further);
 }
 
 void relight(const CellTransport& cell,
@@ -165,6 +181,11 @@ void relight(const CellTransport& cell,
   }
   for (const CellTransport::EnvironmentTerm& e : cell.environment) {
     w.added[e.slot] += e.weight * radiance_at(*light.levels[e.level], e.x, e.y);
+  }
+  for (const CellTransport::BentPlate& b : cell.bent) {
+    const Vec3f share =
+        b.point == CellTransport::BentPlate::lit ? Vec3f{1, 1, 1} : w.passing_at_points[b.point];
+    w.added[b.slot] += b.weight * share * plate_at(*light.levels[b.level], b.x, b.y);
   }
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     picture.added[k] = w.added[k];

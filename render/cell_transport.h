@@ -67,6 +67,15 @@ struct CellTransport {
     std::uint32_t point;  // a centre, or cell_pixels + a shadow point
     Vec3f share, irradiance, albedo;
   };
+  // Slot += weight * the plate at a place, that clear bodies show there; less where it lies in a
+  // shadow.
+  struct BentPlate {
+    static constexpr std::uint32_t lit = ~0U;
+    Vec3f weight;
+    float x, y;
+    std::uint16_t slot, level;  // of FrameLight::levels
+    std::uint32_t point;        // of shadow_points, or lit
+  };
   // A pixel of further samples: those that share the whole radiance of a centre, and how many all
   // are.
   struct Borrowed {
@@ -91,6 +100,7 @@ struct CellTransport {
   std::vector<ShadowPoint> shadow_points;
   std::vector<ShadowLight> shadow_lights;
   std::vector<LampCatcher> lamps;
+  std::vector<BentPlate> bent;
   std::vector<Borrowed> borrowed;
   std::vector<Further> further;
   std::uint64_t rays = 0;  // that it took
@@ -102,7 +112,8 @@ struct CellTransport {
 // The light of one frame, as relight() wants it.
 struct FrameLight {
   std::span<const DirectionalLight> lights;
-  std::span<const capture::Image* const> levels;  // of the environment: levels_of()
+  std::span<const capture::Image* const>
+      levels;  // of the environment: levels_of(), then the plate's
 };
 
 // The share of light that is not lost: 1 - lost/open, exactly 1 where nothing is.
@@ -113,13 +124,17 @@ inline Vec3f passing(Vec3f open, Vec3f lost) {
   return {share(open.x, lost.x), share(open.y, lost.y), share(open.z, lost.z)};
 }
 
+// A picture's value at a place in its pixels, bilinear; the outermost go on beyond its edge.
+Vec3f plate_at(const capture::Image& level, float x, float y);
+
 // What relight() works in.
 struct RelightWorkspace {
   alignas(64) std::array<float, cell_pixels> open_r, open_g, open_b, lost_r, lost_g, lost_b;
   std::array<Vec3f, slots> added, share;
   std::array<float, slots> passed;
   std::array<Vec3f, cell_pixels> arriving, passing;  // irradiance; share of it that is seen
-  std::vector<Vec3f> open_at_points;  // irradiance, where nothing virtual is in the way
+  // At shadow points: irradiance, where nothing virtual is in the way; share of it that arrives.
+  std::vector<Vec3f> open_at_points, passing_at_points;
 };
 
 // What a pixel shows: plate * share + added.

@@ -56,6 +56,9 @@ std::uint64_t transport_key(const FrameContext& context) {
   for (const capture::Image* level : context.planned_levels) key.mix(level->height);
   key.mix(context.planned->radiance.pixels);
   key.mix(std::uint64_t{context.planned->compact_apart});
+  if (context.lens) {
+    for (const double parameter : context.lens->parameters) key.mix(parameter);
+  }
   const Effort& e = job.effort;
   key.mix(e.aa_samples), key.mix(e.aa_tolerance), key.mix(e.glint_contrast);
   key.mix(e.interleave), key.mix(std::uint64_t{e.adaptive_visibility});
@@ -89,6 +92,29 @@ std::array<std::array<float, 2>, samples_max> sample_pattern() {
     pattern[i] = {middle(x), middle(y)};
   }
   return pattern;
+}
+
+// The plate, and its halves down to 1 pixel a side.
+std::vector<capture::Image> plate_levels_of(const capture::HalfImage& plate) {
+  std::vector<capture::Image> levels;
+  capture::Image& whole =
+      levels.emplace_back(capture::make_image(plate.height, plate.width, plate.channels));
+  std::ranges::transform(plate.pixels, whole.pixels.begin(), capture::float_from_half);
+  while (levels.back().width > 1 && levels.back().height > 1) {
+    const capture::Image& from = levels.back();
+    capture::Image to = capture::make_image(from.height / 2, from.width / 2, from.channels);
+    for (int y = 0; y < to.height; ++y) {
+      for (int x = 0; x < to.width; ++x) {
+        for (int c = 0; c < to.channels; ++c) {
+          to.at(y, x, c) =
+              0.25F * (from.at(2 * y, 2 * x, c) + from.at(2 * y, 2 * x + 1, c) +
+                       from.at(2 * y + 1, 2 * x, c) + from.at(2 * y + 1, 2 * x + 1, c));
+        }
+      }
+    }
+    levels.push_back(std::move(to));
+  }
+  return levels;
 }
 
 }  // namespace
@@ -129,6 +155,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
                         ? inputs.planned
                         : inputs.environment;
   context.planned_levels = levels_of(*context.planned);
+  context.first_plate_level = context.planned_levels.size();
   context.levels = levels_of(*inputs.environment);
   auto planned_table = std::make_shared<LightTable>(job.lights);
   for (std::size_t i = 0; i < planned_table->lights.size(); ++i) {
@@ -145,6 +172,11 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.pattern = sample_pattern();
   context.inputs = inputs;
   context.job = &job;
+  if (inputs.scene->has_glass() && inputs.plate != nullptr && inputs.lens != nullptr) {
+    context.plate_levels = plate_levels_of(*inputs.plate);
+    context.lens = *inputs.lens;
+    for (const capture::Image& level : context.plate_levels) context.levels.push_back(&level);
+  }
   context.light = {inputs.scene, context.planned_table.get(), &job.effort};
   const auto& R = job.cam_from_set.R.m;
   for (std::size_t i = 0; i < 3; ++i) {

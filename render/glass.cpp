@@ -6,6 +6,8 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "render/scene.h"
+
 namespace render {
 
 GlassParameters glass_parameters(const Material& material) {
@@ -31,6 +33,59 @@ Material make_glass_material(std::string name, const GlassParameters& parameters
   material.parameters.resize(sizeof parameters);
   std::memcpy(material.parameters.data(), &parameters, sizeof parameters);
   return material;
+}
+
+Glass make_glass(const Material& material) {
+  const GlassParameters p = glass_parameters(material);
+  return {
+      indices_of(p), {p.absorption[0], p.absorption[1], p.absorption[2]}, p.priority, p.abbe != 0};
+}
+
+namespace {
+
+// The body that is there, of all that a ray is in: of the highest priority, the last entered. Null:
+// none.
+const Glass* present(const Scene& scene, const Media& media) {
+  const Glass* there = nullptr;
+  for (std::size_t i = 0; i < media.count; ++i) {
+    const Glass* glass = scene.glass_of(media.bodies[i].material);
+    if (glass != nullptr && (there == nullptr || glass->priority >= there->priority)) there = glass;
+  }
+  return there;
+}
+
+}  // namespace
+
+Crossing cross_surface(const Scene& scene, const Media& media, Media::Body body, bool back) {
+  Crossing crossing{media, {1, 1, 1}, false};
+  Media& after = crossing.after;
+  Media before = media;
+  const auto end = after.bodies.begin() + after.count;
+  const auto known = std::find(after.bodies.begin(), end, body);
+  if (!back) {
+    if (after.count < Media::most) after.bodies[after.count++] = body;
+  } else if (known != end) {
+    std::copy(known + 1, end, known);
+    --after.count;
+  } else if (before.count < Media::most) {
+    before.bodies[before.count++] = body;
+  }
+  const Glass* from = present(scene, before);
+  const Glass* to = present(scene, after);
+  if (from == to) return crossing;
+  for (std::size_t c = 0; c < 3; ++c) {
+    crossing.ratio[c] = (from ? from->index[c] : 1.0F) / (to ? to->index[c] : 1.0F);
+    crossing.seen = crossing.seen || std::abs(crossing.ratio[c] - 1) > 1e-6F;
+  }
+  return crossing;
+}
+
+Vec3f passed_through(const Scene& scene, const Media& media, float distance_m) {
+  const Glass* there = present(scene, media);
+  if (there == nullptr || !(distance_m < 1e6F)) return {1, 1, 1};
+  const Vec3f& a = there->absorption;
+  if (a == Vec3f{}) return {1, 1, 1};
+  return {std::exp(-a.x * distance_m), std::exp(-a.y * distance_m), std::exp(-a.z * distance_m)};
 }
 
 float fresnel(float cosine, float ratio) {

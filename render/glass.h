@@ -16,6 +16,8 @@
 
 namespace render {
 
+class Scene;
+
 // Parameter block of the shader "glass".
 struct GlassParameters {
   float index = 1.5F;               // of refraction, 1 to 4, at 587.6 nm
@@ -31,6 +33,42 @@ struct GlassParameters {
 // material, if the block is not one, or a number is out of range.
 GlassParameters glass_parameters(const Material& material);
 Material make_glass_material(std::string name, const GlassParameters& parameters);
+
+// What a ray that meets glass needs of it.
+struct Glass {
+  std::array<float, 3> index;
+  Vec3f absorption;
+  std::int32_t priority;
+  bool disperses;
+};
+Glass make_glass(const Material& material);
+
+// The bodies that a ray is inside of: instance and material of each, in the order in which they
+// were entered. A ray in more bodies than there is room for takes the rest for absent.
+struct Media {
+  static constexpr std::size_t most = 6;
+  struct Body {
+    std::uint32_t instance = 0, material = 0;
+    friend bool operator==(const Body&, const Body&) = default;
+  };
+  std::array<Body, most> bodies{};
+  std::uint8_t count = 0;
+};
+
+// A ray at a surface of glass.
+struct Crossing {
+  Media after;                          // once it has passed
+  std::array<float, 3> ratio{1, 1, 1};  // of the index before to that after, per colour
+  bool seen = false;                    // false: both sides are the same body, or as good as that
+};
+
+// `back`: the ray meets the body from inside. Of a body that the ray is not known to be in, it is
+// taken to have been.
+Crossing cross_surface(const Scene& scene, const Media& media, Media::Body body, bool back);
+
+// What is left, per colour, of light after `distance_m` in the media. All of it where the distance
+// has no end, as behind an open mesh.
+Vec3f passed_through(const Scene& scene, const Media& media, float distance_m);
 
 // Share of unpolarised light that a surface mirrors: `cosine` of the angle to its normal on the
 // side that the light comes from, 0..1; `ratio` of the index of that side to the other's. 1 beyond

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "render/light_gather.h"
 #include "render/ray_log.h"
@@ -21,6 +22,11 @@ struct FrameContext {
   std::shared_ptr<const LightTable> planned_table;  // the job's, with its planned irradiances
   std::vector<std::uint32_t> compact;  // lights of the table that are compact and apart
   LightContext light;
+  // For rays that clear bodies bend: the plate, halved again and again, and the way to its pixels.
+  // Empty where the scene has none, or no plate is given.
+  std::vector<capture::Image> plate_levels;
+  std::size_t first_plate_level = 0;  // in `levels`
+  std::optional<calibrate::Lens> lens;
   // Places of further camera rays in a pixel, -0.5 to 0.5.
   std::array<std::array<float, 2>, samples_max> pattern;
   std::array<float, 9> set_from_cam{};  // rotation

@@ -156,8 +156,19 @@ struct PathTracer::Walk {
   bool sky_straight_on = true;  // whether the sky counts before the path was scattered
   int depth = 0;
   bool met_virtual = false;
+  Media media;
   CameraPath result;
 };
+
+// Russian roulette, from some depth on.
+bool PathTracer::survives(Walk& w, SampleSequence& numbers) {
+  if (w.depth + 1 < roulette_depth) return true;
+  const float survival = std::min(1.0F, largest(w.share));
+  if (!(numbers.next() < survival)) return false;
+  w.share *= 1 / survival;
+  w.glow_share *= 1 / survival;
+  return true;
+}
 
 PathTracer::PathTracer(const Scene& scene,
                        const EnvironmentSampler& environment,
@@ -171,6 +182,8 @@ PathTracer::PathTracer(const Scene& scene,
       const StandInParameters stand_in = stand_in_parameters(material);
       std::copy_n(stand_in.albedo, 3, surfacing.parameters.base_color);
       surfacing.matte = true;
+    } else if (material.shader == "glass") {
+      surfacing.glass = true;
     } else {
       surfacing.parameters = standard_parameters(material, description.textures.size());
     }
@@ -307,10 +320,57 @@ bool PathTracer::scatter(Walk& w,
   return true;
 }
 
+// Mirrored or refracted, by Fresnel's share; one colour of three where they part.
+void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& numbers) const {
+  const Crossing crossing = cross_surface(scene_, w.media, {hit.instance, hit.material}, hit.back);
+  const auto leave = [&](Vec3f direction) {
+    w.direction = direction;
+    w.origin = offset_origin(hit, direction);
+  };
+  if (!crossing.seen) {
+    w.media = crossing.after;
+    leave(w.direction);
+    return;
+  }
+  std::size_t channel = 0;
+  if (crossing.ratio[0] != crossing.ratio[1] || crossing.ratio[1] != crossing.ratio[2]) {
+    const std::array shares{w.share.x, w.share.y, w.share.z};
+    const float all = shares[0] + shares[1] + shares[2];
+    if (!(all > 0)) return;
+    float choice = numbers.next() * all;
+    while (channel < 2 && choice >= shares[channel]) choice -= shares[channel++];
+    const auto only = [channel](Vec3f v, float times) {
+      return Vec3f{channel == 0 ? v.x * times : 0, channel == 1 ? v.y * times : 0,
+                   channel == 2 ? v.z * times : 0};
+    };
+    const float chance = shares[channel] / all;
+    if (!(chance > 0)) return;
+    w.glow_share = only(w.glow_share, 1 / chance);
+    w.share = only(w.share, 1 / chance);
+  }
+  if (w.kind == RayKind::camera) w.kind = RayKind::bent;
+  w.density = certain;
+  const float ratio = crossing.ratio[channel];
+  if (numbers.next() < fresnel(-dot(w.direction, hit.normal), ratio)) {
+    const Vec3f direction = normalize(mirrored(-w.direction, hit.normal));
+    leave(dot(direction, hit.geometric_normal) < 0 ? normalize(other_side(hit, direction))
+                                                   : direction);
+    return;
+  }
+  Vec3f direction = refracted(w.direction, hit.normal, ratio);
+  if (dot(direction, hit.geometric_normal) > -1e-4F) {
+    const float back = dot(direction, hit.geometric_normal);
+    direction = normalize(direction - hit.geometric_normal * (back + 1e-3F));
+  }
+  w.media = crossing.after;
+  leave(direction);
+}
+
 void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
   for (; w.depth < rules_.max_depth; ++w.depth) {
     const auto met = closest_hit(scene_, w.origin, w.direction, 0, w.mask, w.kind);
-    const bool sees_plate = w.kind == RayKind::camera && !rules_.sees_background;
+    const bool sees_plate =
+        (w.kind == RayKind::camera || w.kind == RayKind::bent) && !rules_.sees_background;
     if (!met) {
       if (sees_plate)
         w.result.end = CameraPath::End::background;
@@ -327,6 +387,16 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
       break;
     }
     w.met_virtual = w.met_virtual || !real;
+    if (w.media.count > 0) {
+      const Vec3f passed = passed_through(scene_, w.media, met->distance);
+      w.share = times(w.share, passed);
+      w.glow_share = times(w.glow_share, passed);
+    }
+    if (materials_[hit.material].glass) {
+      pass_glass(w, hit, numbers);
+      if (!survives(w, numbers)) break;
+      continue;
+    }
     StandardSurface surface = surface_at(hit);
     if (w.left_rough) {
       surface.roughness = std::max(surface.roughness, caustic_roughness);
@@ -362,12 +432,9 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
                         : lobes.transmission > 0 ? PathLobe::transmission
                                                  : PathLobe::none;
     if (!scatter(w, hit, surface, weights, lobes, by, numbers)) break;
-    if (w.depth + 1 < roulette_depth) continue;
-    const float survival = std::min(1.0F, largest(w.share));
-    if (!(numbers.next() < survival)) break;
-    w.share *= 1 / survival;
-    w.glow_share *= 1 / survival;
+    if (!survives(w, numbers)) break;
   }
+  w.result.bent = w.kind == RayKind::bent;
   w.result.through = w.share;
   w.result.incoming = w.direction;
 }

@@ -21,7 +21,7 @@ struct PathRules {
   unsigned scattered_mask = mask_virtual;  // rays mirrored or scattered at a surface
   unsigned diffuse_blockers = mask_virtual | mask_real_blocker;  // of the environment and lamps
   unsigned lobe_blockers = mask_virtual;                         // of the environment in the lobes
-  int max_depth = 16;
+  int max_depth = 128;
 };
 
 // A camera path's end: what it gathered, and what it sees straight on.
@@ -30,7 +30,8 @@ struct CameraPath {
   Vec3f radiance;
   Vec3f through{1, 1, 1};  // share of the light at the end that reaches the camera
   End end = End::nothing;
-  HitPoint hit;  // of the stand-in
+  bool bent = false;  // by a clear body: the plate is that of where it ends, not of its pixel
+  HitPoint hit;       // of the stand-in
   Vec3f incoming;
 };
 
@@ -48,7 +49,8 @@ enum class PathLobe : std::uint8_t;
 // Without lamps, and with diffuse bounces, glowing surfaces light others where paths meet them.
 class PathTracer {
  public:
-  // Throws std::invalid_argument if a material is neither "standard" nor "stand_in".
+  // Throws std::invalid_argument if a material is neither "standard", "glass" nor
+  // "stand_in".
   PathTracer(const Scene& scene,
              const EnvironmentSampler& environment,
              std::span<const LocalLight> lamps,
@@ -76,6 +78,7 @@ class PathTracer {
  private:
   struct Walk;
   void walk(Walk& w, SampleSequence& numbers) const;
+  static bool survives(Walk& w, SampleSequence& numbers);
   void add_sky(const Walk& w, Vec3f& radiance) const;
   Vec3f environment_light(const HitPoint& hit,
                           const StandardSurface& surface,
@@ -83,6 +86,7 @@ class PathTracer {
                           const PathLobes& lobes,
                           Vec3f view,
                           SampleSequence& numbers) const;
+  void pass_glass(Walk& w, const HitPoint& hit, SampleSequence& numbers) const;
   bool scatter(Walk& w,
                const HitPoint& hit,
                const StandardSurface& surface,
@@ -99,6 +103,7 @@ class PathTracer {
   struct Surfacing {
     StandardParameters parameters;
     bool matte = false;  // a stand-in: all its light is diffuse
+    bool glass = false;
   };
   std::vector<Surfacing> materials_;
 };

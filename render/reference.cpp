@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "render/cell_transport.h"
 #include "render/environment_sampler.h"
 #include "render/path_tracer.h"
 #include "render/pixel_rays.h"
@@ -48,6 +49,8 @@ class Sum {
 // What the samples of a pixel say about one stand-in.
 struct StandInSums {
   std::uint32_t instance = 0;
+  bool bent = false;  // seen through clear bodies: `plate` is what lies there
+  Sum plate;          // times share; open and lost are times it as well
   StandInParameters parameters;
   int count = 0;
   Sum through;        // share of the pixel
@@ -56,10 +59,35 @@ struct StandInSums {
   Sum virtual_light;  // irradiance of lamps (and virtual objects); times share
 };
 
+// The plate, for paths that clear bodies bend.
+class Plate {
+ public:
+  // `lens` null: nothing is seen of it.
+  Plate(const capture::Image& plate, const calibrate::Lens* lens, const Pose& cam_from_set)
+      : plate_(plate), lens_(lens), cam_from_set_(cam_from_set.R) {}
+
+  // In a direction from the camera, bilinear; nothing beyond the picture.
+  std::optional<Vec3f> seen(Vec3f from_camera) const {
+    if (lens_ == nullptr) return std::nullopt;
+    const auto q = calibrate::project(*lens_, cam_from_set_ * calibrate::to_double(from_camera));
+    if (!q || !(q->x >= -0.5 && q->x <= plate_.width - 0.5) ||
+        !(q->y >= -0.5 && q->y <= plate_.height - 0.5)) {
+      return std::nullopt;
+    }
+    return plate_at(plate_, static_cast<float>(q->x), static_cast<float>(q->y));
+  }
+
+ private:
+  const capture::Image& plate_;
+  const calibrate::Lens* lens_;
+  Mat3 cam_from_set_;
+};
+
 // The composite, pixel by pixel.
 class Composite {
  public:
-  Composite(const PathTracer& tracer, bool bounces) : tracer_(tracer), bounces_(bounces) {
+  Composite(const PathTracer& tracer, bool bounces, const Plate& plate)
+      : tracer_(tracer), bounces_(bounces), plate_(plate) {
     const SceneDescription& scene = tracer.scene().description();
     if (scene.background != "plate" && scene.background != "environment")
       throw std::invalid_argument(
@@ -89,9 +117,13 @@ class Composite {
     const CameraPath path = tracer_.camera_path(origin, *direction, numbers);
     p.added.add(path.radiance);
     if (path.end == CameraPath::End::nothing) return;
+    if (path.bent) {
+      sample_bent(origin, path, numbers, p);
+      return;
+    }
     p.seen += mean(path.through);
     if (path.end == CameraPath::End::stand_in)
-      sample_stand_in(path, numbers, p);
+      sample_stand_in(path, {}, numbers, p);
     else if (environment_behind_)
       p.added.add(times(path.through, tracer_.environment().radiance(path.incoming)));
     else
@@ -108,6 +140,10 @@ class Composite {
       if (s.parameters.catches_shadow != 0)
         share = {passing(s.lost.x(), s.open.x()), passing(s.lost.y(), s.open.y()),
                  passing(s.lost.z(), s.open.z())};
+      if (s.bent) {
+        rgb += times(s.plate.over(n), share);
+        continue;
+      }
       rgb += times(plate, times(s.through.over(n), share));
       if (s.parameters.catches_light == 0) continue;
       const Vec3f light = s.virtual_light.over(n);
@@ -129,18 +165,40 @@ class Composite {
     return lost > 0 && open > 0 ? static_cast<float>(std::max(0.0, 1 - lost / open)) : 1.0F;
   }
 
-  void sample_stand_in(const CameraPath& path, SampleSequence& numbers, Pixel& p) const {
-    auto sums = std::find_if(p.stand_ins.begin(), p.stand_ins.end(),
-                             [&](const StandInSums& s) { return s.instance == path.hit.instance; });
+  // What a path bent by clear bodies sees of the plate, or of the environment beside it.
+  void sample_bent(Vec3f origin, const CameraPath& path, SampleSequence& numbers, Pixel& p) const {
+    const bool met = path.end == CameraPath::End::stand_in;
+    const auto seen = environment_behind_
+                          ? std::nullopt
+                          : plate_.seen(met ? path.hit.position - origin : path.incoming);
+    if (seen && met) {
+      sample_stand_in(path, seen, numbers, p);
+    } else {
+      p.added.add(
+          times(path.through, seen ? *seen : tracer_.environment().radiance(path.incoming)));
+    }
+  }
+
+  // `bent`: the plate there, where clear bodies bent the path.
+  void sample_stand_in(const CameraPath& path,
+                       std::optional<Vec3f> bent,
+                       SampleSequence& numbers,
+                       Pixel& p) const {
+    auto sums = std::find_if(p.stand_ins.begin(), p.stand_ins.end(), [&](const StandInSums& s) {
+      return s.instance == path.hit.instance && s.bent == bent.has_value();
+    });
     if (sums == p.stand_ins.end()) {
       sums = p.stand_ins.emplace(p.stand_ins.end());
       sums->instance = path.hit.instance;
       sums->parameters = stand_ins_[path.hit.material];
+      sums->bent = bent.has_value();
     }
     ++sums->count;
     sums->through.add(path.through);
-    sample_irradiance(path, numbers, *sums);
-    if (sums->parameters.catches_light != 0) {
+    const Vec3f weight = bent ? times(path.through, *bent) : path.through;
+    if (bent) sums->plate.add(weight);
+    sample_irradiance(path, weight, numbers, *sums);
+    if (sums->parameters.catches_light != 0 && !bent) {
       Vec3f light = tracer_.lamp_irradiance(path.hit, path.hit.normal);
       if (bounces_) light += tracer_.virtual_irradiance(path.hit, numbers);
       sums->virtual_light.add(times(path.through, light));
@@ -149,7 +207,10 @@ class Composite {
       p.added.add(times(path.through, reflection(path, sums->parameters, numbers)));
   }
 
-  void sample_irradiance(const CameraPath& path, SampleSequence& numbers, StandInSums& sums) const {
+  void sample_irradiance(const CameraPath& path,
+                         Vec3f weight,
+                         SampleSequence& numbers,
+                         StandInSums& sums) const {
     const auto sky = tracer_.environment().sample(numbers.next_pair());
     if (!sky) return;
     const HitPoint& hit = path.hit;
@@ -164,8 +225,8 @@ class Composite {
     const Vec3f open = sky->radiance * (cosine / sky->density);
     const Vec3f passed = transmittance(scene, origin, sky->direction, 0, ray_far, mask_virtual);
     sums.irradiance.add(open);
-    sums.open.add(times(path.through, open));
-    sums.lost.add(times(path.through, times(open, Vec3f{1, 1, 1} - passed)));
+    sums.open.add(times(weight, open));
+    sums.lost.add(times(weight, times(open, Vec3f{1, 1, 1} - passed)));
   }
 
   // F (L_hit - L_env) where the mirrored ray meets a virtual object.
@@ -188,6 +249,7 @@ class Composite {
 
   const PathTracer& tracer_;
   bool bounces_;
+  const Plate& plate_;
   bool environment_behind_ = false;
   std::vector<StandInParameters> stand_ins_;
 };
@@ -267,7 +329,8 @@ capture::Image render_reference(const FrameInputs& inputs,
   }
   const EnvironmentSampler environment(*inputs.environment);
   const PathTracer tracer(*inputs.scene, environment, job.lights.lamps, rules);
-  const Composite composite(tracer, settings.bounces);
+  const Plate behind_glass(plate, inputs.lens, job.cam_from_set);
+  const Composite composite(tracer, settings.bounces, behind_glass);
   const PixelRays rays(directions, job.cam_from_set);
   const auto pixel_of = [&](int x, int y, std::uint32_t index, std::uint32_t seed, int first,
                             int count) {

@@ -9,8 +9,8 @@
 namespace render {
 
 struct ReferenceSettings {
-  int samples = 1024;  // paths per pixel in the mean: noisy pixels get more, from 32 on
-  int max_depth = 16;  // then Russian roulette has long ended them
+  int samples = 1024;   // paths per pixel in the mean: noisy pixels get more, from 32 on
+  int max_depth = 128;  // then Russian roulette has long ended them, but for those in glass
   std::uint32_t seed = 1;
   // Bounces of light between surfaces. Off: virtual objects see the environment, and each other
   // only by mirror and glass, as the live kernel does. On: everything (the photograph).

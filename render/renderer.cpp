@@ -49,7 +49,9 @@ void render_frame(const FrameInputs& inputs,
                   const FrameJob& job,
                   const capture::HalfImage& plate,
                   FrameResult& result) {
-  const FrameContext context = make_frame_context(inputs, job);
+  FrameInputs with_plate = inputs;
+  with_plate.plate = &plate;
+  const FrameContext context = make_frame_context(with_plate, job);
   const int width = inputs.directions->width, height = inputs.directions->height;
   if (plate.width != width || plate.height != height || plate.channels != 3) {
     throw std::invalid_argument("the plate is " + std::to_string(plate.width) + "x" +

@@ -21,6 +21,10 @@ struct FrameInputs {
   // stay while the light changes a little; null: `environment`.
   const Environment* planned = nullptr;
   KeptTransport* kept = nullptr;  // a cache, or null: the same bits, slower
+  // For what clear bodies show of the plate: all of it, and the job's lens. Null: they show the
+  // environment in its place.
+  const capture::HalfImage* plate = nullptr;
+  const calibrate::Lens* lens = nullptr;
 };
 
 struct FrameResult {

@@ -5,10 +5,12 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 
 #include "render/blocker_boxes.h"
 #include "render/embree_context.h"
+#include "render/glass.h"
 #include "render/shader.h"
 #include "render/transform.h"
 
@@ -80,7 +82,9 @@ struct Scene::Impl {
   SceneDescription description;
   std::vector<std::shared_ptr<const Shader>> shaders;  // per material
   std::shared_ptr<const BackgroundShader> background;
+  std::vector<std::optional<Glass>> glass;   // per material
   std::vector<std::uint8_t> filtered;        // per material
+  std::vector<std::optional<Vec3f>> shadow;  // per material: what passes for shadows anywhere on it
   std::vector<std::uint8_t> may_stand_back;  // per mesh: of a stand-in that does not occlude
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
@@ -90,6 +94,7 @@ struct Scene::Impl {
   std::vector<std::uint32_t> instance_of_geometry;      // top level
   std::vector<std::vector<const Part*>> parts_of_mesh;  // inside instanced scenes
   std::vector<std::array<float, 9>> normal_matrices;    // per instance
+  std::vector<std::uint8_t> mirrored;                   // per instance: inside out by its matrix
   Bounds virtual_bounds{};
   Bounds all_bounds{};
   Bounds blocker_bounds = no_bounds;
@@ -97,6 +102,7 @@ struct Scene::Impl {
   std::size_t skipped = 0;
   bool real_blockers = false;
   bool filters = false;
+  bool has_glass = false;
 
   ~Impl() {
     for (RTCScene s : mesh_scenes) {
@@ -147,7 +153,11 @@ void Scene::Impl::build() {
     const std::shared_ptr<const Shader>& shader =
         shaders.emplace_back(find_shader(material.shader));
     shader->check(description, material);
+    shadow.push_back(shader->shadow_everywhere(material));
     filtered.push_back(shader->lets_light_through(material) ? 1 : 0);
+    glass.push_back(material.shader == "glass" ? std::optional(make_glass(material))
+                                               : std::nullopt);
+    has_glass = has_glass || glass.back();
   }
   background = find_background(description.background);
   device = rtcNewDevice("");
@@ -171,6 +181,7 @@ void Scene::Impl::build() {
     const Instance& instance = description.instances[i];
     const Mesh& mesh = *description.meshes[instance.mesh];
     normal_matrices.push_back(normal_matrix(instance.set_from_object));
+    mirrored.push_back(determinant(instance.set_from_object) < 0 ? 1 : 0);
     grow(all_bounds, instance.set_from_object, mesh);
     if (instance.kind == ObjectKind::virtual_object) {
       grow(virtual_bounds, instance.set_from_object, mesh);
@@ -272,7 +283,10 @@ void Scene::Impl::add_part(std::uint32_t mesh_index,
   part->positions = positions;
   rtcSetGeometryMask(geometry, mask);
   rtcSetGeometryUserData(geometry, part.get());
-  if (with_filter || may_stand_back[mesh_index]) {
+  const bool holes = std::ranges::any_of(triangles, [&](std::uint32_t t) {
+    return !shadow[mesh.materials[mesh.materials.size() == 1 ? 0 : t]];
+  });
+  if ((with_filter && holes) || may_stand_back[mesh_index]) {
     rtcSetGeometryIntersectFilterFunction(geometry, filter_closest);
   }
   if (with_filter) rtcSetGeometryOccludedFilterFunction(geometry, filter_any);
@@ -333,7 +347,9 @@ HitPoint Scene::Impl::hit_point(
   const Vec3f area = cross(p1 - p0, p2 - p0);
   const float double_area = length(area);
   hit.geometric_normal = double_area > 0 ? area * (1 / double_area) : -incoming;
-  if (dot(hit.geometric_normal, incoming) > 0) hit.geometric_normal = -hit.geometric_normal;
+  hit.back = dot(hit.geometric_normal, incoming) > 0;
+  if (hit.back) hit.geometric_normal = -hit.geometric_normal;
+  if (mirrored[hit.instance] != 0) hit.back = !hit.back;
   hit.normal = hit.geometric_normal;
   if (!mesh.normals.empty()) {
     const auto& normals = placed ? p.normals : mesh.normals;
@@ -382,7 +398,7 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
       hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
                 RTCHitN_v(args->hit, n, lane), incoming);
-  const ShadeContext context{&description};
+  const ShadeContext context{&description, nullptr};
   return shaders[hit.material]->transmittance(context, description.materials[hit.material], hit,
                                               incoming, kind);
 }
@@ -443,7 +459,11 @@ void Scene::Impl::filter_any(const RTCFilterFunctionNArguments* args) {
   const auto& context = *reinterpret_cast<const TraceContext*>(args->context);
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
-    const Vec3f share = part.impl->passes(args, i, RayKind::shadow);
+    const Mesh& mesh = *part.impl->description.meshes[part.mesh];
+    const std::uint32_t prim = RTCHitN_primID(args->hit, args->N, i);
+    const std::uint32_t t = part.triangle_of_prim.empty() ? prim : part.triangle_of_prim[prim];
+    const auto& anywhere = part.impl->shadow[mesh.materials[mesh.materials.size() == 1 ? 0 : t]];
+    const Vec3f share = anywhere ? *anywhere : part.impl->passes(args, i, RayKind::shadow);
     if (share == Vec3f{}) continue;
     if (context.transmittance_r) {
       const unsigned id = RTCRayN_id(args->ray, args->N, i);
@@ -481,6 +501,11 @@ Scene::Surface Scene::surface_of(unsigned geom_id, unsigned prim_id, unsigned in
   return surface;
 }
 const Shader& Scene::shader_of(std::uint32_t material) const { return *impl_->shaders[material]; }
+const Glass* Scene::glass_of(std::uint32_t material) const {
+  const std::optional<Glass>& glass = impl_->glass[material];
+  return glass ? &*glass : nullptr;
+}
+bool Scene::has_glass() const { return impl_->has_glass; }
 const BackgroundShader& Scene::background() const { return *impl_->background; }
 bool Scene::has_real_blockers() const { return impl_->real_blockers; }
 bool Scene::has_filters() const { return impl_->filters; }

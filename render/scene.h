@@ -18,6 +18,7 @@ namespace render {
 
 class BackgroundShader;
 class Shader;
+struct Glass;
 
 enum class ObjectKind : std::uint8_t { virtual_object = 0, stand_in = 1 };
 
@@ -67,6 +68,7 @@ struct HitPoint {
   // it; 0 where it does not.
   Vec3f edge;
   float turn_along = 0, turn_across = 0, turn_both = 0;
+  bool back = false;  // the side that the triangle's corners run clockwise on: from inside a body
   float uv_per_metre = 0;  // texture coordinate units per metre of surface, for mip levels
   std::uint32_t material = 0;
   std::uint32_t instance = 0;
@@ -105,6 +107,9 @@ class Scene {
   };
   Surface surface_of(unsigned geom_id, unsigned prim_id, unsigned inst_id) const;
   const Shader& shader_of(std::uint32_t material) const;
+  // Of a material of the shader "glass"; null for others.
+  const Glass* glass_of(std::uint32_t material) const;
+  bool has_glass() const;
   const BackgroundShader& background() const;
   // Whether any stand-in blocks light; whether any surface lets some through.
   bool has_real_blockers() const;

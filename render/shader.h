@@ -6,17 +6,20 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include "render/environment.h"
+#include "render/glass.h"
 #include "render/scene.h"
 
 namespace render {
 
 enum class RayKind : std::uint8_t {
   camera,  // from the camera, or straight on through something thin: what it sees is the picture
+  bent,    // turned by clear bodies since: sees what the camera does, and the plate elsewhere
   reflection,  // mirrored or scattered in a narrow lobe: sees virtual objects and the environment
   difference,  // a reflection on a real surface: counts only as (what it hits - environment)
   shadow,
@@ -35,6 +38,7 @@ struct ShadePoint {
   std::uint32_t slot = 0;   // the sample that the result is added to
   RayKind kind = RayKind::camera;
   std::uint8_t depth = 0;
+  Media media;  // that the ray arrived in
   // From shade(), cleared before: all that is sent back along `incoming`. Each is multiplied by
   // throughput by the kernel.
   Vec3f radiance;               // its own light
@@ -56,7 +60,12 @@ struct NewRay {
   float roughness;   // of the lobe, 0 = mirror: picks the environment's smoothing
   Spread spread;     // of the sample's cone from here on
   RayKind kind;
+  Media media = {};  // that it goes on in
 };
+
+// The cone of a sample that is mirrored at a surface of unit normal `normal` to the unit direction
+// `view` that it came from. A curved mirror widens it by twice the angle that its normal turns.
+Spread mirrored_spread(const ShadePoint& p, Vec3f normal, Vec3f view);
 
 // Where shade() puts rays. Rays whose share is too small are replaced by the environment's (or the
 // plate's) light in their direction.
@@ -68,6 +77,7 @@ class RaySink {
 
 struct ShadeContext {
   const SceneDescription* scene = nullptr;
+  const Scene* compiled = nullptr;  // for shade()
 };
 
 class Shader {
@@ -84,6 +94,12 @@ class Shader {
   virtual bool lets_light_through(const Material& material) const {
     static_cast<void>(material);
     return false;
+  }
+  // What transmittance() says of shadows where it is the same anywhere on the surface, which then
+  // has no holes: it is not called.
+  virtual std::optional<Vec3f> shadow_everywhere(const Material& material) const {
+    static_cast<void>(material);
+    return std::nullopt;
   }
   // RGB share of light that passes straight through here. For `camera`, `reflection`, `difference`
   // rays a hole is where it is (1, 1, 1); anything less is left to shade().
@@ -109,8 +125,8 @@ class BackgroundShader {
 // that are built later.
 void register_shader(std::string name, std::shared_ptr<const Shader> shader);
 void register_background(std::string name, std::shared_ptr<const BackgroundShader> shader);
-// Throw std::invalid_argument naming what is not there. "standard" and the background "environment"
-// are always there.
+// Throw std::invalid_argument naming what is not there. "standard", "glass" and the background
+// "environment" are always there.
 std::shared_ptr<const Shader> find_shader(std::string_view name);
 std::shared_ptr<const BackgroundShader> find_background(std::string_view name);
 

@@ -73,23 +73,6 @@ class StandardShader final : public Shader {
   }
 
  private:
-  // A curved mirror widens the cone by twice the angle that its normal turns across it. Seen at a
-  // slant the cone covers a longer piece of surface that way.
-  static Spread mirrored_spread(const ShadePoint& p, Vec3f normal, Vec3f view) {
-    const float cosine = dot(normal, view);
-    const Vec3f slant = normalize(view - normal * cosine);
-    const Vec3f side = cross(normal, slant);
-    const auto mirrored_turn = [&](Vec3f step) {
-      const Vec3f turn = turn_of_normal(p.hit, step);
-      return (normal * dot(turn, view) + turn * cosine) * 2;
-    };
-    Spread spread{mirrored_turn(slant * (p.footprint_m / std::max(cosine, 0.1F))),
-                  mirrored_turn(side * p.footprint_m)};
-    spread.b += side * p.spread_rad;
-    spread.a += normalize(cross(side, mirrored(view, normal))) * p.spread_rad;
-    return spread;
-  }
-
   static void mirror(
       const ShadePoint& p, Vec3f normal, Vec3f view, float roughness, Vec3f weight, RaySink& rays) {
     Vec3f direction = normalize(mirrored(view, normal));

@@ -18,6 +18,11 @@ inline Vec3f transform_vector(const std::array<float, 12>& m, Vec3f v) {
           m[8] * v.x + m[9] * v.y + m[10] * v.z};
 }
 
+// Of the 3x3 part: below 0 where it turns things inside out.
+inline float determinant(const std::array<float, 12>& m) {
+  return dot(Vec3f{m[0], m[1], m[2]}, cross(Vec3f{m[4], m[5], m[6]}, Vec3f{m[8], m[9], m[10]}));
+}
+
 // Normals go with the cofactors of the 3x3 part, whatever its scale or handedness.
 inline std::array<float, 9> normal_matrix(const std::array<float, 12>& m) {
   const Vec3f a{m[0], m[1], m[2]}, b{m[4], m[5], m[6]}, c{m[8], m[9], m[10]};

@@ -127,6 +127,7 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
   plate_ = open_plate(set_);
   track_ = track_of(set_);
   directions_ = directions_of(set_);
+  lens_ = std::make_shared<calibrate::Lens>(lens_of(set_));
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
   rate_ = rate.value_or(set_.show.fps.value_or(own));
@@ -238,6 +239,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.planned = std::move(light.planned);
     prepared.scene = scene_;
     prepared.directions = directions_;
+    prepared.lens = lens_;
   }
   return prepared;
 }
@@ -264,6 +266,7 @@ void FrameMaker::change_set(Set set) {
   auto light = std::make_unique<LightFeed>(set);
   auto track = track_of(set);
   auto directions = directions_of(set);
+  auto lens = std::make_shared<calibrate::Lens>(lens_of(set));
   Set before = std::exchange(set_, std::move(set));
   try {
     build_scene();
@@ -274,6 +277,7 @@ void FrameMaker::change_set(Set set) {
   light_ = std::move(light);
   track_ = std::move(track);
   directions_ = std::move(directions);
+  lens_ = std::move(lens);
 }
 
 }  // namespace studio

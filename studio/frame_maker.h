@@ -32,6 +32,7 @@ struct PreparedFrame {
   std::shared_ptr<const render::Environment> planned;  // see render::FrameInputs
   std::shared_ptr<const render::Scene> scene;
   std::shared_ptr<const calibrate::DirectionTable> directions;
+  std::shared_ptr<const calibrate::Lens> lens;
   std::vector<capture::Sound> sound;
   std::chrono::steady_clock::time_point arrived;  // of the plate
   render::MatchResult match;
@@ -41,7 +42,12 @@ struct PreparedFrame {
   std::array<double, stages> stage_ms{};  // capture, probe and job are set
 
   render::FrameInputs inputs() const {
-    return {scene.get(), directions.get(), environment.get(), planned.get()};
+    return {.scene = scene.get(),
+            .directions = directions.get(),
+            .environment = environment.get(),
+            .planned = planned.get(),
+            .plate = plate.get(),
+            .lens = lens.get()};
   }
 };
 
@@ -95,6 +101,7 @@ class FrameMaker {
   std::optional<calibrate::Track> track_;
   std::shared_ptr<const render::Scene> scene_;
   std::shared_ptr<const calibrate::DirectionTable> directions_;
+  std::shared_ptr<const calibrate::Lens> lens_;
   std::vector<render::LocalLight> lamps_;
   std::uint64_t scene_version_ = 0;
   std::optional<capture::Frame> first_due_;  // of a live plate

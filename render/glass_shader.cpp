@@ -1,0 +1,129 @@
+// The shader "glass": both rays at each surface.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "render/builtin_shaders.h"
+#include "render/glass.h"
+#include "render/standard.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+// One colour of three, or all.
+Vec3f only(Vec3f v, int channel) {
+  return {channel == 0 ? v.x : 0.0F, channel == 1 ? v.y : 0.0F, channel == 2 ? v.z : 0.0F};
+}
+
+class GlassShader final : public Shader {
+ public:
+  void check(const SceneDescription&, const Material& material) const override {
+    glass_parameters(material);
+  }
+
+  void shade(const ShadeContext& context,
+             std::span<ShadePoint* const> points,
+             RaySink& rays) const override {
+    for (ShadePoint* p : points) shade_one(*context.compiled, *p, rays);
+  }
+
+  bool lets_light_through(const Material&) const override { return true; }
+
+  std::optional<Vec3f> shadow_everywhere(const Material& material) const override {
+    const GlassParameters p = glass_parameters(material);
+    return Vec3f{p.shadow[0], p.shadow[1], p.shadow[2]};
+  }
+
+ private:
+  static void shade_one(const Scene& scene, ShadePoint& p, RaySink& rays) {
+    const Crossing crossing =
+        cross_surface(scene, p.media, {p.hit.instance, p.hit.material}, p.hit.back);
+    if (!crossing.seen) {
+      rays.push(p, {offset_origin(p.hit, p.incoming),
+                    p.incoming,
+                    p.throughput,
+                    {},
+                    0,
+                    {},
+                    p.kind,
+                    crossing.after});
+      return;
+    }
+    const bool one_index =
+        crossing.ratio[0] == crossing.ratio[1] && crossing.ratio[1] == crossing.ratio[2];
+    if (one_index) {
+      split(p, crossing, crossing.ratio[0], p.throughput, rays);
+      return;
+    }
+    for (int c = 0; c < 3; ++c) {
+      split(p, crossing, crossing.ratio[static_cast<std::size_t>(c)], only(p.throughput, c), rays);
+    }
+  }
+
+  static RayKind kind_after(RayKind kind) { return kind == RayKind::camera ? RayKind::bent : kind; }
+
+  // The mirrored ray and the refracted one.
+  static void split(
+      const ShadePoint& p, const Crossing& crossing, float ratio, Vec3f throughput, RaySink& rays) {
+    const Vec3f view = -p.incoming;
+    const Vec3f normal = p.hit.normal;
+    const float cosine = dot(normal, view);
+    const float share = fresnel(cosine, ratio);
+    const RayKind kind = kind_after(p.kind);
+    if (share > 0) {
+      Vec3f direction = normalize(mirrored(view, normal));
+      const float into = dot(direction, p.hit.geometric_normal);
+      if (into < 0) direction -= p.hit.geometric_normal * (2 * into);
+      rays.push(p, {offset_origin(p.hit, direction),
+                    direction,
+                    throughput * share,
+                    {},
+                    0,
+                    mirrored_spread(p, normal, view),
+                    kind,
+                    p.media});
+    }
+    if (!(share < 1)) return;
+    Vec3f direction = refracted(p.incoming, normal, ratio);
+    if (direction == Vec3f{}) return;
+    // An interpolated normal may leave the ray on this side of the triangle: let it graze the
+    // other.
+    const float back = dot(direction, p.hit.geometric_normal);
+    if (back > -1e-4F) {
+      direction = normalize(direction - p.hit.geometric_normal * (back + 1e-3F));
+    }
+    rays.push(p, {offset_origin(p.hit, direction),
+                  direction,
+                  throughput * (1 - share),
+                  {},
+                  0,
+                  refracted_spread(p, direction, ratio),
+                  kind,
+                  crossing.after});
+  }
+
+  // How the refracted direction turns over the sample's piece of surface, and with its cone.
+  static Spread refracted_spread(const ShadePoint& p, Vec3f direction, float ratio) {
+    const Vec3f normal = p.hit.normal;
+    const float from = -dot(normal, p.incoming);
+    const float to = std::max(-dot(normal, direction), 0.05F);
+    const float bend = ratio * from - to;
+    const auto turned = [&](Vec3f step, Vec3f widened) {
+      const Vec3f turn = turn_of_normal(p.hit, step);
+      const float less = -(dot(widened, normal) + dot(p.incoming, turn));  // of the cosine
+      return widened * ratio + turn * bend + normal * (less * ratio * (1 - ratio * from / to));
+    };
+    const Vec3f slant = normalize(-p.incoming - normal * from);
+    const Vec3f side = cross(normal, slant);
+    const Vec3f across = normalize(cross(side, p.incoming));
+    return {turned(slant * (p.footprint_m / std::max(from, 0.1F)), across * p.spread_rad),
+            turned(side * p.footprint_m, side * p.spread_rad)};
+  }
+};
+
+}  // namespace
+
+std::shared_ptr<const Shader> make_glass_shader() { return std::make_shared<GlassShader>(); }
+
+}  // namespace render

@@ -1,0 +1,347 @@
+// Glass: what optics says of it, in the kernel and in the reference.
+#include "render/glass.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <numbers>
+
+#include "render/kept_transport.h"
+#include "render/reference.h"
+#include "tests/compositing/made_shot.h"
+#include "tests/render/plain_shapes.h"
+
+namespace compositing {
+namespace {
+
+using render::Vec3f;
+
+constexpr double degree = std::numbers::pi / 180;
+
+TEST(Fresnel, IsWhatTheFormulasSayAtEveryAngle) {
+  for (const double index : {1.0, 1.33, 1.5, 2.4, 3.0}) {
+    for (int i = 0; i < 90; ++i) {
+      const double angle = i * degree;
+      const double inside = std::asin(std::sin(angle) / index);
+      double share = std::pow((index - 1) / (index + 1), 2);
+      if (i > 0) {
+        const double across = std::sin(angle - inside) / std::sin(angle + inside);
+        const double along = std::tan(angle - inside) / std::tan(angle + inside);
+        share = 0.5 * (across * across + along * along);
+      }
+      EXPECT_NEAR(
+          render::fresnel(static_cast<float>(std::cos(angle)), static_cast<float>(1 / index)),
+          share, 2e-5);
+      // From inside, at the refracted angle, the same share is mirrored.
+      EXPECT_NEAR(render::fresnel(static_cast<float>(std::cos(inside)), static_cast<float>(index)),
+                  share, 3e-4);
+    }
+  }
+}
+
+TEST(Fresnel, MirrorsAllBeyondTheCriticalAngle) {
+  const double critical = std::asin(1 / 1.5);
+  EXPECT_LT(render::fresnel(static_cast<float>(std::cos(critical - 0.001)), 1.5F), 1);
+  EXPECT_EQ(render::fresnel(static_cast<float>(std::cos(critical + 0.001)), 1.5F), 1);
+  EXPECT_EQ(render::refracted({0.9F, 0, -std::sqrt(0.19F)}, {0, 0, 1}, 1.5F), Vec3f{});
+}
+
+TEST(Refracted, ObeysSnellsLaw) {
+  for (int i = 0; i < 90; ++i) {
+    const double angle = i * degree;
+    const Vec3f in{static_cast<float>(std::sin(angle)), 0, static_cast<float>(-std::cos(angle))};
+    const Vec3f out = render::refracted(in, {0, 0, 1}, 1 / 1.5F);
+    EXPECT_NEAR(out.x, std::sin(angle) / 1.5, 1e-6);
+    EXPECT_EQ(out.y, 0);
+    EXPECT_NEAR(length(out), 1, 1e-6);
+  }
+}
+
+TEST(GlassParameters, AreRefusedByNameWhenOutOfRange) {
+  const auto refuses = [](const std::function<void(render::GlassParameters&)>& spoil) {
+    render::GlassParameters p;
+    spoil(p);
+    EXPECT_THROW(render::glass_parameters(render::make_glass_material("cover", p)),
+                 std::invalid_argument);
+  };
+  refuses([](auto& p) { p.index = 0.9F; });
+  refuses([](auto& p) { p.index = std::nanf(""); });
+  refuses([](auto& p) { p.absorption[1] = -1; });
+  refuses([](auto& p) { p.shadow[2] = 2; });
+  refuses([](auto& p) { p.abbe = 2; });
+  render::Material short_block = render::make_glass_material("cover", {});
+  short_block.parameters.pop_back();
+  EXPECT_THROW(render::glass_parameters(short_block), std::invalid_argument);
+}
+
+TEST(IndicesOf, BendBlueMoreThanRedByAbbesNumber) {
+  const auto [red, green, blue] = render::indices_of({.index = 1.5168F, .abbe = 64.17F});
+  EXPECT_LT(red, green);
+  EXPECT_LT(green, blue);
+  EXPECT_NEAR(red, 1.5157, 5e-4);   // BK7 at 611 nm, by Sellmeier's equation
+  EXPECT_NEAR(blue, 1.5242, 1e-3);  // at 464 nm
+}
+
+// A body of glass in the middle, before an environment of a radiance by direction.
+struct GlassShot {
+  std::unique_ptr<render::Scene> scene;
+  calibrate::Lens lens;
+  calibrate::DirectionTable directions;
+  render::Environment environment;
+  render::FrameJob job;
+  capture::HalfImage plate;
+
+  render::FrameInputs inputs() const {
+    return {.scene = scene.get(),
+            .directions = &directions,
+            .environment = &environment,
+            .lens = &lens};
+  }
+  capture::Image kernel() const {
+    render::FrameResult result;
+    render_frame(inputs(), job, plate, result);
+    return capture::to_float(result.rgba);
+  }
+  capture::Image reference(int samples) const {
+    return render_reference(inputs(), job, capture::to_float(plate), {.samples = samples});
+  }
+};
+
+GlassShot glass_shot(render::SceneDescription scene,
+                     const std::function<float(Vec3f)>& radiance,
+                     int size,
+                     double focal_px,
+                     calibrate::Vec3 from) {
+  register_shaders();
+  GlassShot shot;
+  shot.scene = std::make_unique<render::Scene>(std::move(scene));
+  shot.lens = {"pinhole", size, size, {focal_px, focal_px, (size - 1) / 2.0, (size - 1) / 2.0}};
+  shot.directions = calibrate::make_direction_table(shot.lens);
+  capture::Image& map = shot.environment.radiance = capture::make_image(128, 256, 3);
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const float value = radiance(render::direction_of_texel(
+          static_cast<float>(x), static_cast<float>(y), map.width, map.height));
+      for (int c = 0; c < 3; ++c) map.at(y, x, c) = value;
+    }
+  }
+  render::smooth_for_reflections(shot.environment);
+  shot.job.cam_from_set = calibrate::look_at(from, {0, 0, 0}, 0);
+  shot.job.effort.accuracy = 0.99999F;
+  shot.plate = made_plate(size, size);
+  return shot;
+}
+
+render::SceneDescription bodies(std::vector<std::shared_ptr<const render::Mesh>> meshes,
+                                const std::vector<render::GlassParameters>& glass) {
+  render::SceneDescription scene;
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    auto mesh = std::make_shared<render::Mesh>(*meshes[i]);
+    mesh->materials = {static_cast<std::uint32_t>(i)};
+    scene.meshes.push_back(mesh);
+    scene.materials.push_back(render::make_glass_material("glass", glass[i]));
+    render::Instance instance;
+    instance.name = "body " + std::to_string(i);
+    instance.mesh = static_cast<std::uint32_t>(i);
+    scene.instances.push_back(instance);
+  }
+  return scene;
+}
+
+double middle_of(const capture::Image& picture) {
+  return picture.at(picture.height / 2, picture.width / 2, 0);
+}
+
+TEST(Glass, SlabLetsThroughWhatTheSeriesOfItsReflectionsSays) {
+  for (const float index : {1.33F, 1.5F, 2.4F}) {
+    for (const float absorption : {0.0F, 3.0F, 40.0F}) {
+      const double f = std::pow((index - 1) / (index + 1), 2);
+      const double a = std::exp(-absorption * 0.1);
+      const double through = (1 - f) * (1 - f) * a / (1 - f * f * a * a);
+      const double back = f + f * (1 - f) * (1 - f) * a * a / (1 - f * f * a * a);
+      // Light 1 before the camera, 3 behind it.
+      const GlassShot shot =
+          glass_shot(bodies({render::make_box({-5, -0.05F, -5}, {5, 0.05F, 5})},
+                            {{.index = index, .absorption = {absorption, absorption, absorption}}}),
+                     [](Vec3f d) { return d.y > 0 ? 1.0F : 3.0F; }, 16, 400, {0, -3, 0});
+      EXPECT_NEAR(middle_of(shot.kernel()), through + 3 * back, 1e-3 * (through + 3 * back));
+      if (absorption == 3.0F) {
+        EXPECT_NEAR(middle_of(shot.reference(4000)), through + 3 * back, 0.01);
+      }
+    }
+  }
+}
+
+TEST(Glass, IsWhiteInAWhiteFurnace) {
+  for (const float index : {1.0F, 1.5F, 3.0F}) {
+    const GlassShot shot = glass_shot(bodies({render::make_sphere(1, 48)}, {{.index = index}}),
+                                      [](Vec3f) { return 1.0F; }, 32, 40, {0, -4, 1});
+    const capture::Image kernel = shot.kernel();
+    const capture::Image reference = shot.reference(64);
+    for (int y = 0; y < 32; ++y) {
+      for (int x = 0; x < 32; ++x) {
+        EXPECT_NEAR(kernel.at(y, x, 0), 1, 0.004) << index << ": " << x << ", " << y;
+        EXPECT_NEAR(reference.at(y, x, 0), 1, 0.02) << index << ": " << x << ", " << y;
+      }
+    }
+  }
+}
+
+TEST(Glass, OfIndexOneIsNotThere) {
+  GlassShot shot = glass_shot(bodies({render::make_sphere(1, 48)}, {{.index = 1}}),
+                              [](Vec3f d) { return 1 + d.x; }, 32, 40, {0, -4, 1});
+  const capture::Image with = shot.kernel();
+  shot.scene = std::make_unique<render::Scene>(bodies({}, {}));
+  const capture::Image without = shot.kernel();
+  for (std::size_t i = 0; i < with.pixels.size(); ++i) {
+    if (i % 4 == 3) continue;  // coverage
+    EXPECT_NEAR(with.pixels[i], without.pixels[i], 0.01);
+  }
+}
+
+// A plano-convex lens shows things at its focal length, upside down beyond it.
+TEST(Glass, BallBendsRaysToItsFocus) {
+  // Parallel rays near the axis meet at n R / (2 (n - 1)) behind the middle of a ball. A camera
+  // there sees one direction all over the ball's middle: that straight on.
+  const float index = 1.5F;
+  const double focus = index / (2 * (index - 1));
+  const auto slope = [](Vec3f d) { return 0.5F + 5 * d.x; };
+  GlassShot shot = glass_shot(bodies({render::make_sphere(1, 384)}, {{.index = index}}), slope, 33,
+                              33 / (2 * std::tan(0.06)), {0, -focus, 0});
+  const capture::Image at_focus = shot.kernel();
+  EXPECT_NEAR(at_focus.at(16, 2, 0), at_focus.at(16, 30, 0), 0.03);
+  shot.job.cam_from_set = calibrate::look_at({0, -4 * focus, 0}, {0, 0, 0}, 0);
+  const capture::Image beyond = shot.kernel();
+  EXPECT_GT(beyond.at(16, 2, 0), beyond.at(16, 30, 0) + 0.1);  // turned around
+}
+
+TEST(Glass, BulbInAHollowIsSeenAsIfTheGapWereThere) {
+  // Water in a glass ball, its inside described twice: with a gap of air, and overlapping, where
+  // the glass has priority. A third way, glass alone with water's hollow as an own surface, is the
+  // truth.
+  const auto outer = render::make_sphere(1, 64), inner = render::make_sphere(0.7F, 64),
+             over = render::make_sphere(0.75F, 64);
+  const auto radiance = [](Vec3f d) { return 1 + 0.8F * d.z + 0.3F * d.x; };
+  const render::GlassParameters glass{.index = 1.5F}, water{.index = 1.33F, .priority = 1};
+  const GlassShot nested =
+      glass_shot(bodies({outer, inner}, {glass, water}), radiance, 33, 60, {0, -4, 0.5});
+  // The water reaches too far, but where glass of higher priority is, it is glass: a shell.
+  auto shell = std::make_shared<render::Mesh>(*outer);
+  const auto first = static_cast<std::uint32_t>(shell->positions.size());
+  for (std::size_t i = 0; i < inner->positions.size(); ++i) {
+    shell->positions.push_back(inner->positions[i]);
+    shell->normals.push_back(-inner->normals[i]);
+  }
+  for (const auto& [a, b, c] : inner->triangles) {
+    shell->triangles.push_back({first + a, first + c, first + b});
+  }
+  const GlassShot overlapping =
+      glass_shot(bodies({shell, over}, {{.index = 1.5F, .priority = 2}, water}), radiance, 33, 60,
+                 {0, -4, 0.5});
+  const capture::Image a = nested.kernel(), b = overlapping.kernel();
+  double squares = 0, differences = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    squares += a.pixels[i] * a.pixels[i];
+    differences += std::pow(a.pixels[i] - b.pixels[i], 2);
+  }
+  EXPECT_LT(std::sqrt(differences / squares), 0.003);
+}
+
+TEST(Glass, DispersesIntoColours) {
+  const auto shot_of = [](float abbe) {
+    return glass_shot(bodies({render::make_sphere(1, 384)}, {{.index = 1.5F, .abbe = abbe}}),
+                      [](Vec3f d) { return d.x > -0.12F ? 1.0F : 0.0F; }, 65, 300, {0, -4, 0});
+  };
+  const auto colour = [](const capture::Image& picture) {
+    double most = 0;
+    for (int y = 0; y < picture.height; ++y) {
+      for (int x = 0; x < picture.width; ++x) {
+        most = std::max<double>(most, std::abs(picture.at(y, x, 0) - picture.at(y, x, 2)));
+      }
+    }
+    return most;
+  };
+  EXPECT_EQ(colour(shot_of(0).kernel()), 0);
+  EXPECT_GT(colour(shot_of(20).kernel()), 0.1);
+  EXPECT_GT(colour(shot_of(20).reference(1000)), 0.1);
+}
+
+// A glass ball on a stand-in floor, before a plate.
+MadeShot ball_on_plate(int size) {
+  render::SceneDescription scene = made_scene();
+  scene.materials[2] = render::make_glass_material("glass", {.index = 1.5F});
+  scene.meshes[2] = made_ball({0.5F, -0.9F, 0.4F}, 0.4F, 2);
+  scene.instances.erase(scene.instances.begin() + 1);  // the red ball
+  MadeShot shot = made_shot(size, size * 3 / 4, std::move(scene));
+  shot.job.effort.accuracy = 0.999F;
+  return shot;
+}
+
+calibrate::Lens lens_of(const MadeShot& shot) {
+  const double f = shot.directions.width * 1.1;
+  return {"pinhole",
+          shot.directions.width,
+          shot.directions.height,
+          {f, f, (shot.directions.width - 1) / 2.0, (shot.directions.height - 1) / 2.0}};
+}
+
+TEST(Glass, ShowsThePlateBehindItAsTheReferenceDoes) {
+  MadeShot shot = ball_on_plate(96);
+  // A plate that tells where one looks: a ramp to the right.
+  capture::Image plate = capture::make_image(72, 96, 3);
+  for (int y = 0; y < 72; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      plate.at(y, x, 0) = static_cast<float>(x) / 96;
+      plate.at(y, x, 1) = static_cast<float>(y) / 72;
+      plate.at(y, x, 2) = 0.5F;
+    }
+  }
+  shot.plate = capture::to_half(plate);
+  plate = capture::to_float(shot.plate);
+  const calibrate::Lens lens = lens_of(shot);
+  render::FrameInputs inputs = shot.inputs();
+  inputs.lens = &lens;
+  render::FrameResult result;
+  render_frame(inputs, shot.job, shot.plate, result);
+  const capture::Image kernel = capture::to_float(result.rgba);
+  const capture::Image reference = render_reference(inputs, shot.job, plate, {.samples = 512});
+  const capture::Image mask = render::affected_mask(reference, plate);
+  EXPECT_LT(render::picture_error(kernel, reference, mask).relative_rms, 0.02);
+
+  // Without the plate, the picture is another.
+  inputs.lens = nullptr;
+  render_frame(inputs, shot.job, shot.plate, result);
+  EXPECT_GT(render::picture_error(capture::to_float(result.rgba), reference, mask).relative_rms,
+            0.05);
+}
+
+TEST(Glass, IsTheSameWhateverTheTilesAndWhatIsKept) {
+  MadeShot shot = ball_on_plate(80);
+  const calibrate::Lens lens = lens_of(shot);
+  render::FrameInputs inputs = shot.inputs();
+  inputs.lens = &lens;
+  render::FrameResult once, again, warm;
+  render_frame(inputs, shot.job, shot.plate, once);
+  shot.job.effort.tile_size = 16;
+  render_frame(inputs, shot.job, shot.plate, again);
+  EXPECT_EQ(once.rgba.pixels, again.rgba.pixels);
+
+  // A new plate through kept transport.
+  render::KeptTransport kept;
+  inputs.kept = &kept;
+  render_frame(inputs, shot.job, shot.plate, warm);
+  for (capture::Half& half : shot.plate.pixels) {
+    half = capture::half_from_float(1 - capture::float_from_half(half));
+  }
+  render_frame(inputs, shot.job, shot.plate, warm);
+  EXPECT_GT(warm.statistics.kept_rays, 0U);
+  inputs.kept = nullptr;
+  render_frame(inputs, shot.job, shot.plate, again);
+  EXPECT_EQ(warm.rgba.pixels, again.rgba.pixels);
+  EXPECT_NE(warm.rgba.pixels, once.rgba.pixels);
+}
+
+}  // namespace
+}  // namespace compositing
