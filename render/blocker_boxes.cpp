@@ -13,7 +13,7 @@ constexpr int halvings = 4;
 std::vector<Scene::Bounds> bounds_of_blockers(const SceneDescription& scene) {
   std::vector<Scene::Bounds> triangles;
   for (const Instance& instance : scene.instances) {
-    if (instance.kind == ObjectKind::stand_in && !instance.blocks_light) continue;
+    if (instance.moves || !blocks(instance)) continue;
     const Mesh& mesh = *scene.meshes[instance.mesh];
     for (const auto& [a, b, c] : mesh.triangles) {
       const Vec3f p = transform_point(instance.set_from_object, mesh.positions[a]);

@@ -22,8 +22,12 @@ inline Scene::Bounds joined(const Scene::Bounds& a, const Scene::Bounds& b) {
            std::max(a.upper.z, b.upper.z)}};
 }
 
-// At most 16 boxes that hold all triangles of the set which block light: halved four times along
-// the longest side. Triangles that are not finite block nothing.
+inline bool blocks(const Instance& instance) {
+  return instance.kind == ObjectKind::virtual_object || instance.blocks_light;
+}
+
+// At most 16 boxes that hold all triangles of the set which block light and do not move: halved
+// four times along the longest side. Triangles that are not finite block nothing.
 std::vector<Scene::Bounds> find_blocker_boxes(const SceneDescription& scene);
 
 }  // namespace render

@@ -149,7 +149,7 @@ void CellBaker::trace(int count, bool coherent, RayKind kind) {
                       s.near_m.data(), s.far_m.data()},
                      s.mask.data(), static_cast<std::size_t>(count));
   }
-  TraceContext context(kind, coherent);
+  TraceContext context(*frame_->inputs.scene, kind, coherent);
   RTCRayHitNp rays;
   rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
               s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),

@@ -10,13 +10,15 @@ namespace render {
 // `context` must be the first member: filters get a pointer to it.
 struct TraceContext {
   RTCIntersectContext context;
+  const Scene* scene;
   RayKind kind = RayKind::camera;
   // Shadow rays: per ray id, share of light so far. Null: any surface that is not a hole blocks.
   float* transmittance_r = nullptr;
   float* transmittance_g = nullptr;
   float* transmittance_b = nullptr;
 
-  TraceContext(RayKind ray_kind, bool coherent) : kind(ray_kind) {
+  TraceContext(const Scene& traced, RayKind ray_kind, bool coherent)
+      : scene(&traced), kind(ray_kind) {
     rtcInitIntersectContext(&context);
     context.flags =
         coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;

@@ -104,7 +104,7 @@ void add_ray(GatherWorkspace& w,
 // by.
 void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics) {
   const auto n = static_cast<unsigned>(w.rays);
-  TraceContext context(RayKind::shadow, false);
+  TraceContext context(scene, RayKind::shadow, false);
   for (unsigned i = 0; i < n; ++i) {
     w.near_m[i] = 0, w.far_m[i] = ray_far, w.time[i] = 0, w.id[i] = i, w.flags[i] = 0;
   }

@@ -47,7 +47,7 @@ std::uint64_t shoot(const Scene& scene, const RayLog& log, const LoggedStream& s
                input(log.dz), time.data(),
                far_m.data(),  const_cast<unsigned*>(log.mask.data() + at),
                id.data(),     flags.data()};
-  TraceContext context(s.any_hit ? RayKind::shadow : RayKind::camera, coherent);
+  TraceContext context(scene, s.any_hit ? RayKind::shadow : RayKind::camera, coherent);
   std::uint64_t hits = 0;
   if (s.any_hit) {
     context.transmittance_r = context.transmittance_g = context.transmittance_b = share.data();

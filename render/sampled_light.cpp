@@ -164,7 +164,7 @@ class SampledLight {
   // Shoots shadow rays, takes away the light of those that are blocked; none are left.
   int find_lost(int rays, Workspace& w) const {
     RayStream& s = w.stream;
-    TraceContext context(RayKind::shadow, false);
+    TraceContext context(scene_, RayKind::shadow, false);
     RTCRayNp stream = rays_of(s);
     rtcOccludedNp(scene_.embree(), &context.context, &stream, static_cast<unsigned>(rays));
     for (std::size_t i = 0; i < static_cast<std::size_t>(rays); ++i) {
@@ -203,7 +203,7 @@ class SampledLight {
   }
 
   void intersect(RayStream& s, int count) const {
-    TraceContext context(RayKind::camera, true);
+    TraceContext context(scene_, RayKind::camera, true);
     RTCRayHitNp rays;
     rays.ray = rays_of(s);
     rays.hit.Ng_x = s.ngx.data(), rays.hit.Ng_y = s.ngy.data(), rays.hit.Ng_z = s.ngz.data();

@@ -36,6 +36,8 @@ struct Instance {
   ObjectKind kind = ObjectKind::virtual_object;
   bool blocks_light = true;  // stand-ins only: shadows cast by the real thing it stands for
   bool occludes = true;      // stand-ins only: hides virtual objects behind it
+  // It is likely to stand elsewhere in the next scene: held apart, so that this takes no building.
+  bool moves = false;
   friend bool operator==(const Instance&, const Instance&) = default;
 };
 
@@ -83,12 +85,16 @@ inline Vec3f turn_of_normal(const HitPoint& hit, Vec3f step) {
 }
 
 // The compiled scene. Immutable once built; safe from any thread. Meshes that are used once are
-// placed directly, those used more often through Embree instances.
+// placed directly, those used more often, or by what moves, through Embree instances; beside what
+// moves, all that is placed directly is an instance too.
 class Scene {
  public:
   // Throws std::invalid_argument for indices out of range, std::runtime_error if Embree fails.
   // Triangles that are not finite are left out and counted.
   explicit Scene(SceneDescription description);
+  // The same scene, bit for bit, at next to no cost where it differs from `before` only in where
+  // moving instances stand.
+  Scene(SceneDescription description, const Scene& before);
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
@@ -127,6 +133,8 @@ class Scene {
   std::size_t skipped_triangles() const;
 
  private:
+  struct Part;
+  struct Compiled;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

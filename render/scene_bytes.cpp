@@ -5,7 +5,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x32435350;  // "PSC2"
+constexpr std::uint32_t scene_magic = 0x33435350;  // "PSC3"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);
@@ -86,6 +86,7 @@ std::vector<std::byte> serialize(const SceneDescription& scene) {
     out.put(instance.kind);
     out.put(static_cast<std::uint8_t>(instance.blocks_light));
     out.put(static_cast<std::uint8_t>(instance.occludes));
+    out.put(static_cast<std::uint8_t>(instance.moves));
   }
   return out.take();
 }
@@ -120,6 +121,7 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
     instance.kind = static_cast<ObjectKind>(kind);
     instance.blocks_light = in.get<std::uint8_t>() != 0;
     instance.occludes = in.get<std::uint8_t>() != 0;
+    instance.moves = in.get<std::uint8_t>() != 0;
   }
   in.expect_end();
   return scene;

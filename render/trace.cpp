@@ -18,7 +18,7 @@ void prepare_thread() {
 
 std::optional<TracedHit> closest_hit(
     const Scene& scene, Vec3f origin, Vec3f direction, float near_m, unsigned mask, RayKind kind) {
-  TraceContext context(kind, false);
+  TraceContext context(scene, kind, false);
   RTCRayHit ray{};
   ray.ray = {.org_x = origin.x,
              .org_y = origin.y,
@@ -42,7 +42,7 @@ std::optional<TracedHit> closest_hit(
 
 Vec3f transmittance(
     const Scene& scene, Vec3f origin, Vec3f direction, float near_m, float far_m, unsigned mask) {
-  TraceContext context(RayKind::shadow, false);
+  TraceContext context(scene, RayKind::shadow, false);
   Vec3f share{1, 1, 1};
   context.transmittance_r = &share.x;
   context.transmittance_g = &share.y;

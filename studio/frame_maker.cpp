@@ -140,10 +140,11 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
 }
 
 void FrameMaker::build_scene() {
-  render::SceneDescription description = describe_scene(set_);
-  description.version = ++scene_version_;
+  SetScene described = describe_scene(set_);
+  described.description.version = ++scene_version_;
   try {
-    scene_ = std::make_shared<render::Scene>(std::move(description));
+    scene_ = std::make_shared<render::Scene>(described.description);
+    set_scene_ = std::move(described);
   } catch (const std::invalid_argument& error) {
     fail(set_, {}, error.what());
   }
@@ -245,12 +246,22 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
 }
 
 void FrameMaker::move_object(const std::string& name, const PlacementSettings& pose) {
-  const auto object = std::ranges::find(set_.objects, name, &ObjectSettings::name);
-  if (object == set_.objects.end()) {
+  const auto index_of = [&](std::string_view wanted) {
+    const auto found = std::ranges::find(set_.objects, wanted, &ObjectSettings::name);
+    return static_cast<std::size_t>(found - set_.objects.begin());
+  };
+  const std::size_t slash = name.find('/');
+  if (const std::size_t whole = index_of(name); whole < set_.objects.size()) {
+    set_.objects[whole].pose = pose;
+    place_object(set_, whole, set_scene_);
+  } else if (const std::size_t of_part = index_of(std::string_view(name).substr(0, slash));
+             slash != std::string::npos && of_part < set_.objects.size()) {
+    move_parts(set_, of_part, std::string_view(name).substr(slash + 1), pose, set_scene_);
+  } else {
     throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
   }
-  object->pose = pose;
-  build_scene();
+  set_scene_.description.version = ++scene_version_;
+  scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_);
 }
 
 void FrameMaker::change_set(Set set) {

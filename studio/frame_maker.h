@@ -15,6 +15,7 @@
 #include "render/renderer.h"
 #include "studio/light_feed.h"
 #include "studio/set.h"
+#include "studio/set_scene.h"
 #include "studio/source.h"
 
 namespace studio {
@@ -100,6 +101,7 @@ class FrameMaker {
   std::unique_ptr<LightFeed> light_;
   std::optional<calibrate::Track> track_;
   std::shared_ptr<const render::Scene> scene_;
+  SetScene set_scene_;
   std::shared_ptr<const calibrate::DirectionTable> directions_;
   std::shared_ptr<const calibrate::Lens> lens_;
   std::vector<render::LocalLight> lamps_;

@@ -120,23 +120,30 @@ void add_stand_in(SceneDescription& scene, const StandInSettings& stand_in, std:
   }
 }
 
-void place_copies(SceneDescription& scene,
+// Where a part stands in the set.
+Placement set_from_part(const ObjectSettings& object, const ObjectPart& part) {
+  // Steps are metres of the set, so the object's scale does not count.
+  const double scale = object.pose.scale;
+  const Placement step{1, 0, 0, static_cast<float>(part.copy[0] * object.spacing_m[0] / scale),
+                       0, 1, 0, static_cast<float>(part.copy[1] * object.spacing_m[1] / scale),
+                       0, 0, 1, 0};
+  const Placement set_from_copy = product(matrix_of(object.pose), step);
+  return product(product(set_from_copy, matrix_of(part.moved)), part.object_from_part);
+}
+
+void place_copies(SetScene& scene,
                   const ObjectSettings& object,
+                  std::size_t index,
                   const std::string& name,
-                  const std::vector<Instance>& parts) {
-  const Placement set_from_object = matrix_of(object.pose);
+                  const std::vector<Instance>& model) {
   for (int row = 0; row < object.copies[1]; ++row) {
     for (int column = 0; column < object.copies[0]; ++column) {
-      // Steps are metres of the set, so the object's scale does not count.
-      const double scale = object.pose.scale;
-      const Placement step{1, 0, 0, static_cast<float>(column * object.spacing_m[0] / scale),
-                           0, 1, 0, static_cast<float>(row * object.spacing_m[1] / scale),
-                           0, 0, 1, 0};
-      const Placement set_from_copy = product(set_from_object, step);
-      for (Instance part : parts) {
-        part.name = fmt::format("{}/{}", name, part.name);
-        part.set_from_object = product(set_from_copy, part.set_from_object);
-        scene.instances.push_back(std::move(part));
+      for (Instance instance : model) {
+        const ObjectPart& part = scene.parts.emplace_back(
+            ObjectPart{index, {column, row}, instance.name, instance.set_from_object});
+        instance.name = fmt::format("{}/{}", name, part.name);
+        instance.set_from_object = set_from_part(object, part);
+        scene.description.instances.push_back(std::move(instance));
       }
     }
   }
@@ -158,8 +165,9 @@ std::array<float, 12> matrix_of(const PlacementSettings& placement) {
   return result;
 }
 
-SceneDescription describe_scene(const Set& set) {
-  SceneDescription scene;
+SetScene describe_scene(const Set& set) {
+  SetScene result;
+  SceneDescription& scene = result.description;
   scene.background = "plate";
   Faults faults(set.path);
   // A model that several objects show is held once.
@@ -175,7 +183,7 @@ SceneDescription describe_scene(const Set& set) {
       if (found == loaded.end()) {
         found = loaded.emplace(key, add_model(scene, load_object(object))).first;
       }
-      place_copies(scene, object, name, found->second);
+      place_copies(result, object, i, name, found->second);
     } catch (const std::runtime_error& error) {
       faults.add(object.place, error.what());
     } catch (const std::invalid_argument& error) {
@@ -195,7 +203,40 @@ SceneDescription describe_scene(const Set& set) {
                                scene.instances.size(), most_instances));
     throw SetError(faults.sorted());
   }
-  return scene;
+  return result;
+}
+
+void place_object(const Set& set, std::size_t object, SetScene& scene) {
+  for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+    if (scene.parts[i].object != object) continue;
+    Instance& instance = scene.description.instances[i];
+    instance.set_from_object = set_from_part(set.objects[object], scene.parts[i]);
+    instance.moves = true;
+  }
+}
+
+void move_parts(const Set& set,
+                std::size_t object,
+                std::string_view part,
+                const PlacementSettings& by,
+                SetScene& scene) {
+  bool found = false;
+  std::string names;
+  for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+    ObjectPart& candidate = scene.parts[i];
+    if (candidate.object != object) continue;
+    if (candidate.copy == std::array{0, 0}) names += (names.empty() ? "" : ", ") + candidate.name;
+    if (!candidate.name.starts_with(part)) continue;
+    found = true;
+    candidate.moved = by;
+    Instance& instance = scene.description.instances[i];
+    instance.set_from_object = set_from_part(set.objects[object], candidate);
+    instance.moves = true;
+  }
+  if (!found) {
+    throw std::invalid_argument(fmt::format("object \"{}\" has no part \"{}...\"; it has: {}",
+                                            set.objects[object].name, part, names));
+  }
 }
 
 std::vector<render::LocalLight> describe_lamps(const Set& set) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "render/scene.h"
@@ -9,10 +11,37 @@
 
 namespace studio {
 
+// A part of one copy of an object: an instance of the scene.
+struct ObjectPart {
+  std::size_t object = 0;     // of the set
+  std::array<int, 2> copy{};  // column and row
+  std::string name;           // of its node in the model
+  std::array<float, 12> object_from_part{};
+  PlacementSettings moved{{}, 0, 0, 1};  // in the object's frame, from where the model has it
+};
+
+// A set's scene, and what it takes to move things in it.
+struct SetScene {
+  render::SceneDescription description;
+  std::vector<ObjectPart> parts;  // its first instances, in order
+};
+
 // The scene of a set: first all objects, each part of each copy an instance named "OBJECT/PART",
 // then the stand-ins. Camera rays that meet nothing see the plate. Throws SetError naming every
 // mesh that cannot be loaded, with its place in the set file.
-render::SceneDescription describe_scene(const Set& set);
+SetScene describe_scene(const Set& set);
+
+// Puts an object's parts to where the set says that the object is, and tells that they move. Loads
+// nothing.
+void place_object(const Set& set, std::size_t object, SetScene& scene);
+
+// Moves the parts of an object whose names begin with `part` from where the model has them. Throws
+// std::invalid_argument, listing the parts, if there is none.
+void move_parts(const Set& set,
+                std::size_t object,
+                std::string_view part,
+                const PlacementSettings& by,
+                SetScene& scene);
 
 // Rows of the 3x4 matrix set_from_object of a placement.
 std::array<float, 12> matrix_of(const PlacementSettings& placement);

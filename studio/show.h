@@ -26,6 +26,8 @@ struct StartRecording {
   RecordSettings record;
 };
 struct StopRecording {};
+// An object to a place in the set; or, by the name "OBJECT/PART", its parts whose names begin so by
+// a step in the object's own frame from where the model has them.
 struct MoveObject {
   std::string name;
   PlacementSettings pose;

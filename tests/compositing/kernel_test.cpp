@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <new>
+#include <random>
 
 #include "../render/sun_and_sky.h"
 #include "made_shot.h"
@@ -120,6 +121,38 @@ TEST(RenderFrame, IsTheSameColdAndWarm) {
     EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
     const bool reused = frame == 1 || frame == 2;
     EXPECT_EQ(warm.statistics.primary_rays < cold.statistics.primary_rays, reused) << frame;
+  }
+}
+
+// Objects move from frame to frame, in random steps; what is kept, and shared between scenes, must
+// not show.
+TEST(RenderFrame, IsTheSameColdAndWarmWhileThingsMove) {
+  render::SceneDescription scene = made_scene();
+  scene.instances[2].moves = true;
+  MadeShot shot = made_shot(96, 64, scene);
+  render::KeptTransport kept;
+  std::mt19937 random(3);
+  std::vector<capture::Half> last;
+  for (int frame = 0; frame < 6; ++frame) {
+    if (frame % 3 != 2) {  // every third stands still
+      for (const std::size_t i : {3U, 7U}) {
+        scene.instances[2].set_from_object[i] =
+            std::uniform_real_distribution<float>(-0.5F, 0.5F)(random);
+      }
+    }
+    shot.scene = std::make_unique<render::Scene>(scene, *shot.scene);
+    render::FrameInputs inputs = shot.inputs();
+    inputs.kept = &kept;
+    FrameResult warm, cold;
+    render_frame(inputs, shot.job, shot.plate, warm);
+    const render::Scene built(scene);
+    inputs.scene = &built;
+    inputs.kept = nullptr;
+    render_frame(inputs, shot.job, shot.plate, cold);
+    EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
+    EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
+    EXPECT_NE(warm.rgba.pixels == last, frame % 3 != 2) << frame;
+    last = warm.rgba.pixels;
   }
 }
 

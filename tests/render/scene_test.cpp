@@ -107,6 +107,37 @@ TEST(Scene, GivesTheSameHitPlacedOnceOrAsAnInstance) {
   EXPECT_TRUE(look_down(b, {100, 4.1F, 20}));
 }
 
+TEST(Scene, MovesWhatIsToldToMoveWithoutBuildingAnew) {
+  SceneDescription description = one_square();
+  description.meshes.push_back(square(1, 0));
+  description.instances.emplace_back().mesh = 1;
+  description.instances[1].set_from_object[11] = 1;
+  description.instances[1].moves = true;
+  const Scene before(description);
+  description.instances[1].set_from_object = {0, -1, 0, 30, 1, 0, 0, 0, 0, 0, 1, 2};
+  const Scene cold(description), warm(description, before);
+  EXPECT_NE(before.id(), warm.id());
+  for (const float x : {-0.3F, 0.2F, 29.9F, 30.3F, 50.0F}) {
+    const auto a = look_down(cold, {x, 0.1F, 20}), b = look_down(warm, {x, 0.1F, 20});
+    ASSERT_EQ(a.has_value(), b.has_value()) << x;
+    EXPECT_EQ(a.has_value(), x < 40) << x;
+    if (!a) continue;
+    EXPECT_EQ(a->distance, b->distance);
+    const HitPoint p = cold.hit_point(a->geom_id, a->prim_id, a->inst_id, a->u, a->v, {0, 0, -1});
+    const HitPoint q = warm.hit_point(b->geom_id, b->prim_id, b->inst_id, b->u, b->v, {0, 0, -1});
+    EXPECT_EQ(p.position, q.position);
+    EXPECT_EQ(p.instance, x > 10 ? 1U : 0U);
+    EXPECT_EQ(q.instance, p.instance);
+    EXPECT_NEAR(p.position.z, x > 10 ? 3 : 1, 1e-5F);
+  }
+  EXPECT_EQ(cold.bounds().upper, warm.bounds().upper);
+  EXPECT_GT(warm.bounds().upper.x, 30);
+  EXPECT_EQ(cold.blocker_boxes().size(), warm.blocker_boxes().size());
+  // Whatever else differs is built anew.
+  description.instances[0].set_from_object[3] = -50;
+  EXPECT_FALSE(look_down(Scene(description, warm), {0, 0.1F, 20}));
+}
+
 TEST(Scene, LeavesOutTrianglesThatAreNotFiniteAndCountsThem) {
   SceneDescription scene = one_square();
   auto mesh = std::make_shared<Mesh>(*scene.meshes[0]);

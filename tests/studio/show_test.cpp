@@ -180,6 +180,22 @@ TEST_F(ShowTest, TakesEffortMovesAndPausesWhileItRuns) {
   EXPECT_LE(show.status()->lights, 4U);
 }
 
+TEST_F(ShowTest, MovesObjectsAndPartsInTheVeryNextFrameWithoutLoadingThemAgain) {
+  Set set = made_set("grey:1,25,0");
+  FrameMaker maker(set);
+  for (const ObjectSettings& object : set.objects) std::filesystem::remove(object.mesh);
+  const auto instance = [&] { return maker.make(0)->scene->description().instances[0]; };
+  const render::Instance before = instance();
+  const std::string part = before.name.substr(before.name.find('/') + 1);
+  maker.move_object("cube", {{1.5, 0, 0}, 0, 0, 1});
+  EXPECT_EQ(instance().set_from_object[3], 1.5F);
+  EXPECT_TRUE(instance().moves);
+  maker.move_object("cube/" + part.substr(0, 2), {{0, 0.25, 0}, 0, 0, 1});
+  EXPECT_EQ(instance().set_from_object[3], 1.5F);
+  EXPECT_EQ(instance().set_from_object[7], before.set_from_object[7] + 0.25F);
+  EXPECT_THROW(maker.move_object("cube/spare wheel", {}), std::invalid_argument);
+}
+
 TEST_F(ShowTest, NotesWhatACommandCannotDoAndGoesOn) {
   ShowOptions options;
   options.frames = 5;

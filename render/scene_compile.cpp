@@ -1,0 +1,241 @@
+// Scenes into Embree's trees: once what stands still, then again and again what moves.
+#include <algorithm>
+#include <stdexcept>
+
+#include "render/scene_parts.h"
+#include "render/transform.h"
+
+namespace render {
+namespace {
+
+unsigned mask_of(const Instance& instance) {
+  if (instance.kind == ObjectKind::virtual_object) return mask_virtual;
+  return mask_stand_in | (instance.blocks_light ? mask_real_blocker : 0U) |
+         (instance.occludes ? mask_occluder : 0U);
+}
+
+Scene::Bounds bounds_of(const Mesh& mesh, const std::array<float, 12>& m) {
+  Scene::Bounds bounds = no_bounds;
+  for (const Vec3f& position : mesh.positions) {
+    const Vec3f p = transform_point(m, position);
+    if (is_finite(p)) bounds = joined(bounds, {p, p});
+  }
+  return bounds;
+}
+
+// A box around a box that is moved.
+Scene::Bounds moved(const Scene::Bounds& box, const std::array<float, 12>& m) {
+  if (!(box.lower.x <= box.upper.x)) return no_bounds;
+  Scene::Bounds bounds = no_bounds;
+  for (unsigned i = 0; i < 8; ++i) {
+    const Vec3f p =
+        transform_point(m, {(i & 1U ? box.upper : box.lower).x, (i & 2U ? box.upper : box.lower).y,
+                            (i & 4U ? box.upper : box.lower).z});
+    bounds = joined(bounds, {p, p});
+  }
+  return bounds;
+}
+
+bool is_built(RTCDevice device) {
+  const RTCError error = rtcGetDeviceError(device);
+  if (error == RTC_ERROR_NONE) return true;
+  throw std::runtime_error("Embree could not build the scene (error " +
+                           std::to_string(static_cast<int>(error)) + "): is memory short?");
+}
+
+}  // namespace
+
+void Scene::Compiled::build(const SceneDescription& description) {
+  for (const Material& material : description.materials) {
+    const std::shared_ptr<const Shader>& shader =
+        shaders.emplace_back(find_shader(material.shader));
+    shader->check(description, material);
+    shadow.push_back(shader->shadow_everywhere(material));
+    filtered.push_back(shader->lets_light_through(material) ? 1 : 0);
+    glass.push_back(material.shader == "glass" ? std::optional(make_glass(material))
+                                               : std::nullopt);
+    has_glass = has_glass || glass.back();
+  }
+  background = find_background(description.background);
+  device = rtcNewDevice("");
+  if (!device) throw std::runtime_error("Embree could not start on this machine");
+  placed = rtcNewScene(device);
+  rtcSetSceneBuildQuality(placed, RTC_BUILD_QUALITY_MEDIUM);
+
+  const std::size_t meshes = description.meshes.size();
+  std::vector<int> uses(meshes, 0);
+  may_stand_back.assign(meshes, 0);
+  instanced.assign(meshes, 0);
+  mesh_bounds.assign(meshes, no_bounds);
+  for (const Instance& instance : description.instances) {
+    if (++uses[instance.mesh] > 1 || instance.moves) instanced[instance.mesh] = 1;
+    two_level = two_level || instance.moves;
+    if (instance.kind == ObjectKind::stand_in && !instance.occludes) {
+      may_stand_back[instance.mesh] = 1;
+    }
+  }
+  mesh_scenes.assign(meshes, nullptr);
+  parts_of_mesh.resize(meshes);
+  for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
+    const Instance& instance = description.instances[i];
+    const Mesh& mesh = *description.meshes[instance.mesh];
+    normal_matrices.push_back(normal_matrix(instance.set_from_object));
+    if (instance.moves) {
+      mesh_bounds[instance.mesh] = bounds_of(mesh, Instance{}.set_from_object);
+    } else {
+      const Bounds bounds = bounds_of(mesh, instance.set_from_object);
+      all_bounds = joined(all_bounds, bounds);
+      if (instance.kind == ObjectKind::virtual_object) {
+        virtual_bounds = joined(virtual_bounds, bounds);
+      }
+    }
+    real_blockers |= instance.kind == ObjectKind::stand_in && instance.blocks_light;
+    if (mesh.triangles.empty()) continue;
+    if (instanced[instance.mesh] == 0) {
+      add_parts(description, instance.mesh, i, mask_of(instance), placed);
+    } else if (RTCScene& inner = mesh_scenes[instance.mesh]; !inner) {
+      inner = rtcNewScene(device);
+      add_parts(description, instance.mesh, Part::none, ~0U, inner);
+      rtcCommitScene(inner);
+    }
+  }
+  if (two_level) rtcCommitScene(placed);
+  blocker_boxes = find_blocker_boxes(description);
+  is_built(device);
+}
+
+void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
+  RTCGeometry geometry = rtcNewGeometry(compiled->device, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, inner);
+  const bool all_placed = instance == Part::none;
+  const Instance still;
+  const Instance& placing = all_placed ? still : description.instances[instance];
+  rtcSetGeometryMask(geometry, all_placed ? ~0U : mask_of(placing));
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR,
+                          placing.set_from_object.data());
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(scene, geometry, static_cast<unsigned>(instance_of_geometry.size()));
+  rtcReleaseGeometry(geometry);
+  instance_of_geometry.push_back(instance);
+}
+
+// Puts the scene together from what is compiled.
+void Scene::Impl::assemble() {
+  const Compiled& c = *compiled;
+  if (c.two_level) {
+    scene = rtcNewScene(c.device);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
+    if (!c.part_of_geometry.empty()) add_instance(Part::none, c.placed);
+  } else {
+    scene = c.placed;
+    rtcRetainScene(scene);
+    instance_of_geometry.assign(c.part_of_geometry.size(), Part::none);
+  }
+  virtual_bounds = c.virtual_bounds;
+  all_bounds = c.all_bounds;
+  blocker_boxes = c.blocker_boxes;
+  normal_matrices = c.normal_matrices;
+  for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
+    const Instance& instance = description.instances[i];
+    mirrored.push_back(determinant(instance.set_from_object) < 0 ? 1 : 0);
+    if (RTCScene inner = c.mesh_scenes[instance.mesh]) add_instance(i, inner);
+    if (!instance.moves) continue;
+    normal_matrices[i] = normal_matrix(instance.set_from_object);
+    const Bounds bounds = moved(c.mesh_bounds[instance.mesh], instance.set_from_object);
+    all_bounds = joined(all_bounds, bounds);
+    if (instance.kind == ObjectKind::virtual_object) {
+      virtual_bounds = joined(virtual_bounds, bounds);
+    }
+    if (blocks(instance) && bounds.lower.x <= bounds.upper.x) blocker_boxes.push_back(bounds);
+  }
+  for (const Bounds& box : blocker_boxes) blocker_bounds = joined(blocker_bounds, box);
+  rtcCommitScene(scene);
+  is_built(c.device);
+}
+
+void Scene::Compiled::add_parts(const SceneDescription& description,
+                                std::uint32_t mesh_index,
+                                std::uint32_t instance,
+                                unsigned mask,
+                                RTCScene target) {
+  const Mesh& mesh = *description.meshes[mesh_index];
+  std::vector<std::uint32_t> opaque, with_filter;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    if (!is_finite(mesh.positions[a]) || !is_finite(mesh.positions[b]) ||
+        !is_finite(mesh.positions[c])) {
+      ++skipped;
+      continue;
+    }
+    (filtered[material_of(mesh, t)] ? with_filter : opaque).push_back(t);
+  }
+  const bool all = with_filter.empty() && opaque.size() == mesh.triangles.size();
+  if (!opaque.empty())
+    add_part(description, mesh_index, instance, mask, target, false, opaque, all);
+  if (!with_filter.empty()) {
+    filters = true;
+    add_part(description, mesh_index, instance, mask, target, true, with_filter, false);
+  }
+}
+
+void Scene::Compiled::add_part(const SceneDescription& description,
+                               std::uint32_t mesh_index,
+                               std::uint32_t instance,
+                               unsigned mask,
+                               RTCScene target,
+                               bool with_filter,
+                               const std::vector<std::uint32_t>& triangles,
+                               bool all) {
+  const Mesh& mesh = *description.meshes[mesh_index];
+  auto part = std::make_unique<Part>();
+  part->mesh = mesh_index;
+  part->instance = instance;
+  if (!all) part->triangle_of_prim = triangles;
+
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* positions = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                                RTC_FORMAT_FLOAT3, sizeof(Vec3f),
+                                                                mesh.positions.size()));
+  auto* indices = static_cast<std::array<std::uint32_t, 3>*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                              sizeof(std::array<std::uint32_t, 3>), triangles.size()));
+  if (!positions || !indices) throw std::runtime_error("not enough memory for a mesh");
+  for (std::size_t i = 0; i < triangles.size(); ++i) indices[i] = mesh.triangles[triangles[i]];
+  if (instance == Part::none) {
+    std::copy(mesh.positions.begin(), mesh.positions.end(), positions);
+  } else {
+    const auto& m = description.instances[instance].set_from_object;
+    std::transform(mesh.positions.begin(), mesh.positions.end(), positions,
+                   [&m](Vec3f p) { return transform_point(m, p); });
+    part->normals.reserve(mesh.normals.size());
+    for (const Vec3f& n : mesh.normals) {
+      part->normals.push_back(transform_normal(normal_matrices[instance], n));
+    }
+  }
+  // Vertices that no triangle of ours uses may hold anything; Embree must not see NaN there.
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    if (!is_finite(positions[i])) positions[i] = {};
+  }
+  part->positions = positions;
+  rtcSetGeometryMask(geometry, mask);
+  rtcSetGeometryUserData(geometry, part.get());
+  const bool holes = std::ranges::any_of(
+      triangles, [&](std::uint32_t t) { return !shadow[material_of(mesh, t)]; });
+  if ((with_filter && holes) || may_stand_back[mesh_index]) {
+    rtcSetGeometryIntersectFilterFunction(geometry, Impl::filter_closest);
+  }
+  if (with_filter) rtcSetGeometryOccludedFilterFunction(geometry, Impl::filter_any);
+  rtcCommitGeometry(geometry);
+  if (instance == Part::none) {
+    auto& inner = parts_of_mesh[mesh_index];
+    rtcAttachGeometryByID(target, geometry, static_cast<unsigned>(inner.size()));
+    inner.push_back(part.get());
+  } else {
+    rtcAttachGeometryByID(target, geometry, static_cast<unsigned>(part_of_geometry.size()));
+    part_of_geometry.push_back(part.get());
+  }
+  rtcReleaseGeometry(geometry);
+  parts.push_back(std::move(part));
+}
+
+}  // namespace render
