@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <queue>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -61,37 +60,6 @@ std::vector<Material> make_materials(const MadeCarSettings& settings) {
   set(CarMaterial::plate, "plate", plain(0.75F, 0.75F, 0.72F, 0.35F));
   set(CarMaterial::seam, "seam", plain(0.004F, 0.004F, 0.004F, 1));
   return materials;
-}
-
-// Halves the largest triangles along their longest edges until there are `count` more.
-void halve_largest(Mesh& mesh, std::size_t count) {
-  const auto area_of = [&mesh](std::size_t t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    return length(
-        cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]));
-  };
-  std::priority_queue<std::pair<float, std::size_t>> by_area;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) by_area.push({area_of(t), t});
-  for (; count > 0; --count) {
-    const std::size_t t = by_area.top().second;
-    by_area.pop();
-    auto [a, b, c] = mesh.triangles[t];
-    const auto edge = [&mesh](std::uint32_t p, std::uint32_t q) {
-      return length(mesh.positions[q] - mesh.positions[p]);
-    };
-    while (edge(a, b) < edge(b, c) || edge(a, b) < edge(c, a)) {
-      const std::uint32_t first = a;
-      a = b, b = c, c = first;
-    }
-    const auto middle = static_cast<std::uint32_t>(mesh.positions.size());
-    mesh.positions.push_back((mesh.positions[a] + mesh.positions[b]) * 0.5F);
-    mesh.normals.push_back(normalize(mesh.normals[a] + mesh.normals[b]));
-    mesh.triangles[t] = {a, middle, c};
-    mesh.triangles.push_back({middle, b, c});
-    mesh.materials.push_back(mesh.materials[t]);
-    by_area.push({area_of(t), t});
-    by_area.push({area_of(mesh.triangles.size() - 1), mesh.triangles.size() - 1});
-  }
 }
 
 }  // namespace

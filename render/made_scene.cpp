@@ -27,8 +27,12 @@ void MadeSceneBuilder::add(const std::string& name,
   parameters.metallic = metallic;
   parameters.specular = specular;
   parameters.base_color_texture = texture;
+  add(name, std::move(mesh), make_standard_material(name, parameters));
+}
+
+void MadeSceneBuilder::add(const std::string& name, Mesh mesh, Material material) {
   mesh.materials = {static_cast<std::uint32_t>(scene_.materials.size())};
-  scene_.materials.push_back(make_standard_material(name, parameters));
+  scene_.materials.push_back(std::move(material));
   Instance instance;
   instance.name = name;
   instance.mesh = static_cast<std::uint32_t>(scene_.meshes.size());

@@ -9,8 +9,8 @@
 
 namespace render {
 
-// Gathers things of standard surfaces; each becomes an instance with a mesh and a material of its
-// own.
+// Gathers things, most of them of standard surfaces; each becomes an instance with a mesh and a
+// material of its own.
 class MadeSceneBuilder {
  public:
   // Returns the texture's index, for things that wear it.
@@ -24,6 +24,8 @@ class MadeSceneBuilder {
            std::int32_t texture = -1,
            float specular = 1,
            float metallic = 0);
+  // A thing of any one material, of the shader that it names.
+  void add(const std::string& name, Mesh mesh, Material material);
 
   SceneDescription take();
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <queue>
 #include <utility>
 
 namespace render {
@@ -194,6 +195,40 @@ void smooth_normals(Mesh& mesh) {
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const Vec3f normal = normalize(sums[i]);
     mesh.normals[i] = dot(normal, normal) > 0.5F ? normal : Vec3f{0, 0, 1};
+  }
+}
+
+void halve_largest(Mesh& mesh, std::size_t count) {
+  const auto area_of = [&mesh](std::size_t t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    return length(
+        cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a]));
+  };
+  std::priority_queue<std::pair<float, std::size_t>> by_area;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) by_area.push({area_of(t), t});
+  for (; count > 0; --count) {
+    const std::size_t t = by_area.top().second;
+    by_area.pop();
+    auto [a, b, c] = mesh.triangles[t];
+    const auto edge = [&mesh](std::uint32_t p, std::uint32_t q) {
+      return length(mesh.positions[q] - mesh.positions[p]);
+    };
+    while (edge(a, b) < edge(b, c) || edge(a, b) < edge(c, a)) {
+      const std::uint32_t first = a;
+      a = b, b = c, c = first;
+    }
+    const auto middle = static_cast<std::uint32_t>(mesh.positions.size());
+    mesh.positions.push_back((mesh.positions[a] + mesh.positions[b]) * 0.5F);
+    mesh.normals.push_back(normalize(mesh.normals[a] + mesh.normals[b]));
+    if (!mesh.uvs.empty()) {
+      mesh.uvs.push_back(
+          {(mesh.uvs[a][0] + mesh.uvs[b][0]) / 2, (mesh.uvs[a][1] + mesh.uvs[b][1]) / 2});
+    }
+    mesh.triangles[t] = {a, middle, c};
+    mesh.triangles.push_back({middle, b, c});
+    if (mesh.materials.size() > 1) mesh.materials.push_back(mesh.materials[t]);
+    by_area.push({area_of(t), t});
+    by_area.push({area_of(mesh.triangles.size() - 1), mesh.triangles.size() - 1});
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -67,6 +68,10 @@ class CoveredArea {
 
 // Gives every vertex the mean of its triangles' normals, weighted by area.
 void smooth_normals(Mesh& mesh);
+
+// Halves the largest triangles along their longest edges until there are `count` more: no shape is
+// changed. Their neighbours are left as they are.
+void halve_largest(Mesh& mesh, std::size_t count);
 
 // Mirrors at y = 0.
 void add_mirrored(Mesh& mesh, const Mesh& part);
