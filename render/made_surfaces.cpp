@@ -206,4 +206,47 @@ Texture make_concrete_texture(int size, std::uint32_t seed) {
   });
 }
 
+Texture make_carpet_texture(int size, std::uint32_t seed) {
+  return paint_texture(size, [=](int x, int y, float u, float v) {
+    const float from_edge = std::min({u, v, 1 - u, 1 - v});
+    const float lozenge =
+        std::abs(u * 6 - std::floor(u * 6) - 0.5F) + std::abs(v * 6 - std::floor(v * 6) - 0.5F);
+    const Vec3f red{0.30F, 0.035F, 0.03F}, cream{0.48F, 0.40F, 0.28F}, blue{0.03F, 0.05F, 0.13F};
+    Vec3f wool = mix(red, blue, band(lozenge - 0.5F, 0.09F, 0.02F));
+    wool = mix(wool, cream, band(lozenge - 0.2F, 0.05F, 0.02F));
+    wool = mix(wool, blue, 1 - smooth_step(0.085F, 0.09F, from_edge));
+    wool = mix(wool, cream, band(from_edge - 0.055F, 0.014F, 0.003F));
+    const float knots =
+        1 + 0.25F * grain(x, y, seed) + 0.3F * fractal_noise(u * 64, v * 64, 3, seed + 1, 64);
+    return wool * knots;
+  });
+}
+
+Texture make_screen_texture(int size) {
+  return paint_texture(size, [=](int, int, float u, float v) {
+    constexpr float horizon = 0.58F;
+    const float from_sun = std::hypot((u - 0.68F) * 1.3F, v - 0.42F);
+    const float glow = std::exp(-7 * from_sun * from_sun);
+    Vec3f colour = mix({0.10F, 0.22F, 0.60F}, {0.95F, 0.45F, 0.16F}, smooth_step(0, horizon, v));
+    const float clouds = fractal_noise(u * 5, v * 16, 4, 3);
+    colour = mix(colour, {1.0F, 0.72F, 0.5F}, 0.8F * smooth_step(0.05F, 0.5F, clouds));
+    colour = mix(colour, {1.0F, 0.85F, 0.5F}, glow);
+    colour = mix({1, 0.97F, 0.8F}, colour, smooth_step(0.07F, 0.08F, from_sun));
+    if (v > horizon) {
+      const float depth = v - horizon;
+      const float waves = fractal_noise(u * 8 / (0.1F + depth), 6 / (0.05F + depth), 3, 4);
+      const float path = std::exp(-30 * (u - 0.68F) * (u - 0.68F) / (0.3F + 2 * depth));
+      colour =
+          mix({0.03F, 0.14F, 0.26F}, {1.0F, 0.66F, 0.3F}, path * smooth_step(-0.2F, 0.3F, waves));
+    }
+    const float sail = band(u - 0.27F, 0.10F * std::max(0.0F, v - 0.28F), 0.004F);
+    if (v > 0.28F && v < 0.6F) colour = mix(colour, {0.95F, 0.92F, 0.88F}, sail);
+    if (v >= 0.6F && v < 0.65F) {
+      colour =
+          mix(colour, {0.25F, 0.02F, 0.02F}, band(u - 0.27F, 0.09F - 0.6F * (v - 0.6F), 0.004F));
+    }
+    return colour;
+  });
+}
+
 }  // namespace render

@@ -30,4 +30,10 @@ Texture make_board_texture(int size, std::uint32_t seed);
 // Rough plain concrete.
 Texture make_concrete_texture(int size, std::uint32_t seed);
 
+// A woven carpet with a border; fills its square once.
+Texture make_carpet_texture(int size, std::uint32_t seed);
+
+// What a made television shows: a bright sunset over the sea, upright.
+Texture make_screen_texture(int size);
+
 }  // namespace render
