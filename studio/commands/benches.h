@@ -10,6 +10,14 @@ namespace studio {
 // The kernel against bare Embree over the same rays, the best of `runs`.
 void bench_kernel(int runs, Console& console);
 
+struct PapersBench {
+  int runs = 5;
+  int check = 64;        // paths a pixel of the reference; 0 = no error
+  std::string pictures;  // directory, or none
+};
+// Both papers' scenes at 640x480: the papers' table with ours beside it.
+void bench_papers(const PapersBench& bench, Console& console);
+
 // CPU time a frame that a set's inputs take: plate, probe, light table; the best of `runs` passes.
 // Throws SetError.
 void bench_inputs(const std::string& set_path, int runs, Console& console);

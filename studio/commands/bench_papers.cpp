@@ -1,0 +1,167 @@
+// platelight bench papers: the scenes of both papers, their figures and ours.
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <string>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "capture/png.h"
+#include "compositing/display.h"
+#include "render/paper_scenes.h"
+#include "studio/commands/benches.h"
+#include "studio/commands/kernel_rate.h"
+#include "studio/machine.h"
+#include "studio/picture_error.h"
+
+namespace studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int width = 640, height = 480;
+
+struct PaperShot {
+  BenchScene shot;
+  double compile_ms = 0;
+};
+
+// A scene as a show would have it: its light followed, compact sources apart.
+PaperShot make_shot(const render::PaperScene& paper) {
+  PaperShot made;
+  BenchScene& shot = made.shot;
+  const auto start = std::chrono::steady_clock::now();
+  shot.scene = std::make_unique<render::Scene>(paper.scene);
+  made.compile_ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  const double focal_px = 0.5 * width / std::tan(0.5 * paper.horizontal_view_rad);
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}});
+  render::LightFollower follower;
+  BenchLight light =
+      follow_bench_sky(follower, paper.environment, {.count = render::Effort{}.light_samples});
+  shot.environment = std::move(light.environment);
+  shot.plate = capture::make_image(height, width, 3);
+  shot.half_plate = capture::to_half(shot.plate);
+  shot.job.cam_from_set = paper.cam_from_set;
+  shot.job.lights = std::move(light.table);
+  shot.job.lights.lamps = paper.lamps;
+  return made;
+}
+
+// As the papers did while anything moved: one ray a pixel, and the contribution cut at 95 %.
+render::Effort papers_effort() {
+  render::Effort effort;
+  effort.aa_samples = 1;
+  effort.accuracy = 0.95F;
+  return effort;
+}
+
+double error_of(const BenchScene& shot,
+                const render::FrameJob& job,
+                const Truth& truth,
+                capture::Image& picture) {
+  render::FrameResult result;
+  render_frame(shot.inputs(), job, shot.half_plate, result);
+  picture = capture::to_float(result.rgba);
+  return render::picture_error(picture, truth.references, truth.mask).relative_rms;
+}
+
+void write_picture(const std::string& path, const capture::Image& rgba) {
+  const compositing::Display display;
+  std::vector<std::uint8_t> codes(rgba.pixels.size() / 4 * 3);
+  display.to_rgb8(capture::to_half(rgba), codes);
+  capture::write_png(path, rgba.width, rgba.height, 3, codes);
+}
+
+Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
+  const render::PaperScene paper = render::made_paper_scene(name);
+  const auto [shot, compile_ms] = make_shot(paper);
+  render::FrameJob fast = shot.job;
+  fast.effort = papers_effort();
+  render::FrameJob plain = fast;
+  plain.effort = plain_effort(plain.effort);
+  const KernelRate share = measure_kernel(shot, plain, bench.runs);
+  const KernelRate moving = measure_kernel(shot, fast, bench.runs);
+  const KernelRate whole = measure_kernel(shot, shot.job, 1);
+  const double still_ms = measure_kept(shot, shot.job, bench.runs);
+  Json row{{"scene", name},
+           {"triangles", triangle_count(paper.scene)},
+           {"width", width},
+           {"height", height},
+           {"threads", tbb::this_task_arena::max_concurrency()},
+           {"fps", 1000 / moving.kernel_ms},
+           {"fps_default", 1000 / whole.kernel_ms},
+           {"fps_still", 1000 / still_ms},
+           {"rays_per_frame", moving.rays},
+           {"rays_per_frame_default", whole.rays},
+           {"embree_share", share.bare_ms / share.kernel_ms},
+           {"compile_ms", compile_ms},
+           {"error", nullptr},
+           {"error_default", nullptr}};
+  capture::Image picture;
+  if (bench.check > 0) {
+    const Truth truth = truth_of(shot.plate, [&](std::uint32_t seed) {
+      return render_reference(shot.inputs(), shot.job, shot.plate,
+                              {.samples = std::max(1, bench.check / 2), .seed = seed});
+    });
+    row["error"] = error_of(shot, fast, truth, picture);
+    row["error_default"] = error_of(shot, shot.job, truth, picture);
+    if (!bench.pictures.empty()) {
+      write_picture(fmt::format("{}/{}_reference.png", bench.pictures, name), truth.references[0]);
+    }
+  } else {
+    render::FrameResult result;
+    render_frame(shot.inputs(), shot.job, shot.half_plate, result);
+    picture = capture::to_float(result.rgba);
+  }
+  if (!bench.pictures.empty()) {
+    write_picture(fmt::format("{}/{}.png", bench.pictures, name), picture);
+  }
+  const auto figures = render::paper_figures();
+  const auto theirs = std::ranges::find(figures, name, &render::PaperFigure::scene);
+  if (theirs != figures.end()) {
+    row["paper"] = {{"source", theirs->source},
+                    {"triangles", theirs->triangles},
+                    {"cpus", theirs->cpus},
+                    {"fps", theirs->fps}};
+  }
+  const auto percent = [&](const char* key) {
+    return row[key].is_null() ? std::string("-") : fmt::format("{:.1f} %", 100 * double{row[key]});
+  };
+  console.say(fmt::format(
+      "{:<13} {:>9} {:>8} {:>10.1f} {:>7} {:>9.1f} {:>7} {:>8.1f} {:>9.2f} M {:>7.0f} %", name,
+      std::size_t{row["triangles"]},
+      theirs != figures.end() ? fmt::format("{:.1f}", theirs->fps) : "-", double{row["fps"]},
+      percent("error"), double{row["fps_default"]}, percent("error_default"),
+      double{row["fps_still"]}, 1e-6 * static_cast<double>(moving.rays),
+      100 * share.bare_ms / share.kernel_ms));
+  return row;
+}
+
+}  // namespace
+
+void bench_papers(const PapersBench& bench, Console& console) {
+  if (!bench.pictures.empty()) std::filesystem::create_directories(bench.pictures);
+  console.say(
+      "              triangles    paper   1 ray a    error   default   error    still       rays   "
+      "share of");
+  console.say(
+      "                             fps  pixel, fps          moving            fps      "
+      "           Embree");
+  Json rows = Json::array();
+  for (const std::string_view name : render::paper_scene_names()) {
+    rows.push_back(row_of(name, bench, console));
+  }
+  const Machine machine = this_machine();
+  console.figures(Json{
+      {"rows", rows},
+      {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}}}}
+                      .dump(2));
+}
+
+}  // namespace studio

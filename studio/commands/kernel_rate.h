@@ -1,0 +1,26 @@
+// How fast the kernel is, beside bare Embree over the same rays.
+#pragma once
+
+#include <cstddef>
+
+#include "studio/bench_scene.h"
+
+namespace studio {
+
+struct KernelRate {
+  double kernel_ms = 0;
+  double bare_ms = 0;  // the same rays, nothing but Embree, its best mode
+  std::size_t rays = 0;
+};
+
+// The best of `runs`. Kernel and bare loop take turns, so that both see the same noise of the
+// machine.
+KernelRate measure_kernel(const BenchScene& shot, const render::FrameJob& job, int runs);
+
+// A frame of a still shot, all of whose transport is kept: milliseconds, the best of `runs`.
+double measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs);
+
+// Every pixel tests every light that it faces, and nothing adapts.
+render::Effort plain_effort(render::Effort effort);
+
+}  // namespace studio
