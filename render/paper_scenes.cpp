@@ -8,6 +8,7 @@
 
 #include "render/join_scenes.h"
 #include "render/made_car.h"
+#include "render/made_headlight.h"
 #include "render/made_sky.h"
 #include "render/made_soft_boxes.h"
 #include "render/made_stage.h"
@@ -21,12 +22,15 @@ constexpr int map_height = 256;
 
 constexpr std::string_view pomi = "Pomi et al., VMV 2003, table 1";
 
-constexpr std::array<PaperFigure, 5> figures{{
+constexpr std::string_view benthin = "Benthin et al., EGPGV 2002, section 5";
+
+constexpr std::array<PaperFigure, 6> figures{{
     {"tv_room", pomi, made_tv_room_triangles, 24, 640, 480, 19},
     {"tv_room_lit", pomi, made_tv_room_triangles, 24, 640, 480, 5.5},
     {"billboards", pomi, made_stage_triangles, 24, 640, 480, 10},
     {"glass_sphere", pomi, made_stage_triangles + glass_sphere_triangles, 24, 640, 480, 6.4},
     {"car", pomi, made_car_triangles, 24, 640, 480, 2.6},
+    {"headlight", benthin, made_headlight_triangles, 32, 640, 480, 10},
 }};
 
 Environment smoothed(const capture::Image& map) {
@@ -102,6 +106,15 @@ PaperScene make_car_scene() {
   return made;
 }
 
+PaperScene make_headlight_scene() {
+  PaperScene made;
+  made.scene = make_headlight();
+  made.cam_from_set = calibrate::look_at({0.63, 0.24, 0.06}, {-0.035, 0, 0.002}, 0);
+  made.horizontal_view_rad = 26 * degree;
+  made.environment = make_daylight();
+  return made;
+}
+
 }  // namespace
 
 std::span<const PaperFigure> paper_figures() { return figures; }
@@ -120,6 +133,8 @@ PaperScene made_paper_scene(std::string_view name) {
     made = make_billboards(name == "glass_sphere");
   } else if (name == "car") {
     made = make_car_scene();
+  } else if (name == "headlight") {
+    made = make_headlight_scene();
   } else {
     std::string known;
     for (const PaperFigure& figure : figures) {
