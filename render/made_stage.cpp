@@ -27,7 +27,7 @@ Material polished(const std::string& name, std::array<float, 3> base, std::int32
   std::ranges::copy(base, p.base_color);
   p.base_color_texture = texture;
   p.roughness = 0.8F;
-  p.specular = 0.1F;
+  p.specular = 0;
   p.clearcoat = 1;
   return make_standard_material(name, p);
 }
@@ -65,8 +65,8 @@ void add_columns(MadeSceneBuilder& stage) {
     append(square, make_box_faces({x - 0.28F, 1.92F, 2.9F}, {x + 0.28F, 2.48F, 3.05F},
                                   "-x +x -y +y -z +z", 1));
   }
-  stage.add("columns", std::move(round), {0.72F, 0.68F, 0.60F}, 0.9F, -1, 0.1F);
-  stage.add("plinths", std::move(square), {0.62F, 0.58F, 0.50F}, 0.9F, -1, 0.1F);
+  stage.add("columns", std::move(round), {0.72F, 0.68F, 0.60F}, 1, -1, 0);
+  stage.add("plinths", std::move(square), {0.62F, 0.58F, 0.50F}, 1, -1, 0);
 }
 
 void add_podium(MadeSceneBuilder& stage) {
@@ -74,7 +74,7 @@ void add_podium(MadeSceneBuilder& stage) {
   constexpr std::array<std::array<float, 2>, 3> step{{{1.7F, 0}, {1.7F, 0.14F}, {0, 0.14F}}};
   Mesh podium;
   append(podium, make_lathe(step, around, 1), {0, 1.7F, 0});
-  stage.add("podium", std::move(podium), {0.42F, 0.07F, 0.06F}, 0.9F, -1, 0.1F);
+  stage.add("podium", std::move(podium), {0.42F, 0.07F, 0.06F}, 1, -1, 0);
   const Vec3f foot{glass_sphere_middle.x, glass_sphere_middle.y, 0};
   const float top = glass_sphere_middle.z - glass_sphere_radius_m;
   Mesh pedestal =
@@ -83,7 +83,7 @@ void add_podium(MadeSceneBuilder& stage) {
                                   "-x +x -y +y -z +z", 1));
   Mesh placed;
   append(placed, pedestal, foot, 0.3F);
-  stage.add("pedestal", std::move(placed), {0.55F, 0.55F, 0.57F}, 0.9F, -1, 0.1F);
+  stage.add("pedestal", std::move(placed), {0.55F, 0.55F, 0.57F}, 1, -1, 0);
 }
 
 void add_mirror(MadeSceneBuilder& stage) {

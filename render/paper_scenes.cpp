@@ -55,10 +55,10 @@ Environment make_evening(float strength) {
 // A studio's lamps on a grid above and in front.
 Environment make_studio_light() {
   const std::array<SoftBox, 4> boxes{{
-      {{-0.9F, -1, 1.1F}, 0.1F, 0.1F, {235, 220, 196}},
-      {{1.1F, -0.8F, 1.2F}, 0.22F, 0.22F, {11, 12, 14}},
+      {{-0.9F, -1, 1.1F}, 0.1F, 0.1F, {300, 282, 252}},
+      {{1.1F, -0.8F, 1.2F}, 0.22F, 0.22F, {6, 6.6F, 7.8F}},
       {{0.1F, -1, 0.5F}, 0.8F, 0.35F, {1.0F, 0.97F, 0.9F}},
-      {{0.2F, 0.4F, 1}, 0.5F, 0.3F, {2.5F, 2.7F, 3.2F}},
+      {{0.2F, 0.4F, 1}, 0.5F, 0.3F, {1.4F, 1.5F, 1.8F}},
   }};
   return smoothed(make_soft_box_map(map_height, {0.10F, 0.11F, 0.13F}, {0.04F, 0.045F, 0.06F},
                                     {0.03F, 0.03F, 0.03F}, boxes));
