@@ -112,6 +112,7 @@ void CellBaker::pack() {
     }
   }
   pack_lights();
+  pack_environment();
   std::ranges::sort(t.shared, {}, [](const CellTransport::SharedTerm& s) {
     return key_of(s);
   });  // in place: nothing is allocated
@@ -132,6 +133,41 @@ void CellBaker::pack_lights() {
                       {}, &CellTransport::LightTerm::light);
   }
   terms.resize(join(sorted_lights_, terms));
+}
+
+// Places of a slot that lie between the same four texels of a level become one, in their middle:
+// many rays through glass, or of many samples, look nearly the same way. Between four texels a
+// picture is all but linear, so hardly anything is lost.
+void CellBaker::pack_environment() {
+  auto& terms = transport_->environment;
+  using Term = CellTransport::EnvironmentTerm;
+  const auto key = [](const Term& e) {
+    // Texels are fewer than 2^15 a side; left of and above the first ones there is one more.
+    const auto column = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.x)) + 1);
+    const auto row = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.y)) + 1);
+    return std::uint64_t{e.slot} << 48 | std::uint64_t{e.level} << 40 | row << 20 | column;
+  };
+  std::ranges::sort(terms, [&](const Term& a, const Term& b) {
+    const std::uint64_t ka = key(a), kb = key(b);
+    return ka != kb ? ka < kb : a.x != b.x ? a.x < b.x : a.y < b.y;
+  });
+  std::size_t kept = 0;
+  float share = 0;  // how much the last one stands for
+  for (const Term& e : terms) {
+    const float weight = mean(e.weight);
+    if (kept > 0 && key(terms[kept - 1]) == key(e) && weight > 0 && share > 0) {
+      Term& to = terms[kept - 1];
+      const float part = weight / (share + weight);
+      to.weight += e.weight;
+      to.x += (e.x - to.x) * part;
+      to.y += (e.y - to.y) * part;
+      share += weight;
+    } else {
+      share = weight;
+      terms[kept++] = e;
+    }
+  }
+  terms.resize(kept);
 }
 
 void CellBaker::trace(int count, bool coherent, RayKind kind) {

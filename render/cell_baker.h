@@ -144,6 +144,7 @@ class CellBaker final : public RaySink {
   void bounce();
   void pack();
   void pack_lights();
+  void pack_environment();
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;

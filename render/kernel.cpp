@@ -13,7 +13,7 @@ namespace render {
 
 struct TileWorkspace::Impl {
   CellBaker baker;
-  CellTransport transport;  // where none is kept
+  CellTransport transport;
   RelightWorkspace relight;
   CellPicture picture;
   std::array<Vec3f, cell_pixels> plate;
@@ -109,11 +109,13 @@ void TileWorkspace::Impl::render_cell(
     light(frame, *kept, result.statistics);
     result.statistics.kept_rays += kept->rays;
   } else {
-    CellTransport* room = memory ? memory->place(column, row) : nullptr;
-    CellTransport& fresh = room ? *room : transport;
-    baker.bake(frame, x0, y0, fresh, result.statistics);
-    light(frame, fresh, result.statistics);
-    if (room) memory->keep(column, row);
+    baker.bake(frame, x0, y0, transport, result.statistics);
+    light(frame, transport, result.statistics);
+    // Found in a room of its own, which is as large as the largest needs: what is kept is not.
+    if (CellTransport* room = memory ? memory->place(column, row) : nullptr) {
+      *room = transport;
+      memory->keep(column, row);
+    }
   }
   write(frame, tile, x0, y0, result);
 }
