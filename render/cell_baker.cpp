@@ -366,6 +366,11 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   // Further samples of an edge pixel share its weight.
   const float further_share = 1 / static_cast<float>(frame_->job->effort.aa_samples);
   r.share[k] = largest(p.throughput) * (p.slot < cell_pixels ? 1.0F : further_share);
+  // What is dark shows little of the light, what only mirrors nothing but compact lights.
+  if (!p.catches_shadow && !p.catches_lamps) {
+    constexpr float grey = 0.25F / std::numbers::pi_v<float>;
+    r.share[k] *= std::min(largest(p.diffuse) / grey, 1.0F);
+  }
 }
 
 // Finds who sees which light, and notes it.

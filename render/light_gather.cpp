@@ -417,6 +417,10 @@ void gather_cell(const LightContext& context,
     for (std::size_t word = 0; word < 4; ++word) real_first[word] &= r.active[word];
   }
 
+  CellMask answering{};  // to lights that are not compact
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (r.share[k] > 0) answering[k / 64] |= std::uint64_t{1} << (k % 64);
+  }
   for (std::size_t first = 0; first < lights.size(); first += GatherWorkspace::group) {
     const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lights.size() - first);
     const auto first32 = static_cast<std::uint32_t>(first);
@@ -425,6 +429,9 @@ void gather_cell(const LightContext& context,
     const std::span<const DirectionalLight> group(&lights[first], count);
     find_lit(r, group, std::span(w.lit).first(count));
     for (std::size_t i = 0; i < count; ++i) {
+      if (group[i].compact == 0) {
+        for (std::size_t word = 0; word < 4; ++word) w.lit[i][word] &= answering[word];
+      }
       skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, group[i].direction);
     }
     if (real_first != CellMask{}) {
@@ -469,7 +476,9 @@ void gather_points(const LightContext& context,
   const bool real = context.scene->has_real_blockers();
   // Compact lights are few and strong: all points test all of them.
   const auto stride_of = [&](std::size_t k, const DirectionalLight& light) -> std::uint32_t {
-    if (light.compact != 0 || context.effort->accuracy >= 1 || r.share[k] >= 0.5F) return 1;
+    if (light.compact != 0) return 1;
+    if (r.share[k] == 0) return 0;  // none
+    if (context.effort->accuracy >= 1 || r.share[k] >= 0.5F) return 1;
     return r.share[k] >= 0.2F ? 2 : r.share[k] >= 0.05F ? 4 : 8;
   };
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
@@ -486,7 +495,8 @@ void gather_points(const LightContext& context,
   for (std::uint32_t i = 0; i < lights.size(); ++i) {
     const Vec3f l = lights[i].direction;
     for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-      if ((i + k) % stride_of(k, lights[i]) != 0) continue;
+      const std::uint32_t stride = stride_of(k, lights[i]);
+      if (stride == 0 || (i + k) % stride != 0) continue;
       if (!(cosine_at(r, k, l) > 0) || !(r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0)) {
         continue;
       }

@@ -61,6 +61,16 @@ render::Effort papers_effort() {
   return effort;
 }
 
+Json rays_of(const BenchScene& shot, const render::FrameJob& job) {
+  render::FrameResult result;
+  render_frame(shot.inputs(), job, shot.half_plate, result);
+  const render::RenderStatistics& s = result.statistics;
+  return {{"primary", s.primary_rays},
+          {"shadow", s.shadow_rays},
+          {"secondary", s.secondary_rays},
+          {"depth_limit_hits", s.depth_limit_hits}};
+}
+
 double error_of(const BenchScene& shot,
                 const render::FrameJob& job,
                 const Truth& truth,
@@ -98,6 +108,7 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
            {"fps_default", 1000 / whole.kernel_ms},
            {"fps_still", 1000 / still_ms},
            {"rays_per_frame", moving.rays},
+           {"rays", rays_of(shot, fast)},
            {"rays_per_frame_default", whole.rays},
            {"embree_share", share.bare_ms / share.kernel_ms},
            {"compile_ms", compile_ms},
