@@ -104,6 +104,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
            least;
   };
   if (deep || too_dim()) {
+    if (effort.dark_cuts) return;
     if (straight) {
       CellTransport::Base& base = base_[target_of(from)];
       samples_[from.slot].plate += ray.throughput;

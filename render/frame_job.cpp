@@ -14,7 +14,8 @@ template <class E, class F>
 void for_each_setting(E& effort, F&& visit) {
   visit(effort.aa_samples), visit(effort.glint_contrast), visit(effort.aa_tolerance),
       visit(effort.light_samples), visit(effort.interleave);
-  visit(effort.adaptive_visibility), visit(effort.cull_lights), visit(effort.accuracy);
+  visit(effort.adaptive_visibility), visit(effort.cull_lights), visit(effort.accuracy),
+      visit(effort.dark_cuts);
   visit(effort.max_depth), visit(effort.tile_size), visit(effort.progressive_sample);
 }
 

@@ -30,6 +30,7 @@ struct Effort {
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
   bool cull_lights = true;          // skip shadow rays that no object can block
   float accuracy = 0.97F;      // rays whose share of the pixel falls below 1 - accuracy are cut
+  bool dark_cuts = false;      // cut rays see nothing, instead of the environment: for charts
   int max_depth = 64;          // safety net; counted when hit
   int tile_size = 32;          // pixels, a multiple of 16
   int progressive_sample = 0;  // samples accumulated so far (later issues)

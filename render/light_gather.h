@@ -29,11 +29,11 @@ struct Receivers {
   std::array<std::uint32_t, cell_pixels> surface;  // same number = same object and material
   std::array<std::uint32_t, cell_pixels> mask;     // what blocks: mask_virtual, mask_real_blocker
   std::array<std::uint8_t, cell_pixels>
-      real_first;                        // light that real things block does not count as open
+      real_first;  // light that real things block does not count as open
   // Of the pixel: weak points test fewer lights, those of 0 only the compact ones.
   std::array<float, cell_pixels> share;
-  std::array<std::uint64_t, 4> active;   // bit y % 4 * 16 + x of word y / 4
-  int count = 0;                         // of entries, if not a grid
+  std::array<std::uint64_t, 4> active;  // bit y % 4 * 16 + x of word y / 4
+  int count = 0;                        // of entries, if not a grid
 };
 
 // 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.

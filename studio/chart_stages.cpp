@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "studio/charts/glass.h"
 #include "studio/charts/hdr.h"
 #include "studio/charts/lens.h"
 #include "studio/charts/lights.h"
@@ -11,7 +12,7 @@
 namespace studio {
 
 std::span<const ChartStage> chart_stages() {
-  static const std::vector<ChartStage> all{hdr_chart(), lens_chart(), lights_chart(),
+  static const std::vector<ChartStage> all{glass_chart(), hdr_chart(), lens_chart(), lights_chart(),
                                            photograph_chart()};
   return all;
 }

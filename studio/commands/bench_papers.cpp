@@ -2,8 +2,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cmath>
 #include <filesystem>
 #include <string>
 
@@ -16,6 +14,7 @@
 #include "studio/commands/benches.h"
 #include "studio/commands/kernel_rate.h"
 #include "studio/machine.h"
+#include "studio/paper_shot.h"
 #include "studio/picture_error.h"
 
 namespace studio {
@@ -24,34 +23,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int width = 640, height = 480;
-
-struct PaperShot {
-  BenchScene shot;
-  double compile_ms = 0;
-};
-
-// A scene as a show would have it: its light followed, compact sources apart.
-PaperShot make_shot(const render::PaperScene& paper) {
-  PaperShot made;
-  BenchScene& shot = made.shot;
-  const auto start = std::chrono::steady_clock::now();
-  shot.scene = std::make_unique<render::Scene>(paper.scene);
-  made.compile_ms =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  const double focal_px = 0.5 * width / std::tan(0.5 * paper.horizontal_view_rad);
-  shot.directions = calibrate::make_direction_table(
-      {"pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}});
-  render::LightFollower follower;
-  BenchLight light =
-      follow_bench_sky(follower, paper.environment, {.count = render::Effort{}.light_samples});
-  shot.environment = std::move(light.environment);
-  shot.plate = capture::make_image(height, width, 3);
-  shot.half_plate = capture::to_half(shot.plate);
-  shot.job.cam_from_set = paper.cam_from_set;
-  shot.job.lights = std::move(light.table);
-  shot.job.lights.lamps = paper.lamps;
-  return made;
-}
 
 // As the papers did while anything moved: one ray a pixel, and the contribution cut at 95 %.
 render::Effort papers_effort() {
@@ -89,8 +60,7 @@ void write_picture(const std::string& path, const capture::Image& rgba) {
 }
 
 Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
-  const render::PaperScene paper = render::made_paper_scene(name);
-  const auto [shot, compile_ms] = make_shot(paper);
+  const auto [shot, compile_ms] = make_paper_shot(name, width, height);
   render::FrameJob fast = shot.job;
   fast.effort = papers_effort();
   render::FrameJob plain = fast;
@@ -100,7 +70,7 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
   const KernelRate whole = measure_kernel(shot, shot.job, 1);
   const double still_ms = measure_kept(shot, shot.job, bench.runs);
   Json row{{"scene", name},
-           {"triangles", triangle_count(paper.scene)},
+           {"triangles", triangle_count(shot.scene->description())},
            {"width", width},
            {"height", height},
            {"threads", tbb::this_task_arena::max_concurrency()},

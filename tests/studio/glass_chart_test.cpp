@@ -1,0 +1,29 @@
+// The chart of glass: what it must show whatever the machine.
+#include "studio/charts/glass.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/studio/quick_chart.h"
+
+namespace studio {
+namespace {
+
+TEST(GlassChart, ErrsLessTheFurtherRaysAreFollowedAndLessThanWithDarkCuts) {
+  const Chart chart = measure_quickly(glass_chart());
+  ASSERT_EQ(chart.points.size(), 4U);  // 80 and 95 %, cut rays seeing the environment, or nothing
+  const auto& p = chart.points;
+  EXPECT_LT(p[1].error, p[0].error);
+  EXPECT_LT(p[3].error, p[2].error);
+  EXPECT_LT(p[0].error, p[2].error);
+  EXPECT_LT(p[1].error, p[3].error);
+  EXPECT_LT(p[1].error, 0.05);
+  for (const ChartPoint& point : p) EXPECT_GT(point.time_ms, 0);
+
+  ASSERT_EQ(chart.stressors.size(), 1U);
+  const auto& depths = chart.stressors[0].samples;
+  EXPECT_NE(depths.front().status, "ok");
+  EXPECT_GT(depths.front().error, 5 * depths.back().error);
+}
+
+}  // namespace
+}  // namespace studio
