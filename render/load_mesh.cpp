@@ -249,8 +249,10 @@ class ModelBuilder {
       aiString name;
       source.Get(AI_MATKEY_NAME, name);
       material_of_[index] = static_cast<std::int64_t>(model_.scene.materials.size());
+      const ImportedMaterial& imported = imported_[index];
       model_.scene.materials.push_back(
-          make_standard_material(name.C_Str(), imported_[index].parameters));
+          imported.glass ? make_glass_material(name.C_Str(), *imported.glass)
+                         : make_standard_material(name.C_Str(), imported.parameters));
     }
     return static_cast<std::uint32_t>(material_of_[index]);
   }

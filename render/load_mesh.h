@@ -41,10 +41,10 @@ struct LoadedModel {
 // -z, y). Hidden parts are not even decoded. Tangents are computed where a normal map needs them.
 //
 // glTF materials: base colour, metallic-roughness, normal, clear coat, transmission (as a thin
-// wall), emission, alpha cut-outs (blended alpha is cut at a half). Not handled, and noted in the
-// report: occlusion maps (the light is traced), sheen, volume, coat and transmission roughness
-// maps, vertex colours, animation, skins. Materials of other formats: colour, opacity, shininess,
-// emission.
+// wall; a volume of it as solid glass, glass.h, if it is hardly rough), emission, alpha cut-outs
+// (blended alpha is cut at a half). Not handled, and noted in the report: occlusion maps (the light
+// is traced), sheen, volumes that are not clear, coat and transmission roughness maps, vertex
+// colours, animation, skins. Materials of other formats: colour, opacity, shininess, emission.
 //
 // Throws std::invalid_argument if scale is not > 0 and finite, or `hide` names a node that is not
 // there (the nodes are listed). Throws std::runtime_error naming file and reason if the file cannot

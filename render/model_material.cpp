@@ -42,6 +42,26 @@ std::string name_of(const aiMaterial& material) {
   return material.Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS ? name.C_Str() : "";
 }
 
+// Above this, glass scatters light so much that it is taken for a thin, clear sheet.
+constexpr float rough_glass = 0.3F;
+
+// glTF's volume, of KHR_materials_volume and _ior: the attenuation colour is what is left of white
+// light after the attenuation distance. Base colour tints each surface once, which glass.h does not
+// know: it goes into shadows.
+GlassParameters glass_of(const aiMaterial& material, const StandardParameters& p) {
+  GlassParameters glass;
+  glass.index = std::clamp(number(material, AI_MATKEY_REFRACTI, 1.5F), 1.0F, 4.0F);
+  float left[3] = {1, 1, 1};
+  colour(material, AI_MATKEY_VOLUME_ATTENUATION_COLOR, left);
+  const float distance_m = number(material, AI_MATKEY_VOLUME_ATTENUATION_DISTANCE, 0);
+  for (int c = 0; c < 3; ++c) {
+    const float share = std::clamp(left[c], 1e-4F, 1.0F);
+    if (distance_m > 1e-4F) glass.absorption[c] = -std::log(share) / distance_m;
+    glass.shadow[c] *= std::sqrt(share) * p.base_color[c];
+  }
+  return glass;
+}
+
 }  // namespace
 
 void MaterialImport::note(const std::string& text) {
@@ -97,8 +117,6 @@ void MaterialImport::note_unhandled(const aiMaterial& material, const std::strin
   float sheen[3];
   if (colour(material, AI_MATKEY_SHEEN_COLOR_FACTOR, sheen) && sheen[0] + sheen[1] + sheen[2] > 0)
     leave_out("sheen is");
-  if (number(material, AI_MATKEY_VOLUME_THICKNESS_FACTOR, 0) > 0)
-    leave_out("the volume (thickness, attenuation) is");
   if (has(AI_MATKEY_CLEARCOAT_ROUGHNESS_TEXTURE)) leave_out("the coat's roughness map is");
   if (has(AI_MATKEY_CLEARCOAT_NORMAL_TEXTURE)) leave_out("the coat's normal map is");
   if (has(aiTextureType_HEIGHT, 0)) leave_out("the height map is");
@@ -162,6 +180,13 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   int two_sided = 1;
   if (material.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS)
     p.two_sided = two_sided != 0 ? 1 : 0;
+  if (number(material, AI_MATKEY_VOLUME_THICKNESS_FACTOR, 0) > 0) {
+    if (p.transmission >= 0.5F && p.roughness < rough_glass) {
+      result.glass = glass_of(material, p);
+    } else {
+      note("material '" + name + "': the volume (thickness, attenuation) is left out");
+    }
+  }
   note_unhandled(material, name);
   return result;
 }

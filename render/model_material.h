@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "render/glass.h"
 #include "render/mesh.h"
 #include "render/model_folder.h"
 #include "render/standard.h"
@@ -28,6 +30,7 @@ struct UvTransform {
 
 struct ImportedMaterial {
   StandardParameters parameters;
+  std::optional<GlassParameters> glass;  // a volume that light passes: this, in place of those
   UvTransform uv;
 };
 

@@ -10,7 +10,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "render/glass.h"
 #include "render/standard.h"
+#include "tests/made_files.h"
 
 namespace {
 
@@ -143,6 +145,39 @@ TEST(LoadModel, SurvivesDamageAnywhere) {
   }
   EXPECT_GT(refused, 10);
   fs::remove_all(folder);
+}
+
+TEST(LoadModel, TakesClearVolumesForSolidGlass) {
+  const auto load = [](const std::string& material) {
+    const fs::path path = made::make_temporary_directory() / "glass.gltf";
+    std::ofstream(path)
+        << R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"extensionsUsed":["KHR_materials_transmission","KHR_materials_volume","KHR_materials_ior"],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+"bufferViews":[{"buffer":0,"byteLength":36}],
+"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+"materials":[{"name":"bottle",)"
+        << material << "}]}";
+    return load_model(path).scene.materials[0];
+  };
+  const render::Material bottle = load(
+      R"("pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0},"extensions":{
+"KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_ior":{"ior":1.45},
+"KHR_materials_volume":{"thicknessFactor":0.01,"attenuationDistance":0.02,"attenuationColor":[0.5,1,0.25]}})");
+  ASSERT_EQ(bottle.shader, "glass");
+  const render::GlassParameters glass = render::glass_parameters(bottle);
+  EXPECT_NEAR(glass.index, 1.45F, 1e-6F);
+  EXPECT_NEAR(glass.absorption[0], std::log(2.0) / 0.02, 1e-3);
+  EXPECT_NEAR(glass.absorption[1], 0, 1e-6);
+  EXPECT_LT(glass.shadow[2], glass.shadow[0]);
+  // Without a volume it is a thin sheet; rough, it is not glass.
+  EXPECT_EQ(load(R"("extensions":{"KHR_materials_transmission":{"transmissionFactor":1}})").shader,
+            "standard");
+  EXPECT_EQ(load(R"("pbrMetallicRoughness":{"roughnessFactor":0.8},"extensions":{
+"KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_volume":{"thicknessFactor":0.01}})")
+                .shader,
+            "standard");
 }
 
 TEST(LoadModel, ReadsTheToyCar) {
