@@ -107,7 +107,7 @@ struct PlacementSettings {
 struct ObjectSettings {
   std::string name;
   std::string mesh;  // file; "" = made
-  std::string made;  // "car", "lamp"
+  std::string made;  // "car", "headlight", "lamp"
   Place place;       // of `mesh` or `made`
   PlacementSettings pose;
   std::vector<std::string> hide;  // parts left out, by node name

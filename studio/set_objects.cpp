@@ -60,7 +60,7 @@ ObjectSettings read_object_section(Section section, const SetContext& context) {
   }
   object.place = section.place_of(section.has("mesh") ? "mesh" : "made");
   section.file("mesh", context.base, object.mesh);
-  section.word("made", object.made, {"car", "lamp"});
+  section.word("made", object.made, {"car", "headlight", "lamp"});
   if (auto table = section.table("pose")) object.pose = read_placement(*table);
   section.texts("hide", object.hide);
   section.number("emission_gain", object.emission_gain, {0, 1e9});

@@ -12,7 +12,9 @@
 #include "render/join_scenes.h"
 #include "render/load_mesh.h"
 #include "render/made_car.h"
+#include "render/made_headlight.h"
 #include "render/made_lamp.h"
+#include "render/standard.h"
 
 namespace studio {
 namespace {
@@ -39,6 +41,16 @@ SceneDescription load_object(const ObjectSettings& object) {
     render::MadeCarSettings car;
     car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
     return render::made_car(car);
+  }
+  if (object.made == "headlight") {
+    SceneDescription headlight = render::make_headlight();
+    for (render::Material& material : headlight.materials) {
+      if (material.shader != "standard") continue;
+      render::StandardParameters p = standard_parameters(material, headlight.textures.size());
+      p.emission_gain *= static_cast<float>(object.emission_gain);
+      material = make_standard_material(material.name, p);
+    }
+    return headlight;
   }
   if (object.made == "lamp") return render::made_lamp(static_cast<float>(object.emission_gain));
   render::LoadOptions options;

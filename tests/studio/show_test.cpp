@@ -196,6 +196,36 @@ TEST_F(ShowTest, MovesObjectsAndPartsInTheVeryNextFrameWithoutLoadingThemAgain) 
   EXPECT_THROW(maker.move_object("cube/spare wheel", {}), std::invalid_argument);
 }
 
+// A bulb in its headlight of 800,000 triangles, and the next moment before it.
+TEST_F(ShowTest, DragsTheBulbOutOfTheHeadlight) {
+  Set set = made_set("grey:1,25,0");
+  set.objects.resize(1);
+  ObjectSettings& headlight = set.objects[0];
+  headlight = {};
+  headlight.name = "headlight";
+  headlight.made = "headlight";
+  set.stand_ins.clear();
+  set.camera.pose.cam_from_set = calibrate::look_at({0.7, 0.15, 0.1}, {0, 0, 0}, 0);
+  set.effort.aa_samples = 1;
+  FrameMaker maker(set);
+  const auto picture = [](const PreparedFrame& frame) {
+    render::FrameResult result;
+    render_frame(frame.inputs(), frame.job, *frame.plate, result);
+    return result.rgba.pixels;
+  };
+  const auto inside = picture(*maker.make(0));
+  EXPECT_EQ(picture(*maker.make(1)), inside);
+  maker.move_object("headlight/bulb", {{0.25, 0, 0}, 0, 0, 1});
+  const auto before = maker.make(2);
+  const auto out = picture(*before);
+  EXPECT_NE(out, inside);
+  maker.move_object("headlight/bulb", {{0.2, 0.1, 0}, 0, 0, 1});
+  EXPECT_NE(picture(*maker.make(3)), out);
+  // Back in its place it is as if nothing had been: but for what instances round.
+  maker.move_object("headlight/bulb", {{0, 0, 0}, 0, 0, 1});
+  EXPECT_EQ(triangle_count(maker.make(4)->scene->description()), 800000U);
+}
+
 TEST_F(ShowTest, NotesWhatACommandCannotDoAndGoesOn) {
   ShowOptions options;
   options.frames = 5;
