@@ -90,6 +90,21 @@ std::size_t join(const std::vector<Term>& from, std::vector<Term>& to) {
   return kept;
 }
 
+// Terms in the order of their slots, of which there are few; sort_slot orders those of one.
+template <class Term, class F>
+void sort_by_slot(const std::vector<Term>& terms, std::vector<Term>& sorted, F&& sort_slot) {
+  std::array<std::uint32_t, slots + 1> first{};  // of each slot's terms
+  for (const Term& term : terms) ++first[term.slot + 1U];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  sorted.resize(terms.size());
+  std::array<std::uint32_t, slots + 1> next = first;
+  for (const Term& term : terms) sorted[next[term.slot]++] = term;
+  for (std::size_t slot = 0; slot < slots; ++slot) {
+    const std::size_t count = first[slot + 1] - first[slot];
+    if (count > 1) sort_slot(std::span(sorted).subspan(first[slot], count));
+  }
+}
+
 }  // namespace
 
 // Tells what came of the cell's slots, and joins what is many times the same.
@@ -122,16 +137,9 @@ void CellBaker::pack() {
 // One term for each light of a slot: by slots first, of which there are few.
 void CellBaker::pack_lights() {
   auto& terms = transport_->lights;
-  std::array<std::uint32_t, 2 * cell_pixels + 1> first{};  // of each slot's terms
-  for (const CellTransport::LightTerm& term : terms) ++first[term.slot + 1U];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  sorted_lights_.resize(terms.size());
-  std::array<std::uint32_t, 2 * cell_pixels + 1> next = first;
-  for (const CellTransport::LightTerm& term : terms) sorted_lights_[next[term.slot]++] = term;
-  for (std::size_t slot = 0; slot < 2 * cell_pixels; ++slot) {
-    std::ranges::sort(std::span(sorted_lights_).subspan(first[slot], first[slot + 1] - first[slot]),
-                      {}, &CellTransport::LightTerm::light);
-  }
+  sort_by_slot(terms, sorted_lights_, [](auto of_slot) {
+    std::ranges::sort(of_slot, {}, &CellTransport::LightTerm::light);
+  });
   terms.resize(join(sorted_lights_, terms));
 }
 
@@ -147,13 +155,15 @@ void CellBaker::pack_environment() {
     const auto row = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.y)) + 1);
     return std::uint64_t{e.slot} << 48 | std::uint64_t{e.level} << 40 | row << 20 | column;
   };
-  std::ranges::sort(terms, [&](const Term& a, const Term& b) {
-    const std::uint64_t ka = key(a), kb = key(b);
-    return ka != kb ? ka < kb : a.x != b.x ? a.x < b.x : a.y < b.y;
+  sort_by_slot(terms, sorted_places_, [&](auto of_slot) {
+    std::ranges::sort(of_slot, [&](const Term& a, const Term& b) {
+      const std::uint64_t ka = key(a), kb = key(b);
+      return ka != kb ? ka < kb : a.x != b.x ? a.x < b.x : a.y < b.y;
+    });
   });
   std::size_t kept = 0;
   float share = 0;  // how much the last one stands for
-  for (const Term& e : terms) {
+  for (const Term& e : sorted_places_) {
     const float weight = mean(e.weight);
     if (kept > 0 && key(terms[kept - 1]) == key(e) && weight > 0 && share > 0) {
       Term& to = terms[kept - 1];

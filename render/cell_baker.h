@@ -186,6 +186,7 @@ class CellBaker final : public RaySink {
   std::array<std::uint8_t, stream_rays> done_;
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
+  std::vector<CellTransport::EnvironmentTerm> sorted_places_;
   std::vector<PointLight> tested_;
   std::vector<Lobe> lobes_;
   std::vector<QueuedRay> queue_;         // capacity reserved
