@@ -46,6 +46,8 @@ void CellBaker::bake(const FrameContext& frame,
   const std::uint64_t rays_before =
       statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays;
   transport.clear();
+  if (frame.inputs.count_rays) transport.counts.resize(cell_pixels);
+  counting_ = frame.inputs.count_rays ? transport.counts.data() : nullptr;
   samples_.fill({});
   base_.fill({});
   light_.fill({});
@@ -62,6 +64,7 @@ void CellBaker::bake(const FrameContext& frame,
     find_edges();
     find_glints();
     sample_edges();
+    if (counting_) count_errors();
   }
   pack();
   transport.rays =
@@ -238,6 +241,9 @@ void CellBaker::trace_centres() {
       set_camera_ray(i, {});
     }
     statistics_->primary_rays += in;
+    if (counting_ && stream_.mask[static_cast<std::size_t>(i)]) {
+      ++counting_[static_cast<std::size_t>(y * cell_size + x)].rays;
+    }
   }
   trace(cell_pixels, true, RayKind::camera);
 }
@@ -415,6 +421,11 @@ void CellBaker::receive(int count, bool grid) {
     r.active[k / 64] |= std::uint64_t{1} << (k % 64);
   }
   if (r.count > 0) {
+    std::array<std::uint32_t, cell_pixels> shadow_rays;
+    if (counting_) {
+      shadow_rays.fill(0);
+      gather_.counts = shadow_rays.data();
+    }
     if (grid) {
       for (std::size_t k = 0; k < cell_pixels; ++k) {
         if (!(r.active[k / 64] >> (k % 64) & 1)) r.nx[k] = r.ny[k] = r.nz[k] = 0;
@@ -423,6 +434,10 @@ void CellBaker::receive(int count, bool grid) {
       transport_->receiving = r.active;
     } else {
       gather_points(frame_->light, r, gather_, tested_, *statistics_);
+    }
+    gather_.counts = nullptr;
+    for (std::size_t i = 0; counting_ && i < static_cast<std::size_t>(count); ++i) {
+      if (place[i] != nowhere) counting_[points_[i].pixel].shadow_rays += shadow_rays[place[i]];
     }
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -499,9 +514,13 @@ void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
 void CellBaker::add_lamps(const ShadePoint& p, std::size_t light_point) {
   if (frame_->job->lights.lamps.empty() || !receives_light(p)) return;
   const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
+  const std::uint64_t before = statistics_->shadow_rays;
   const Vec3f irradiance =
       gather_lamps(frame_->light, origin, p.light_normal, p.hit.geometric_normal,
                    mask_virtual | mask_real_blocker, *statistics_);
+  if (counting_) {
+    counting_[p.pixel].shadow_rays += static_cast<std::uint32_t>(statistics_->shadow_rays - before);
+  }
   if (irradiance == Vec3f{}) return;
   const Vec3f added = p.throughput * p.diffuse * irradiance;
   base_[target_of(p)].radiance += added;
@@ -592,6 +611,11 @@ void CellBaker::bounce() {
     const std::size_t from = queue_.size() - n;
     for (std::size_t i = 0; i < n; ++i) {
       const QueuedRay& q = queue_[from + i];
+      if (counting_) {
+        RayCount& pixel = counting_[q.pixel];
+        ++pixel.rays;
+        pixel.depth = std::max<std::uint32_t>(pixel.depth, q.depth);
+      }
       stream_.ox[i] = q.origin.x, stream_.oy[i] = q.origin.y, stream_.oz[i] = q.origin.z;
       stream_.dx[i] = q.direction.x, stream_.dy[i] = q.direction.y, stream_.dz[i] = q.direction.z;
       stream_.near_m[i] = 0;

@@ -174,6 +174,8 @@ class CellBaker final : public RaySink {
   CellMask edges() const;
   CellMask uncertain(int n) const;
   bool is_uncertain(std::size_t k, int n) const;
+  Vec3f spread_of_further(std::size_t k) const;
+  void count_errors();
   Vec3f direction_in(int x, int y, const std::array<float, 2>& offset) const;
   void add_further(std::size_t k, const Sample& sample);
 
@@ -209,6 +211,7 @@ class CellBaker final : public RaySink {
   const FrameContext* frame_ = nullptr;
   RenderStatistics* statistics_ = nullptr;
   CellTransport* transport_ = nullptr;
+  RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for
   int x0_ = 0, y0_ = 0;
   CellMask inside_{};
 };

@@ -182,6 +182,7 @@ void CellBaker::finish_further(int count) {
   const float finer = 1 / std::sqrt(static_cast<float>(samples_each_));
   for (int i = 0; i < count; ++i) {
     const Further& f = further_[static_cast<std::size_t>(i)];
+    if (counting_ && stream_.mask[static_cast<std::size_t>(i)]) ++counting_[f.pixel].rays;
     const int neighbour = neighbour_of(i, f);
     if (neighbour >= 0 && edge_[f.pixel] == Edge::surface) {
       add_further(f.pixel, samples_[static_cast<std::size_t>(neighbour)]);
@@ -277,11 +278,25 @@ CellMask CellBaker::uncertain(int n) const {
 bool CellBaker::is_uncertain(std::size_t k, int n) const {
   if (counts_[k] != n) return false;
   const auto samples_n = static_cast<float>(n);
-  const Vec3f shown = shown_sum_[k], behind = behind_sum_[k];
-  const Vec3f spread = squares_[k] - (shown * shown + behind * behind) * (1 / samples_n);
   const float tolerance = frame_->job->effort.aa_tolerance;
-  return std::max({spread.x, spread.y, spread.z}) >
+  return largest(spread_of_further(k)) >
          tolerance * tolerance * samples_n * std::max(samples_n - 1, 1.0F);
+}
+
+// The squares of what a pixel's further samples differ from their mean by, added up.
+Vec3f CellBaker::spread_of_further(std::size_t k) const {
+  const Vec3f shown = shown_sum_[k], behind = behind_sum_[k];
+  return squares_[k] - (shown * shown + behind * behind) * (1 / static_cast<float>(counts_[k]));
+}
+
+void CellBaker::count_errors() {
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const auto n = static_cast<float>(counts_[k]);
+    if (edge_[k] == Edge::none || !(n > 1)) continue;
+    // Not less than rounding leaves.
+    const float spread = std::max(largest(spread_of_further(k)), 0.0F);
+    counting_[k].error = std::sqrt(spread / (n * (n - 1)));
+  }
 }
 
 // Through a pixel off its centre: linear between the centre and the next one on that side.

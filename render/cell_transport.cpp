@@ -142,13 +142,14 @@ void CellTransport::clear() {
   environment.clear(), shadow_points.clear(), shadow_lights.clear(), lamps.clear();
   bent.clear(), borrowed.clear(), further.clear();
   rays = 0;
+  counts.clear();
 }
 
 std::size_t CellTransport::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
          of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
-         of(lamps) + of(bent) + of(borrowed) + of(further);
+         of(lamps) + of(bent) + of(borrowed) + of(further) + of(counts);
 }
 
 void relight(const CellTransport& cell,

@@ -104,6 +104,8 @@ struct CellTransport {
   std::vector<Borrowed> borrowed;
   std::vector<Further> further;
   std::uint64_t rays = 0;  // that it took
+  // By pixel, or empty if nobody has asked: a cell that is kept without them is found anew, once.
+  std::vector<RayCount> counts;
 
   void clear();
   std::size_t bytes() const;

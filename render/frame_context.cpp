@@ -215,11 +215,12 @@ void cut_tile(const capture::HalfImage& plate, Rect rect, int margin, TileJob& j
   }
 }
 
-void size_result(const Rect& rect, TileResult& result) {
+void size_result(const Rect& rect, TileResult& result, bool count_rays) {
   const auto pixels = static_cast<std::size_t>(rect.width) * static_cast<std::size_t>(rect.height);
   result.rect = rect;
   result.rgba.resize(pixels * 4);
   result.matte.resize(pixels);
+  result.rays.resize(count_rays ? pixels : 0);
   result.statistics = {};
 }
 

@@ -12,6 +12,7 @@
 #include "capture/half.h"
 #include "render/colour_matrix.h"
 #include "render/light_table.h"
+#include "render/ray_counts.h"
 
 namespace render {
 
@@ -97,6 +98,7 @@ struct TileResult {
   Rect rect;
   std::vector<capture::Half> rgba;   // (rect.height, rect.width, 4): finished picture, coverage
   std::vector<capture::Half> matte;  // (rect.height, rect.width)
+  std::vector<RayCount> rays;        // (rect.height, rect.width), or empty if not asked for
   RenderStatistics statistics;
 };
 

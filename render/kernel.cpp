@@ -24,6 +24,8 @@ struct TileWorkspace::Impl {
   void light(const FrameContext& frame, const CellTransport& cell, RenderStatistics& statistics);
   void write(
       const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) const;
+  static void write_counts(
+      const CellTransport& cell, const TileJob& tile, int x0, int y0, TileResult& result);
 };
 
 TileWorkspace::TileWorkspace() : impl_(std::make_unique<Impl>()) {}
@@ -100,17 +102,33 @@ void TileWorkspace::Impl::write(
   }
 }
 
+void TileWorkspace::Impl::write_counts(
+    const CellTransport& cell, const TileJob& tile, int x0, int y0, TileResult& result) {
+  const Rect& rect = tile.rect;
+  const int columns = std::min(cell_size, rect.x + rect.width - x0);
+  const int rows = std::min(cell_size, rect.y + rect.height - y0);
+  for (int y = 0; y < rows; ++y) {
+    const auto to = static_cast<std::ptrdiff_t>(y0 + y - rect.y) * rect.width + x0 - rect.x;
+    std::copy_n(cell.counts.begin() + static_cast<std::ptrdiff_t>(y) * cell_size, columns,
+                result.rays.begin() + to);
+  }
+}
+
 void TileWorkspace::Impl::render_cell(
     const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) {
   load_plate(tile, x0, y0);
   KeptTransport* memory = frame.inputs.kept;
   const int column = x0 / cell_size, row = y0 / cell_size;
-  if (const CellTransport* kept = memory ? memory->find(column, row) : nullptr) {
+  const CellTransport* kept = memory ? memory->find(column, row) : nullptr;
+  const bool counts = frame.inputs.count_rays;
+  if (kept && (!counts || !kept->counts.empty())) {
     light(frame, *kept, result.statistics);
     result.statistics.kept_rays += kept->rays;
+    if (counts) write_counts(*kept, tile, x0, y0, result);
   } else {
     baker.bake(frame, x0, y0, transport, result.statistics);
     light(frame, transport, result.statistics);
+    if (counts) write_counts(transport, tile, x0, y0, result);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
     if (CellTransport* room = memory ? memory->place(column, row) : nullptr) {
       *room = transport;

@@ -56,12 +56,12 @@ class TileWorkspace {
 // Makes a tile's job: its slice of the plate with a margin. `job`'s buffer is used again.
 void cut_tile(const capture::HalfImage& plate, Rect rect, int margin, TileJob& job);
 
-// Renders one tile. `result` must have been sized by size_result. Its bits depend on the frame and
-// the pixels only, not on how they are cut into tiles.
+// Renders one tile. `result` must have been sized by size_result, as the frame's inputs ask. Its
+// bits depend on the frame and the pixels only, not on how they are cut into tiles.
 void render_tile(const FrameContext& context,
                  const TileJob& tile,
                  TileWorkspace& workspace,
                  TileResult& result);
-void size_result(const Rect& rect, TileResult& result);
+void size_result(const Rect& rect, TileResult& result, bool count_rays = false);
 
 }  // namespace render

@@ -125,6 +125,9 @@ void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics)
                 w.far_m.data(), w.mask.data(), w.id.data(), w.flags.data()};
   rtcOccludedNp(scene.embree(), &context.context, &rays, n);
   statistics.shadow_rays += n;
+  if (w.counts) {
+    for (unsigned i = 0; i < n; ++i) ++w.counts[w.ray_point[i]];
+  }
 }
 
 // Calls visit(point, light, blocked, share that passes) for every ray of the stream, and empties
@@ -503,6 +506,7 @@ void gather_points(const LightContext& context,
       if (real && r.real_first[k]) {
         const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
         ++statistics.shadow_rays;
+        if (w.counts) ++w.counts[k];
         if (transmittance(*context.scene, origin, l, 0, ray_far, mask_real_blocker) == Vec3f{}) {
           continue;
         }

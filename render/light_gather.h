@@ -46,7 +46,8 @@ struct GatherWorkspace {
   alignas(64) std::array<float, stream_rays> tr, tg, tb;  // transmittance so far
   std::array<std::uint32_t, stream_rays> ray_light, ray_point;
   int rays = 0;
-  RayLog* log = nullptr;  // keeps all rays, if set
+  RayLog* log = nullptr;            // keeps all rays, if set
+  std::uint32_t* counts = nullptr;  // adds up shadow rays by receiver, if set
 
   static constexpr int group = 64;  // lights at a time
   std::array<CellMask, group> lit, seen, tested;

@@ -35,6 +35,14 @@ void size_image(capture::HalfImage& image, int height, int width, int channels) 
                       static_cast<std::size_t>(channels));
 }
 
+void copy_counts(const TileResult& from, RayCounts& to) {
+  const Rect& rect = from.rect;
+  for (int y = 0; y < rect.height; ++y) {
+    std::copy_n(from.rays.begin() + static_cast<std::ptrdiff_t>(y) * rect.width, rect.width,
+                to.pixels.begin() + static_cast<std::ptrdiff_t>(rect.y + y) * to.width + rect.x);
+  }
+}
+
 void copy_rows(const std::vector<capture::Half>& from, const Rect& rect, capture::HalfImage& to) {
   const auto row = static_cast<std::ptrdiff_t>(rect.width) * to.channels;
   for (int y = 0; y < rect.height; ++y) {
@@ -61,6 +69,10 @@ void render_frame(const FrameInputs& inputs,
   size_image(result.rgba, height, width, 4);
   size_image(result.matte, height, width, 1);
   result.statistics = {};
+  result.rays.width = inputs.count_rays ? width : 0;
+  result.rays.height = inputs.count_rays ? height : 0;
+  result.rays.pixels.resize(static_cast<std::size_t>(result.rays.width) *
+                            static_cast<std::size_t>(result.rays.height));
   const int size = job.effort.tile_size;
   const int columns = (width + size - 1) / size, rows = (height + size - 1) / size;
   std::mutex statistics_mutex;
@@ -70,10 +82,11 @@ void render_frame(const FrameInputs& inputs,
     rect.width = std::min(size, width - rect.x);
     rect.height = std::min(size, height - rect.y);
     cut_tile(plate, rect, 0, worker.job);
-    size_result(rect, worker.result);
+    size_result(rect, worker.result, inputs.count_rays);
     render_tile(context, worker.job, worker.workspace, worker.result);
     copy_rows(worker.result.rgba, rect, result.rgba);
     copy_rows(worker.result.matte, rect, result.matte);
+    if (inputs.count_rays) copy_counts(worker.result, result.rays);
     const std::lock_guard lock(statistics_mutex);
     result.statistics += worker.result.statistics;
   };

@@ -25,11 +25,13 @@ struct FrameInputs {
   // environment in its place.
   const capture::HalfImage* plate = nullptr;
   const calibrate::Lens* lens = nullptr;
+  bool count_rays = false;  // fill FrameResult::rays; the picture's bits are the same
 };
 
 struct FrameResult {
   capture::HalfImage rgba;   // (height, width, 4)
   capture::HalfImage matte;  // (height, width, 1)
+  RayCounts rays;            // if asked for, else empty
   RenderStatistics statistics;
 };
 

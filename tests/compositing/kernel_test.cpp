@@ -404,19 +404,23 @@ TEST(RenderTile, DoesNotAllocate) {
   GTEST_SKIP() << "a sanitizer allocates by itself";
 #endif
   const MadeShot shot = made_shot(128, 96, made_scene());
-  const render::FrameContext context = make_frame_context(shot.inputs(), shot.job);
-  render::TileWorkspace workspace;
-  render::TileJob tile;
-  render::TileResult result;
-  const render::Rect rect{0, 0, 128, 96};
-  cut_tile(shot.plate, rect, 0, tile);
-  size_result(rect, result);
-  render_tile(context, tile, workspace, result);
-  allocations = 0;
-  counting = true;
-  render_tile(context, tile, workspace, result);
-  counting = false;
-  EXPECT_EQ(allocations, 0);
+  for (const bool count_rays : {false, true}) {
+    render::FrameInputs inputs = shot.inputs();
+    inputs.count_rays = count_rays;
+    const render::FrameContext context = make_frame_context(inputs, shot.job);
+    render::TileWorkspace workspace;
+    render::TileJob tile;
+    render::TileResult result;
+    const render::Rect rect{0, 0, 128, 96};
+    cut_tile(shot.plate, rect, 0, tile);
+    size_result(rect, result, count_rays);
+    render_tile(context, tile, workspace, result);
+    allocations = 0;
+    counting = true;
+    render_tile(context, tile, workspace, result);
+    counting = false;
+    EXPECT_EQ(allocations, 0) << count_rays;
+  }
 }
 
 TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
