@@ -55,6 +55,15 @@ void Arguments::choices(const std::string& names,
       ->check(CLI::IsMember(choices));
 }
 
+void Arguments::choice(const std::string& names,
+                       std::string& target,
+                       const std::vector<std::string>& choices,
+                       const std::string& help) {
+  std::string list;
+  for (const std::string& choice : choices) list += (list.empty() ? "" : "|") + choice;
+  app_->add_option(names, target, help)->type_name(list)->check(CLI::IsMember(choices));
+}
+
 void Arguments::repeated(const std::string& names,
                          std::vector<std::string>& target,
                          const std::string& help) {

@@ -51,6 +51,11 @@ class Arguments {
                std::vector<std::string>& target,
                const std::vector<std::string>& choices,
                const std::string& help);
+  // One of `choices`.
+  void choice(const std::string& names,
+              std::string& target,
+              const std::vector<std::string>& choices,
+              const std::string& help);
   // One value each time it is given.
   void repeated(const std::string& names,
                 std::vector<std::string>& target,

@@ -113,6 +113,13 @@ std::string show_figures(const Set& set,
             {"peak_memory_mb", peak_memory_mb()},
             {"notes", s.notes}};
   if (s.match.matrix) json["match_matrix"] = *s.match.matrix;
+  if (s.pixel_figures) {
+    for (std::size_t i = 0; i < s.pixel_figures->size(); ++i) {
+      const render::RayViewFigures& figures = (*s.pixel_figures)[i];
+      json["per_pixel"][render::ray_view_names()[i]] = {{"mean", figures.mean},
+                                                        {"max", figures.max}};
+    }
+  }
   if (error) {
     json["error"] = {
         {"relative_rms", error->relative_rms},

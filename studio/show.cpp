@@ -37,6 +37,7 @@ struct Work {
   PreparedFrame frame;
   std::int64_t dropped = 0;  // frames left out so far
   capture::CameraStatistics plate;
+  std::optional<render::RayView> view;
   std::vector<RecorderCommand> recorder;  // before this frame
 };
 
@@ -147,6 +148,7 @@ class Show::Stages {
       const Clock::duration making = Clock::now() - begin;
       work.frame = std::move(*frame);
       work.dropped = dropped;
+      work.view = view_;
       work.plate = maker_.plate().statistics();
       if (!work_.give(std::move(work))) return;
       // What is made sooner than it can be rendered only waits, and grows old. The first frame is
@@ -210,6 +212,7 @@ class Show::Stages {
                             [&](const StartRecording& c) { work.recorder.emplace_back(c); },
                             [&](const StopRecording& c) { work.recorder.emplace_back(c); },
                             [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
+                            [&](const SetView& c) { view_ = c.view; },
                             [&](const SetPaused& c) { paused_ = c.paused; },
                             [&](ChangeSet& c) { maker_.change_set(std::move(c.set)); },
                             [](const Quit&) {}},
@@ -227,6 +230,7 @@ class Show::Stages {
     timed(shown, Stage::render, [&] {
       render::FrameInputs inputs = shown.prepared.inputs();
       inputs.kept = &kept_;
+      inputs.count_rays = work.view.has_value();
       render::render_frame(inputs, shown.prepared.job, *shown.prepared.plate, *result);
     });
     shown.result = result;
@@ -236,6 +240,7 @@ class Show::Stages {
       const capture::HalfImage& rgba = result->rgba;
       rgb8->resize(rgba.pixels.size() / 4 * 3);
       tally_.status().display_nan += display_->to_rgb8(rgba, *rgb8);
+      if (work.view) shown.view_rgb8 = draw_view(result->rays, *work.view);
     });
     shown.rgb8 = rgb8;
     const Clock::time_point displayed = Clock::now();
@@ -248,6 +253,16 @@ class Show::Stages {
     tally_.status().damaged_plate_frames = work.plate.damaged;
     publish(false);
     if (on_frame) on_frame(shown);
+  }
+
+  std::shared_ptr<const std::vector<std::uint8_t>> draw_view(const render::RayCounts& counts,
+                                                             render::RayView view) {
+    const auto rgb8 = pictures_.lend();
+    rgb8->resize(counts.pixels.size() * 3);
+    render::draw_false_colour(counts, view, *rgb8);
+    render::draw_legend(view, counts.width, counts.height, *rgb8);
+    tally_.status().pixel_figures = render::figures_of(counts);
+    return rgb8;
   }
 
   // Once whenever the light ceases to be renewed.
@@ -325,6 +340,7 @@ class Show::Stages {
 
   // Of the thread that makes inputs, once it runs.
   FrameMaker maker_;
+  std::optional<render::RayView> view_;
   Clock::duration paused_for_{};
 
   // Of the caller's thread.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "compositing/recorder.h"
+#include "render/false_colour.h"
 #include "render/renderer.h"
 #include "studio/frame_maker.h"
 #include "studio/set.h"
@@ -32,6 +33,11 @@ struct MoveObject {
   std::string name;
   PlacementSettings pose;
 };
+// What the operator sees in place of the picture, from now on; nothing = the picture. What is
+// recorded and sent out stays.
+struct SetView {
+  std::optional<render::RayView> view;
+};
 struct SetPaused {
   bool paused = false;
 };
@@ -39,8 +45,14 @@ struct ChangeSet {
   Set set;
 };
 struct Quit {};
-using ShowCommand =
-    std::variant<SetEffort, StartRecording, StopRecording, MoveObject, SetPaused, ChangeSet, Quit>;
+using ShowCommand = std::variant<SetEffort,
+                                 StartRecording,
+                                 StopRecording,
+                                 MoveObject,
+                                 SetView,
+                                 SetPaused,
+                                 ChangeSet,
+                                 Quit>;
 
 // How the show stands after a frame.
 struct ShowStatus {
@@ -66,6 +78,8 @@ struct ShowStatus {
   std::int64_t damaged_plate_frames = 0;
   std::int64_t display_nan = 0;  // pixels that reached the display without a number
   render::Effort effort;
+  // What pixels took, by view, in the last frame that had one.
+  std::optional<std::array<render::RayViewFigures, render::ray_views>> pixel_figures;
   bool paused = false;
   bool recording = false;
   compositing::RecorderStatus recorder;  // of the present or last recording
@@ -77,7 +91,8 @@ struct ShowStatus {
 struct ShownFrame {
   PreparedFrame prepared;
   std::shared_ptr<const render::FrameResult> result;
-  std::shared_ptr<const std::vector<std::uint8_t>> rgb8;  // (height, width, 3) display codes
+  std::shared_ptr<const std::vector<std::uint8_t>> rgb8;       // (height, width, 3) display codes
+  std::shared_ptr<const std::vector<std::uint8_t>> view_rgb8;  // the view asked for, or null
 };
 
 struct ShowOptions {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "capture/png.h"
 #include "studio/commands/commands.h"
 #include "studio/effort_points.h"
 #include "studio/figures.h"
@@ -27,6 +28,8 @@ struct RunOptions {
   std::optional<std::int64_t> check_error;
   std::string record;
   std::string exr;
+  std::string view;
+  std::string view_png;
 };
 
 std::string absolute(const std::string& path) { return std::filesystem::absolute(path).string(); }
@@ -112,6 +115,7 @@ void run(const RunOptions& options, Console& console) {
   show_options.live = options.live;
   show_options.frames = options.frames;
   Show show(set, show_options);
+  if (!options.view.empty()) show.post(SetView{render::ray_view_named(options.view)});
   const std::optional<std::int64_t> planned = show.planned_frames();
 
   std::unique_ptr<SetWatch> watch;
@@ -136,6 +140,9 @@ void run(const RunOptions& options, Console& console) {
 
   const ShowStatus status = *show.status();
   report_end(status, set, console);
+  if (!options.view_png.empty() && last.view_rgb8) {
+    capture::write_png(options.view_png, set.show.width, set.show.height, 3, *last.view_rgb8);
+  }
   std::optional<render::PictureError> error;
   if (options.check_error && last.result) {
     error = error_against(truth_of(last, static_cast<int>(*options.check_error)), last);
@@ -171,7 +178,14 @@ Command run_command() {
             arguments.option("--error", o->error, 0, 1,
                              "the fastest effort within this error (.01 = 1 %), by the chart of "
                              "this set");
+            arguments.choice("--view", o->view, render::ray_view_names(),
+                             "show what pixels take, in false colours, in place of the picture; "
+                             "what is recorded stays");
+            arguments.option("--view-png", o->view_png, "write the last frame's view to this file");
             return [o](Console& console) {
+              if (!o->view_png.empty() && o->view.empty()) {
+                throw UsageError("--view-png: which --view?");
+              }
               if (o->fps && o->error) throw UsageError("--fps and --error: only one can be held");
               run(*o, console);
             };

@@ -19,6 +19,7 @@ struct StillOptions {
   std::string out;
   std::optional<std::int64_t> frame;
   std::vector<std::string> overlays;
+  std::string view;
 };
 
 void still(const StillOptions& options, Console& console) {
@@ -28,11 +29,12 @@ void still(const StillOptions& options, Console& console) {
   show_options.frames = 1;
   show_options.record = false;
   Show show(set, show_options);
+  if (!options.view.empty()) show.post(SetView{render::ray_view_named(options.view)});
   ShownFrame shown;
   show.run([&](const ShownFrame& frame) { shown = frame; });
   if (!shown.rgb8) throw std::runtime_error(set.path + ": the plate has no such frame");
 
-  std::vector<std::uint8_t> picture = *shown.rgb8;
+  std::vector<std::uint8_t> picture = shown.view_rgb8 ? *shown.view_rgb8 : *shown.rgb8;
   draw_overlays(set, shown, options.overlays, picture);
   capture::write_png(options.out, set.show.width, set.show.height, 3, picture);
   console.figures(show_figures(set, *show.status(), {}));
@@ -51,6 +53,8 @@ Command still_command() {
             arguments.required("--out");
             arguments.option("--frame", o->frame, 0, 100'000'000, "which frame of the set");
             arguments.choices("--overlay", o->overlays, overlay_names(), "what to draw over it");
+            arguments.choice("--view", o->view, render::ray_view_names(),
+                             "in place of the picture, what its pixels took, in false colours");
             return [o](Console& console) { still(*o, console); };
           }};
 }

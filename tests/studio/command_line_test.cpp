@@ -267,6 +267,31 @@ TEST_F(Runs, DrawOverlaysOverAStill) {
   EXPECT_EQ(run("still " + set + " -o " + plain + " --overlay gird").status, 2);
 }
 
+TEST_F(Runs, ShowWhatPixelsTookInPlaceOfThePicture) {
+  const std::string set = write_set();
+  const std::string json = (dir_ / "still.json").string();
+  std::vector<std::string> pictures;
+  for (const std::string view : {"depth", "rays", "shadow_rays", "error"}) {
+    const fs::path png = dir_ / (view + ".png");
+    const Outcome outcome =
+        run("still " + set + " -o " + png.string() + " --view " + view + " --json " + json);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const std::string content = content_of(png);
+    EXPECT_TRUE(content.starts_with("\x89PNG"));
+    EXPECT_EQ(std::ranges::count(pictures, content), 0) << view;
+    pictures.push_back(content);
+    const nlohmann::json figures = nlohmann::json::parse(content_of(json))["per_pixel"];
+    EXPECT_EQ(figures.size(), 4U);
+    EXPECT_GE(figures["rays"]["mean"], 1);
+    EXPECT_GE(figures[view]["max"], figures[view]["mean"]);
+  }
+  const std::string last = (dir_ / "last.png").string();
+  EXPECT_EQ(run("run " + set + " --frames 3 --view rays --view-png " + last).status, 0);
+  EXPECT_EQ(content_of(last), pictures[1]);
+  EXPECT_EQ(run("still " + set + " -o " + last + " --view colours").status, 2);
+  EXPECT_EQ(run("run " + set + " --view-png " + last).status, 2);
+}
+
 TEST_F(Runs, ConvertAnHdrPicture) {
   write_set();
   const std::string out = (dir_ / "out.exr").string();

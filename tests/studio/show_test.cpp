@@ -280,6 +280,37 @@ TEST_F(ShowTest, RecordsFromOneFrameToAnother) {
   EXPECT_EQ(show.status()->recorder.error, "");
 }
 
+TEST_F(ShowTest, ShowsAViewBesideAPictureThatStaysAsItIs) {
+  const Set set = made_set("grey:1,25,0");
+  ShowOptions options;
+  options.frames = 8;
+  const Pictures plain = pictures_of(set, options, 0ms);
+  Show show(set, options);
+  std::vector<bool> viewed;
+  Pictures pictures;
+  std::vector<std::uint8_t> codes;
+  show.run([&](const ShownFrame& shown) {
+    pictures.push_back(shown.result->rgba.pixels);
+    viewed.push_back(shown.view_rgb8 != nullptr);
+    EXPECT_EQ(shown.result->rays.pixels.empty(), !viewed.back());
+    if (codes.empty()) codes = *shown.rgb8;
+    EXPECT_EQ(*shown.rgb8, codes) << "what is recorded";
+    if (viewed.back()) {
+      EXPECT_EQ(shown.view_rgb8->size(), codes.size());
+      EXPECT_NE(*shown.view_rgb8, codes);
+    }
+    if (shown.prepared.job.frame == 1) show.post(SetView{render::RayView::rays});
+    if (shown.prepared.job.frame == 4) show.post(SetView{});
+  });
+  EXPECT_EQ(pictures, plain);
+  EXPECT_FALSE(viewed.front());
+  EXPECT_TRUE(viewed[4]);
+  EXPECT_FALSE(viewed.back());
+  const auto figures = show.status()->pixel_figures;
+  ASSERT_TRUE(figures);
+  EXPECT_GE((*figures)[static_cast<std::size_t>(render::RayView::rays)].mean, 1);
+}
+
 TEST_F(ShowTest, RefusesAPlateOfAnotherSizeAtItsPlace) {
   Set set = made_set("grey:1,25,0");
   set.show.width = 32;
