@@ -282,33 +282,54 @@ void Display::bake() {
 }
 
 template <typename Code, typename Emit>
-std::int64_t Display::convert(std::span<const capture::Half> rgba,
-                              const std::vector<Code>& table,
-                              Emit emit) const {
+void Display::emit_codes(std::span<const capture::Half> rgba,
+                         const std::vector<Code>& table,
+                         Emit emit) const {
   if (separable()) {
     emit_exact(rgba, table, emit);
   } else {
     emit_baked<Code>(rgba, positions_, nodes_, table_size_, emit);
   }
+}
+
+template <typename Code, typename Emit>
+std::int64_t Display::convert(std::span<const capture::Half> rgba,
+                              const std::vector<Code>& table,
+                              const ToneCurve& tone,
+                              Emit emit) const {
+  if (!tone.is_on()) {
+    emit_codes(rgba, table, emit);
+    return count_pixels_with_nan(rgba);
+  }
+  std::array<capture::Half, 4 * Tetrahedra::block> toned;
+  for (std::size_t first = 0; first < rgba.size(); first += toned.size()) {
+    const auto run = rgba.subspan(first, std::min(toned.size(), rgba.size() - first));
+    apply_tone(tone, run, toned);
+    emit_codes(std::span<const capture::Half>(toned).first(run.size()), table,
+               [&](std::size_t i, Code r, Code g, Code b) { emit(first / 4 + i, r, g, b); });
+  }
   return count_pixels_with_nan(rgba);
 }
 
 std::int64_t Display::to_rgb8(std::span<const capture::Half> rgba,
-                              std::span<std::uint8_t> rgb) const {
+                              std::span<std::uint8_t> rgb,
+                              const ToneCurve& tone) const {
   require_size(rgba.size() / 4, rgb.size(), 3);
-  return convert(rgba, bytes_, emit_triples(rgb));
+  return convert(rgba, bytes_, tone, emit_triples(rgb));
 }
 
 std::int64_t Display::to_rgb16(std::span<const capture::Half> rgba,
-                               std::span<std::uint16_t> rgb) const {
+                               std::span<std::uint16_t> rgb,
+                               const ToneCurve& tone) const {
   require_size(rgba.size() / 4, rgb.size(), 3);
-  return convert(rgba, codes_, emit_triples(rgb));
+  return convert(rgba, codes_, tone, emit_triples(rgb));
 }
 
 std::int64_t Display::to_rgb32(std::span<const capture::Half> rgba,
-                               std::span<std::uint32_t> words) const {
+                               std::span<std::uint32_t> words,
+                               const ToneCurve& tone) const {
   require_size(rgba.size() / 4, words.size(), 1);
-  return convert(rgba, bytes_,
+  return convert(rgba, bytes_, tone,
                  [words](std::size_t i, std::uint8_t r, std::uint8_t g, std::uint8_t b) {
                    words[i] = 0xff000000U | std::uint32_t{r} << 16U | std::uint32_t{g} << 8U | b;
                  });
@@ -337,17 +358,22 @@ std::int64_t Display::convert_image(const capture::HalfImage& rgba,
       std::plus<>());
 }
 
-std::int64_t Display::to_rgb8(const capture::HalfImage& rgba, std::span<std::uint8_t> rgb) const {
-  return convert_image(rgba, rgb, 3, [this](auto in, auto out) { return to_rgb8(in, out); });
+std::int64_t Display::to_rgb8(const capture::HalfImage& rgba,
+                              std::span<std::uint8_t> rgb,
+                              const ToneCurve& tone) const {
+  return convert_image(rgba, rgb, 3, [&](auto in, auto out) { return to_rgb8(in, out, tone); });
 }
 
-std::int64_t Display::to_rgb16(const capture::HalfImage& rgba, std::span<std::uint16_t> rgb) const {
-  return convert_image(rgba, rgb, 3, [this](auto in, auto out) { return to_rgb16(in, out); });
+std::int64_t Display::to_rgb16(const capture::HalfImage& rgba,
+                               std::span<std::uint16_t> rgb,
+                               const ToneCurve& tone) const {
+  return convert_image(rgba, rgb, 3, [&](auto in, auto out) { return to_rgb16(in, out, tone); });
 }
 
 std::int64_t Display::to_rgb32(const capture::HalfImage& rgba,
-                               std::span<std::uint32_t> words) const {
-  return convert_image(rgba, words, 1, [this](auto in, auto out) { return to_rgb32(in, out); });
+                               std::span<std::uint32_t> words,
+                               const ToneCurve& tone) const {
+  return convert_image(rgba, words, 1, [&](auto in, auto out) { return to_rgb32(in, out, tone); });
 }
 
 CodeError Display::measure_error(const capture::HalfImage& rgba) const {

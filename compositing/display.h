@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "capture/image.h"
+#include "compositing/tone.h"
 #include "compositing/view_transform.h"
 
 namespace compositing {
@@ -45,15 +46,28 @@ class Display {
   // Converts a whole (height, width, 4) image, on all threads, to (height, width, 3) codes, or to
   // 0xffRRGGBB words as windows take them. Alpha is not applied: RGB is the finished picture.
   // Returns how many pixels had a NaN. Throws std::invalid_argument if the sizes do not agree.
-  std::int64_t to_rgb8(const capture::HalfImage& rgba, std::span<std::uint8_t> rgb) const;
-  std::int64_t to_rgb16(const capture::HalfImage& rgba, std::span<std::uint16_t> rgb) const;
-  std::int64_t to_rgb32(const capture::HalfImage& rgba, std::span<std::uint32_t> words) const;
+  // `tone` is applied before the view; none by default.
+  std::int64_t to_rgb8(const capture::HalfImage& rgba,
+                       std::span<std::uint8_t> rgb,
+                       const ToneCurve& tone = {}) const;
+  std::int64_t to_rgb16(const capture::HalfImage& rgba,
+                        std::span<std::uint16_t> rgb,
+                        const ToneCurve& tone = {}) const;
+  std::int64_t to_rgb32(const capture::HalfImage& rgba,
+                        std::span<std::uint32_t> words,
+                        const ToneCurve& tone = {}) const;
 
   // The same for a run of pixels (some rows, a piece of one) on the calling thread: for callers
   // that go tile by tile. Allocates nothing.
-  std::int64_t to_rgb8(std::span<const capture::Half> rgba, std::span<std::uint8_t> rgb) const;
-  std::int64_t to_rgb16(std::span<const capture::Half> rgba, std::span<std::uint16_t> rgb) const;
-  std::int64_t to_rgb32(std::span<const capture::Half> rgba, std::span<std::uint32_t> words) const;
+  std::int64_t to_rgb8(std::span<const capture::Half> rgba,
+                       std::span<std::uint8_t> rgb,
+                       const ToneCurve& tone = {}) const;
+  std::int64_t to_rgb16(std::span<const capture::Half> rgba,
+                        std::span<std::uint16_t> rgb,
+                        const ToneCurve& tone = {}) const;
+  std::int64_t to_rgb32(std::span<const capture::Half> rgba,
+                        std::span<std::uint32_t> words,
+                        const ToneCurve& tone = {}) const;
 
   // Whether the exact tables serve.
   bool separable() const { return nodes_.empty(); }
@@ -65,8 +79,13 @@ class Display {
   void make_exact_tables(const DisplaySettings& settings);
   void bake();
   template <typename Code, typename Emit>
+  void emit_codes(std::span<const capture::Half> rgba,
+                  const std::vector<Code>& table,
+                  Emit emit) const;
+  template <typename Code, typename Emit>
   std::int64_t convert(std::span<const capture::Half> rgba,
                        const std::vector<Code>& table,
+                       const ToneCurve& tone,
                        Emit emit) const;
   template <typename Value, typename Run>
   std::int64_t convert_image(const capture::HalfImage& rgba,

@@ -54,7 +54,7 @@ struct FrameJob {
   std::vector<TextureTime> textures;  // [0] is the plate, [1] the environment
   LightTable lights;
   ColourMatrix match = same_colours;  // probe radiance to plate units, already in `lights`
-  std::array<float, 2> tone{1, 0};    // parameters of the tone curve (later issues)
+  std::array<float, 2> tone{1, 0};    // of the display's curve: p and the brightest, 0 = none
   friend bool operator==(const FrameJob&, const FrameJob&) = default;
 };
 
