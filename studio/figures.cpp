@@ -113,6 +113,7 @@ std::string show_figures(const Set& set,
             {"peak_memory_mb", peak_memory_mb()},
             {"notes", s.notes}};
   if (s.match.matrix) json["match_matrix"] = *s.match.matrix;
+  if (set.display.tone) json["tone"] = {{"p", s.tone[0]}, {"brightest", s.tone[1]}};
   if (s.pixel_figures) {
     for (std::size_t i = 0; i < s.pixel_figures->size(); ++i) {
       const render::RayViewFigures& figures = (*s.pixel_figures)[i];

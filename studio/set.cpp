@@ -69,11 +69,31 @@ ShowSettings read_show_section(Section section) {
   return show;
 }
 
+void read_tone(Section& section, std::optional<ToneSettings>& tone) {
+  std::string name = "none";
+  section.text("tone", name);
+  if (name != "none" && name != "schlick") {
+    section.fault("tone", fmt::format("must be \"none\" or \"schlick\", not \"{}\"", name));
+  }
+  ToneSettings settings;
+  float key = 0;
+  if (section.number("key", key, {0.001, 0.9})) settings.key = key;
+  section.number("tone_seconds", settings.seconds, {0.01, 1000});
+  if (name == "schlick") {
+    tone = settings;
+    return;
+  }
+  for (const char* given : {"key", "tone_seconds"}) {
+    if (section.has(given)) section.fault(given, "is for tone = \"schlick\"");
+  }
+}
+
 DisplayChoice read_display_section(Section section) {
   DisplayChoice display;
   display.place = section.place();
   section.text("display", display.display);
   section.text("view", display.view);
+  read_tone(section, display.tone);
   section.finish();
   return display;
 }

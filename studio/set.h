@@ -143,9 +143,16 @@ struct LampSettings {
       intensity{};  // radiant intensity (of a disc: straight ahead), in the plate's units
 };
 
+// The display's tone mapping, see ToneFollower.
+struct ToneSettings {
+  std::optional<float> key;  // level of the picture's middle; nothing = as it is
+  double seconds = 1;        // in which the curve follows the picture's levels to 63 %
+};
+
 struct DisplayChoice {
   std::string display;  // "" = compositing's default
   std::string view;
+  std::optional<ToneSettings> tone;  // nothing = the view alone
   Place place;
 };
 

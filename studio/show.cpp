@@ -16,6 +16,7 @@
 #include "studio/handover.h"
 #include "studio/recording.h"
 #include "studio/tally.h"
+#include "studio/tone_follower.h"
 
 namespace studio {
 namespace {
@@ -81,6 +82,7 @@ class Show::Stages {
     display_ = at_place(s, s.display.place, [&] {
       return std::make_unique<compositing::Display>(display_settings(s));
     });
+    if (s.display.tone) tone_.emplace(*s.display.tone);
     frames_ = options.frames ? options.frames : s.show.frames;
     if (!frames_ && !options_.live && maker_.is_endless()) frames_ = 1;
     planned_frames_ = frames_ ? frames_ : frames_of_plate();
@@ -227,6 +229,7 @@ class Show::Stages {
     ShownFrame shown;
     shown.prepared = std::move(work.frame);
     const std::shared_ptr<render::FrameResult> result = results_.lend();
+    set_tone(shown.prepared.job);
     timed(shown, Stage::render, [&] {
       render::FrameInputs inputs = shown.prepared.inputs();
       inputs.kept = &kept_;
@@ -239,7 +242,9 @@ class Show::Stages {
     timed(shown, Stage::display, [&] {
       const capture::HalfImage& rgba = result->rgba;
       rgb8->resize(rgba.pixels.size() / 4 * 3);
-      tally_.status().display_nan += display_->to_rgb8(rgba, *rgb8);
+      follow_tone(rgba, shown.prepared.job);
+      const compositing::ToneCurve curve = compositing::curve_of(shown.prepared.job.tone);
+      tally_.status().display_nan += display_->to_rgb8(rgba, *rgb8, curve);
       if (work.view) shown.view_rgb8 = draw_view(result->rays, *work.view);
     });
     shown.rgb8 = rgb8;
@@ -253,6 +258,20 @@ class Show::Stages {
     tally_.status().damaged_plate_frames = work.plate.damaged;
     publish(false);
     if (on_frame) on_frame(shown);
+  }
+
+  // The curve by the pictures before this frame, so that it goes with all tiles of the job.
+  void set_tone(render::FrameJob& job) const {
+    const auto curve = tone_ ? tone_->curve() : std::nullopt;
+    if (curve) job.tone = compositing::parameters_of(*curve);
+  }
+
+  // For the next frame; where there was none before, for this one too.
+  void follow_tone(const capture::HalfImage& rgba, render::FrameJob& job) {
+    if (!tone_) return;
+    const bool first = !tone_->curve();
+    tone_->follow(compositing::measure_levels(rgba), job.time);
+    if (first) set_tone(job);
   }
 
   std::shared_ptr<const std::vector<std::uint8_t>> draw_view(const render::RayCounts& counts,
@@ -333,6 +352,7 @@ class Show::Stages {
   // Of the caller's thread.
   Tally tally_;
   std::unique_ptr<compositing::Display> display_;
+  std::optional<ToneFollower> tone_;
   render::KeptTransport kept_;
   std::string light_kept_because_;
   capture::Pool<render::FrameResult> results_;

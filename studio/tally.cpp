@@ -49,6 +49,7 @@ void Tally::add(const ShownFrame& shown, Clock::time_point displayed) {
   s.light_error_estimate = frame.job.lights.error_estimate;
   s.lights = frame.job.lights.lights.size();
   s.effort = frame.job.effort;
+  s.tone = frame.job.tone;
 }
 
 }  // namespace studio

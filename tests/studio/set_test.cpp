@@ -116,6 +116,9 @@ tile_size = 32
 [display]
 display = "sRGB"
 view = "Un-tone-mapped"
+tone = "schlick"
+key = 0.2
+tone_seconds = 0.5
 [record]
 file = "take.mkv"
 exr = "take"
@@ -160,6 +163,9 @@ timecode = "10:00:00:00"
   EXPECT_FLOAT_EQ(set.effort.glint_contrast, 0.3F);
   EXPECT_FALSE(set.effort.adaptive_visibility);
   EXPECT_EQ(set.display.display, "sRGB");
+  ASSERT_TRUE(set.display.tone);
+  EXPECT_EQ(set.display.tone->key, 0.2F);
+  EXPECT_EQ(set.display.tone->seconds, 0.5);
   EXPECT_EQ(set.record.file, (dir_ / "take.mkv").string());
   EXPECT_EQ(set.record.timecode, "10:00:00:00");
 }

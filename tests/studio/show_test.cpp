@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <fstream>
 #include <thread>
 
+#include "studio/tone_follower.h"
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
 
@@ -309,6 +312,56 @@ TEST_F(ShowTest, ShowsAViewBesideAPictureThatStaysAsItIs) {
   const auto figures = show.status()->pixel_figures;
   ASSERT_TRUE(figures);
   EXPECT_GE((*figures)[static_cast<std::size_t>(render::RayView::rays)].mean, 1);
+}
+
+// A plate alone, by which the display's codes are those that came in.
+constexpr char only_plate[] =
+    "[show]\nwidth = 64\nheight = 48\n[camera]\nsource = \"grey:6,25,0\"\n";
+
+TEST_F(ShowTest, LeavesAPlateToItselfWithoutTone) {
+  const std::filesystem::path path = dir_ / "plate.toml";
+  std::ofstream(path) << only_plate;
+  Show show(read_set(path.string()));
+  show.run([](const ShownFrame& shown) {
+    EXPECT_EQ(shown.prepared.job.tone, (std::array<float, 2>{1, 0}));
+    const float grey = 0.1F + static_cast<float>(shown.prepared.job.frame) / 100;
+    const float code = 255 * std::pow(grey, 1 / 2.4F);
+    for (const std::uint8_t shown_code : *shown.rgb8) ASSERT_NEAR(shown_code, code, 1);
+  });
+  EXPECT_EQ(show.status()->frames, 6);
+}
+
+TEST_F(ShowTest, TakesATonesCurveFromThePicturesBefore) {
+  const Set set = made_set("grey:6,25,0", "[display]\ntone = \"schlick\"\nkey = 0.4\n");
+  std::vector<std::array<float, 2>> tones;
+  std::vector<std::vector<std::uint8_t>> codes;
+  const auto play = [&](std::chrono::milliseconds delay) {
+    std::vector<std::array<float, 2>> played;
+    ToneFollower follower(*set.display.tone);
+    codes.clear();
+    Show show(set);
+    show.run([&](const ShownFrame& shown) {
+      const render::FrameJob& job = shown.prepared.job;
+      const auto before = follower.curve();
+      follower.follow(compositing::measure_levels(shown.result->rgba), job.time);
+      const auto expected = before ? before : follower.curve();
+      EXPECT_EQ(job.tone, compositing::parameters_of(*expected)) << job.frame;
+      played.push_back(job.tone);
+      codes.push_back(*shown.rgb8);
+      std::this_thread::sleep_for(delay);
+    });
+    EXPECT_EQ(show.status()->tone, played.back());
+    return played;
+  };
+  tones = play(0ms);
+  const auto first_codes = codes;
+  EXPECT_EQ(tones.size(), 6U);
+  EXPECT_EQ(tones[0], tones[1]);
+  EXPECT_NE(tones[1], tones[5]);
+  EXPECT_EQ(play(5ms), tones);
+  EXPECT_EQ(codes, first_codes);
+  EXPECT_EQ(pictures_of(set, {}, 0ms), pictures_of(made_set("grey:6,25,0"), {}, 0ms))
+      << "what is recorded as EXR is linear";
 }
 
 TEST_F(ShowTest, RefusesAPlateOfAnotherSizeAtItsPlace) {
