@@ -87,8 +87,9 @@ Command bench_command() {
             "kernel, papers (both papers' scenes), inputs (plate, probe, light table), or hdr (a "
             "live probe's frames)");
         arguments.option("--set", o->set, "the set file whose inputs are measured");
-        arguments.option("--pictures", o->pictures,
-                         "papers: a directory for a picture of every scene");
+        arguments.option(
+            "--pictures", o->pictures,
+            "papers: a directory for pictures of every scene: itself, and depth and rays by pixel");
         arguments.option("--check-error", o->check, 0, 65536,
                          "papers: paths a pixel of the reference; 0 = none");
         arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");

@@ -10,6 +10,7 @@
 
 #include "capture/png.h"
 #include "compositing/display.h"
+#include "render/false_colour.h"
 #include "render/paper_scenes.h"
 #include "studio/commands/benches.h"
 #include "studio/commands/kernel_rate.h"
@@ -59,6 +60,23 @@ void write_picture(const std::string& path, const capture::Image& rgba) {
   capture::write_png(path, rgba.width, rgba.height, 3, codes);
 }
 
+// The depth of every pixel's ray tree and its rays, as the headlight paper's figures 2 and 3.
+void write_views(const std::string& path_start,
+                 const BenchScene& shot,
+                 const render::FrameJob& job) {
+  render::FrameInputs inputs = shot.inputs();
+  inputs.count_rays = true;
+  render::FrameResult result;
+  render_frame(inputs, job, shot.half_plate, result);
+  std::vector<std::uint8_t> codes(result.rays.pixels.size() * 3);
+  for (const render::RayView view : {render::RayView::depth, render::RayView::rays}) {
+    draw_false_colour(result.rays, view, codes);
+    draw_legend(view, width, height, codes);
+    const std::string& name = render::ray_view_names()[static_cast<std::size_t>(view)];
+    capture::write_png(fmt::format("{}_{}.png", path_start, name), width, height, 3, codes);
+  }
+}
+
 Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
   const auto [shot, compile_ms] = make_paper_shot(name, width, height);
   render::FrameJob fast = shot.job;
@@ -102,6 +120,7 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
   }
   if (!bench.pictures.empty()) {
     write_picture(fmt::format("{}/{}.png", bench.pictures, name), picture);
+    write_views(fmt::format("{}/{}", bench.pictures, name), shot, fast);
   }
   const auto figures = render::paper_figures();
   const auto theirs = std::ranges::find(figures, name, &render::PaperFigure::scene);
