@@ -17,9 +17,14 @@ namespace {
 void clear_answer(ShadePoint& p) {
   p.radiance = p.diffuse = p.light_normal = p.plate_share = p.environment_share = {};
   p.catches_shadow = p.catches_lamps = false;
+  p.video = {};
 }
 
 bool sees_stand_ins(RayKind kind) { return kind == RayKind::camera || kind == RayKind::bent; }
+
+// The full angle of a disc that holds half of its light as near its middle as a lobe does: half of
+// a lobe lies within 2 alpha of the mirrored direction.
+float lobe_width(float roughness) { return 2 * 2 / 0.7F * roughness * roughness; }
 
 // Whether the table's light matters to a point.
 bool receives_light(const ShadePoint& p) {
@@ -115,8 +120,8 @@ void CellBaker::pack() {
   CellTransport& t = *transport_;
   std::copy_n(base_.begin(), cell_pixels, t.base.begin());
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
-  t.empty =
-      t.receiving == CellMask{} && t.environment.empty() && t.lights.empty() && t.bent.empty();
+  t.empty = t.receiving == CellMask{} && t.environment.empty() && t.lights.empty() &&
+            t.bent.empty() && t.video.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;
@@ -257,6 +262,7 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
                                             p.incoming);
   }
   p.spread_rad = frame_->pixel_angle;
+  p.blur_m = 0;
   p.footprint_m = s.far_m[i] < ray_far ? s.far_m[i] * p.spread_rad : 0;
   p.throughput = {1, 1, 1};
   p.pixel = pixel;
@@ -328,6 +334,7 @@ void CellBaker::collect(const ShadePoint& p) {
   const Vec3f own = p.throughput * p.radiance;
   base.radiance += own;
   sample.added += own + p.throughput * p.diffuse * light.arriving;
+  if (p.video.index >= 0) add_video(p);
   if (p.environment_share != Vec3f{}) {
     add_environment(p.slot, target_of(p), p.incoming, 0, {}, false,
                     p.throughput * p.environment_share);
@@ -648,6 +655,7 @@ void CellBaker::bounce() {
       if (!hit) group_[leaving - 1] = &p;
       p.spread_rad = q.spread_rad;
       p.footprint_m = q.footprint_m + (hit ? stream_.far_m[i] * q.spread_rad : 0);
+      p.blur_m = hit ? stream_.far_m[i] * lobe_width(q.roughness) : 0;
       p.throughput = q.throughput;
       if (hit && q.media.count > 0) {
         p.throughput =

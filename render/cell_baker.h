@@ -146,6 +146,9 @@ class CellBaker final : public RaySink {
   void pack_lights();
   void pack_environment();
 
+  // cell_video.cpp
+  void add_video(const ShadePoint& p);
+
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;
   SampleSequence numbers_of(const ShadePoint& p, std::uint32_t number, std::uint32_t sample) const;

@@ -99,9 +99,10 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const auto too_dim = [&] {
     const float least = 1 - effort.accuracy;
     if (straight || weight >= least) return weight < least;
-    return weight *
-               largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread)) <
-           least;
+    const float brightest =
+        std::max(largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread)),
+                 frame_->brightest_video);
+    return weight * brightest < least;
   };
   if (deep || too_dim()) {
     if (effort.dark_cuts) return;

@@ -140,7 +140,7 @@ void CellTransport::clear() {
   visibility.lit.clear(), visibility.seen.clear(), visibility.tints.clear();
   shared.clear(), lights.clear();
   environment.clear(), shadow_points.clear(), shadow_lights.clear(), lamps.clear();
-  bent.clear(), borrowed.clear(), further.clear();
+  bent.clear(), video.clear(), borrowed.clear(), further.clear();
   rays = 0;
   counts.clear();
 }
@@ -149,7 +149,7 @@ std::size_t CellTransport::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
          of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
-         of(lamps) + of(bent) + of(borrowed) + of(further) + of(counts);
+         of(lamps) + of(bent) + of(video) + of(borrowed) + of(further) + of(counts);
 }
 
 void relight(const CellTransport& cell,
@@ -187,6 +187,9 @@ void relight(const CellTransport& cell,
     const Vec3f share =
         b.point == CellTransport::BentPlate::lit ? Vec3f{1, 1, 1} : w.passing_at_points[b.point];
     w.added[b.slot] += b.weight * share * plate_at(*light.levels[b.level], b.x, b.y);
+  }
+  for (const CellTransport::VideoTerm& v : cell.video) {
+    w.added[v.slot] += v.weight * plate_at(*light.levels[v.level], v.x, v.y);
   }
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     picture.added[k] = w.added[k];

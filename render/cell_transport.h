@@ -76,6 +76,12 @@ struct CellTransport {
     std::uint16_t slot, level;  // of FrameLight::levels
     std::uint32_t point;        // of shadow_points, or lit
   };
+  // Slot += weight * a level of a live texture at a place.
+  struct VideoTerm {
+    Vec3f weight;
+    float x, y;
+    std::uint16_t slot, level;  // of FrameLight::levels
+  };
   // A pixel of further samples: those that share the whole radiance of a centre, and how many all
   // are.
   struct Borrowed {
@@ -101,6 +107,7 @@ struct CellTransport {
   std::vector<ShadowLight> shadow_lights;
   std::vector<LampCatcher> lamps;
   std::vector<BentPlate> bent;
+  std::vector<VideoTerm> video;
   std::vector<Borrowed> borrowed;
   std::vector<Further> further;
   std::uint64_t rays = 0;  // that it took
@@ -115,7 +122,7 @@ struct CellTransport {
 struct FrameLight {
   std::span<const DirectionalLight> lights;
   std::span<const capture::Image* const>
-      levels;  // of the environment: levels_of(), then the plate's
+      levels;  // of the environment: levels_of(), then the plate's, then those of live textures
 };
 
 // The share of light that is not lost: 1 - lost/open, exactly 1 where nothing is.

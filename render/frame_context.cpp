@@ -7,6 +7,7 @@
 
 #include "render/kept_transport.h"
 #include "render/kernel.h"
+#include "render/standard.h"
 
 namespace render {
 namespace {
@@ -59,6 +60,9 @@ std::uint64_t transport_key(const FrameContext& context) {
   if (context.lens) {
     for (const double parameter : context.lens->parameters) key.mix(parameter);
   }
+  for (const VideoTexture* video : context.inputs.videos) {
+    key.mix(video->width()), key.mix(video->height());
+  }
   const Effort& e = job.effort;
   key.mix(e.aa_samples), key.mix(e.aa_tolerance), key.mix(e.glint_contrast);
   key.mix(e.interleave), key.mix(std::uint64_t{e.adaptive_visibility});
@@ -75,6 +79,33 @@ bool alike(const Environment& a, const Environment& b) {
   return a.radiance.height == b.radiance.height && same_sizes(a.smoothed, b.smoothed) &&
          same_sizes(a.halved, b.halved) && same_sizes(a.diffused, b.diffused) &&
          a.compact_apart == b.compact_apart;
+}
+
+// The levels of the scene's live textures, and how bright they may be.
+void add_videos(FrameContext& context) {
+  const SceneDescription& scene = context.inputs.scene->description();
+  const auto& videos = context.inputs.videos;
+  if (videos.size() != scene.videos.size()) {
+    throw std::invalid_argument("the scene has " + std::to_string(scene.videos.size()) +
+                                " live textures, but the frame has " +
+                                std::to_string(videos.size()));
+  }
+  for (const VideoTexture* video : videos) {
+    if (video == nullptr || video->levels.empty()) {
+      throw std::invalid_argument("a live texture has no frame");
+    }
+    context.first_video_levels.push_back(context.levels.size());
+    for (const capture::Image& level : video->levels) context.levels.push_back(&level);
+  }
+  if (videos.empty()) return;
+  for (const Material& material : scene.materials) {
+    if (material.shader != "standard") continue;
+    const StandardParameters p =
+        standard_parameters(material, scene.textures.size(), scene.videos.size());
+    if (p.emission_video < 0) continue;
+    const float strongest = std::max({p.emission[0], p.emission[1], p.emission[2]});
+    context.brightest_video = std::max(context.brightest_video, strongest * p.emission_gain);
+  }
 }
 
 // Places in a pixel, -.5..+.5: every first 4^n of them are spread well (Sobol's sequence).
@@ -178,6 +209,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
     context.lens = *inputs.lens;
     for (const capture::Image& level : context.plate_levels) context.levels.push_back(&level);
   }
+  add_videos(context);
   context.light = {inputs.scene, context.planned_table.get(), &job.effort};
   const auto& R = job.cam_from_set.R.m;
   for (std::size_t i = 0; i < 3; ++i) {

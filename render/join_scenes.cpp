@@ -32,6 +32,7 @@ Placement placed(Vec3f position, float yaw_rad) {
 void join(SceneDescription& whole, const SceneDescription& part, const Placement& set_from_part) {
   const auto first_mesh = static_cast<std::uint32_t>(whole.meshes.size());
   const auto first_texture = static_cast<std::int32_t>(whole.textures.size());
+  const auto first_video = static_cast<std::int32_t>(whole.videos.size());
   const auto first_material = static_cast<std::uint32_t>(whole.materials.size());
   for (const auto& mesh : part.meshes) {
     Mesh moved = *mesh;
@@ -39,18 +40,21 @@ void join(SceneDescription& whole, const SceneDescription& part, const Placement
     whole.meshes.push_back(std::make_shared<const Mesh>(std::move(moved)));
   }
   whole.textures.insert(whole.textures.end(), part.textures.begin(), part.textures.end());
+  whole.videos.insert(whole.videos.end(), part.videos.begin(), part.videos.end());
   for (const Material& material : part.materials) {
     if (material.shader != "standard") {
       whole.materials.push_back(material);
       continue;
     }
-    StandardParameters parameters = standard_parameters(material, part.textures.size());
+    StandardParameters parameters =
+        standard_parameters(material, part.textures.size(), part.videos.size());
     for (std::int32_t* texture :
          {&parameters.base_color_texture, &parameters.metallic_roughness_texture,
           &parameters.normal_texture, &parameters.clearcoat_texture,
           &parameters.transmission_texture, &parameters.emission_texture}) {
       if (*texture >= 0) *texture += first_texture;
     }
+    if (parameters.emission_video >= 0) parameters.emission_video += first_video;
     whole.materials.push_back(make_standard_material(material.name, parameters));
   }
   for (Instance instance : part.instances) {

@@ -27,6 +27,8 @@ struct FrameContext {
   std::vector<capture::Image> plate_levels;
   std::size_t first_plate_level = 0;  // in `levels`
   std::optional<calibrate::Lens> lens;
+  std::vector<std::size_t> first_video_levels;  // of each live texture, in `levels`
+  float brightest_video = 0;  // radiance of a live texture's white, where it is brightest
   // Places of further camera rays in a pixel, -0.5 to 0.5.
   std::array<std::array<float, 2>, samples_max> pattern;
   std::array<float, 9> set_from_cam{};  // rotation

@@ -110,7 +110,8 @@ std::unique_ptr<Scene> with_glow(const Scene& scene, const Glows& glows) {
   SceneDescription description = scene.description();
   bool changed = false;
   for (Material& material : description.materials) {
-    StandardParameters parameters = standard_parameters(material, description.textures.size());
+    StandardParameters parameters =
+        standard_parameters(material, description.textures.size(), description.videos.size());
     const bool dark = std::ranges::all_of(parameters.emission, [](float e) { return e == 0; });
     if (dark || glows(material.name)) continue;
     changed = true;

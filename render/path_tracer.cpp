@@ -173,8 +173,9 @@ bool PathTracer::survives(Walk& w, SampleSequence& numbers) {
 PathTracer::PathTracer(const Scene& scene,
                        const EnvironmentSampler& environment,
                        std::span<const LocalLight> lamps,
-                       const PathRules& rules)
-    : scene_(scene), environment_(environment), lamps_(lamps), rules_(rules) {
+                       const PathRules& rules,
+                       std::span<const VideoTexture* const> videos)
+    : scene_(scene), environment_(environment), lamps_(lamps), rules_(rules), videos_(videos) {
   const SceneDescription& description = scene.description();
   for (const Material& material : description.materials) {
     Surfacing surfacing;
@@ -185,14 +186,21 @@ PathTracer::PathTracer(const Scene& scene,
     } else if (material.shader == "glass") {
       surfacing.glass = true;
     } else {
-      surfacing.parameters = standard_parameters(material, description.textures.size());
+      surfacing.parameters =
+          standard_parameters(material, description.textures.size(), videos.size());
     }
     materials_.push_back(surfacing);
   }
 }
 
 StandardSurface PathTracer::surface_at(const HitPoint& hit) const {
-  return standard_surface(materials_[hit.material].parameters, scene_.description(), hit, 0);
+  const StandardParameters& parameters = materials_[hit.material].parameters;
+  StandardSurface surface = standard_surface(parameters, scene_.description(), hit, 0);
+  if (parameters.emission_video >= 0) {
+    const auto video = static_cast<std::size_t>(parameters.emission_video);
+    surface.emission = times(surface.emission, sample(*videos_[video], hit.u, hit.v, 0));
+  }
+  return surface;
 }
 
 void PathTracer::add_sky(const Walk& w, Vec3f& radiance) const {

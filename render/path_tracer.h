@@ -10,6 +10,7 @@
 #include "render/sample_sequence.h"
 #include "render/scene.h"
 #include "render/standard.h"
+#include "render/video_texture.h"
 
 namespace render {
 
@@ -54,7 +55,8 @@ class PathTracer {
   PathTracer(const Scene& scene,
              const EnvironmentSampler& environment,
              std::span<const LocalLight> lamps,
-             const PathRules& rules);
+             const PathRules& rules,
+             std::span<const VideoTexture* const> videos = {});
 
   CameraPath camera_path(Vec3f origin, Vec3f direction, SampleSequence& numbers) const;
   // Radiance along a ray that left a real surface, and whether it met a virtual object.
@@ -100,6 +102,7 @@ class PathTracer {
   const EnvironmentSampler& environment_;
   std::span<const LocalLight> lamps_;
   PathRules rules_;
+  std::span<const VideoTexture* const> videos_;
   struct Surfacing {
     StandardParameters parameters;
     bool matte = false;  // a stand-in: all its light is diffuse

@@ -32,7 +32,7 @@ capture::Image photograph(const FrameInputs& inputs,
   rules.scattered_mask = rules.lobe_blockers = rules.diffuse_blockers =
       mask_virtual | mask_stand_in;
   const EnvironmentSampler environment(*inputs.environment);
-  const PathTracer tracer(*inputs.scene, environment, view.lamps, rules);
+  const PathTracer tracer(*inputs.scene, environment, view.lamps, rules, inputs.videos);
   const PixelRays rays(*inputs.directions, cam_from_set);
   const int width = inputs.directions->width;
   capture::Image picture = capture::make_image(inputs.directions->height, width, 3);

@@ -328,7 +328,7 @@ capture::Image render_reference(const FrameInputs& inputs,
     rules.scattered_mask = rules.lobe_blockers = mask_virtual | mask_real_blocker;
   }
   const EnvironmentSampler environment(*inputs.environment);
-  const PathTracer tracer(*inputs.scene, environment, job.lights.lamps, rules);
+  const PathTracer tracer(*inputs.scene, environment, job.lights.lamps, rules, inputs.videos);
   const Plate behind_glass(plate, inputs.lens, job.cam_from_set);
   const Composite composite(tracer, settings.bounces, behind_glass);
   const PixelRays rays(directions, job.cam_from_set);
@@ -370,7 +370,7 @@ capture::Image photograph(const FrameInputs& inputs,
   rules.scattered_mask = rules.lobe_blockers = rules.diffuse_blockers =
       mask_virtual | mask_stand_in;
   const EnvironmentSampler environment(*inputs.environment);
-  const PathTracer tracer(*inputs.scene, environment, {}, rules);
+  const PathTracer tracer(*inputs.scene, environment, {}, rules, inputs.videos);
   const PixelRays rays(directions, cam_from_set);
   const auto pixel_of = [&](int x, int y, std::uint32_t index, std::uint32_t seed, int first,
                             int count) {

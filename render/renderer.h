@@ -1,11 +1,14 @@
 // One frame, tile by tile, on this machine's threads.
 #pragma once
 
+#include <span>
+
 #include "calibrate/lens.h"
 #include "capture/image.h"
 #include "render/environment.h"
 #include "render/frame_job.h"
 #include "render/scene.h"
+#include "render/video_texture.h"
 
 namespace render {
 
@@ -20,6 +23,8 @@ struct FrameInputs {
   // An earlier one, of the same sizes, by whose light sampling is decided, so that the decisions
   // stay while the light changes a little; null: `environment`.
   const Environment* planned = nullptr;
+  // The frames of the scene's live textures, one for each of SceneDescription::videos.
+  std::span<const VideoTexture* const> videos = {};
   KeptTransport* kept = nullptr;  // a cache, or null: the same bits, slower
   // For what clear bodies show of the plate: all of it, and the job's lens. Null: they show the
   // environment in its place.

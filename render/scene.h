@@ -46,6 +46,7 @@ struct SceneDescription {
   std::vector<std::shared_ptr<const Texture>> textures;
   std::vector<Material> materials;
   std::vector<Instance> instances;
+  std::vector<std::string> videos;  // live textures by name: FrameInputs::videos has their frames
   std::string background = "environment";  // background shader: what camera rays see at the end
   std::uint64_t version = 0;
 };

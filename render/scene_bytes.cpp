@@ -72,6 +72,8 @@ std::vector<std::byte> serialize(const SceneDescription& scene) {
     out.put(static_cast<std::uint8_t>(texture->srgb));
     out.put_all(texture->texels);
   }
+  out.put(static_cast<std::uint64_t>(scene.videos.size()));
+  for (const std::string& video : scene.videos) out.put_text(video);
   out.put(static_cast<std::uint64_t>(scene.materials.size()));
   for (const Material& material : scene.materials) {
     out.put_text(material.name);
@@ -104,6 +106,7 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
   for (std::size_t n = in.get_count(3 * sizeof(int) + 1 + count_size); n > 0; --n) {
     scene.textures.push_back(std::make_shared<const Texture>(get_texture(in)));
   }
+  for (std::size_t n = in.get_count(count_size); n > 0; --n) scene.videos.push_back(in.get_text());
   for (std::size_t n = in.get_count(3 * count_size); n > 0; --n) {
     Material& material = scene.materials.emplace_back();
     material.name = in.get_text();

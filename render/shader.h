@@ -25,6 +25,14 @@ enum class RayKind : std::uint8_t {
   shadow,
 };
 
+// Light of a live texture: gain times its look-up at (u, v).
+struct SeenVideo {
+  std::int32_t index = -1;  // of SceneDescription::videos, or none
+  float u = 0, v = 0;
+  float footprint_uv = 0;  // see find_video_samples
+  Vec3f gain;
+};
+
 // One point to shade. Filled by the kernel, then by shade(). A shader never sees the light: it says
 // how its surface answers to it, so that the answer can be kept while the light changes.
 struct ShadePoint {
@@ -32,6 +40,7 @@ struct ShadePoint {
   HitPoint hit;             // unset for background()
   Vec3f incoming;           // unit, direction of the ray that arrived
   float footprint_m = 0;    // width of the sample's cone here
+  float blur_m = 0;         // width here of the rough lobe that a ray in its middle stands for
   float spread_rad = 0;     // by how much that cone widens a metre: its full angle
   Vec3f throughput;         // share of the pixel that this ray carries
   std::uint32_t pixel = 0;  // index in the cell, for patterns
@@ -42,6 +51,7 @@ struct ShadePoint {
   // From shade(), cleared before: all that is sent back along `incoming`. Each is multiplied by
   // throughput by the kernel.
   Vec3f radiance;               // its own light
+  SeenVideo video;              // ... that a live texture shows
   Vec3f diffuse;                // radiance per irradiance on light_normal
   Vec3f light_normal;           // unit
   Vec3f plate_share;            // share of the pixel's background that passes

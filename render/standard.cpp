@@ -16,7 +16,7 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 92, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 96, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
@@ -58,7 +58,9 @@ Vec3f mapped_normal(const StandardParameters& parameters,
 
 }  // namespace
 
-StandardParameters standard_parameters(const Material& material, std::size_t texture_count) {
+StandardParameters standard_parameters(const Material& material,
+                                       std::size_t texture_count,
+                                       std::size_t video_count) {
   const auto refuse = [&](const std::string& why) {
     throw std::invalid_argument("material '" + material.name + "': " + why);
   };
@@ -83,6 +85,9 @@ StandardParameters standard_parameters(const Material& material, std::size_t tex
         parameters.emission_texture})
     if (index < -1 || (index >= 0 && static_cast<std::size_t>(index) >= texture_count))
       refuse("it names texture " + std::to_string(index) + " of " + std::to_string(texture_count));
+  const std::int32_t video = parameters.emission_video;
+  if (video < -1 || (video >= 0 && static_cast<std::size_t>(video) >= video_count))
+    refuse("it names video " + std::to_string(video) + " of " + std::to_string(video_count));
   return parameters;
 }
 

@@ -46,19 +46,22 @@ struct StandardParameters {
   float base_color_alpha = 1;
   float specular = 1;  // share of the mirrored light of what is not metal (KHR_materials_specular)
   std::uint32_t two_sided = 1;
+  std::int32_t emission_video = -1;  // of SceneDescription::videos: emission is times its light
 };
 
 // The block in a material of the shader "standard", and back. Throws std::invalid_argument, naming
-// the material, if the block is not one, holds numbers that are not finite, or names textures that
-// are not among `texture_count`.
-StandardParameters standard_parameters(const Material& material, std::size_t texture_count);
+// the material, if the block is not one, holds numbers that are not finite, or names textures or
+// videos that are not among so many.
+StandardParameters standard_parameters(const Material& material,
+                                       std::size_t texture_count,
+                                       std::size_t video_count = 0);
 Material make_standard_material(std::string name, const StandardParameters& parameters);
 
 // What a point of a standard surface does with light, textures looked up.
 struct StandardSurface {
   Vec3f base;
   float metallic, roughness, clearcoat, clearcoat_roughness, transmission;
-  Vec3f emission;
+  Vec3f emission;     // without the light of a video
   Vec3f normal;       // with the normal map, unit, on the viewer's side of the surface
   Vec3f coat_normal;  // without it: the coat is smooth over a rough ground
   float alpha;        // below alpha_cutoff = hole

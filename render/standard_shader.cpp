@@ -1,4 +1,5 @@
 // The shader "standard", and the background "environment".
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -19,20 +20,25 @@ StandardParameters block_of(const Material& material) {
 class StandardShader final : public Shader {
  public:
   void check(const SceneDescription& scene, const Material& material) const override {
-    standard_parameters(material, scene.textures.size());
+    standard_parameters(material, scene.textures.size(), scene.videos.size());
   }
 
   void shade(const ShadeContext& context,
              std::span<ShadePoint* const> points,
              RaySink& rays) const override {
     for (ShadePoint* p : points) {
+      const StandardParameters block = block_of(context.scene->materials[p->hit.material]);
       const StandardSurface surface =
-          standard_surface(block_of(context.scene->materials[p->hit.material]), *context.scene,
-                           p->hit, p->footprint_m);
+          standard_surface(block, *context.scene, p->hit, p->footprint_m);
       const Vec3f view = -p->incoming;
       const StandardWeights weights = standard_weights(surface, view);
       constexpr float per_pi = 0.318309886F;
-      p->radiance = surface.emission;
+      if (block.emission_video >= 0) {
+        p->video = {block.emission_video, p->hit.u, p->hit.v,
+                    std::max(p->footprint_m, p->blur_m) * p->hit.uv_per_metre, surface.emission};
+      } else {
+        p->radiance = surface.emission;
+      }
       p->diffuse = weights.diffuse * per_pi;
       p->light_normal = surface.normal;
       if (weights.coat > 0) {

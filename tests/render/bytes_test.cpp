@@ -49,6 +49,7 @@ SceneDescription made_scene() {
   instance.blocks_light = false;
   instance.occludes = false;
   scene.instances.push_back(instance);
+  scene.videos = {"news", ""};
   scene.version = 9;
   return scene;
 }
@@ -81,6 +82,7 @@ TEST(Serialize, KeepsAScene) {
   EXPECT_EQ(*b.textures[0], *a.textures[0]);
   EXPECT_EQ(b.materials, a.materials);
   EXPECT_EQ(b.instances, a.instances);
+  EXPECT_EQ(b.videos, a.videos);
   EXPECT_EQ(b.background, a.background);
   EXPECT_EQ(b.version, a.version);
 }

@@ -46,6 +46,21 @@ TEST(Join, KeepsEveryInstanceItsOwnMeshMaterialAndTexture) {
   EXPECT_EQ(whole.materials.back().shader, "stand_in");
 }
 
+TEST(Join, KeepsEveryScreenItsOwnVideo) {
+  const auto screen_of = [](const std::string& video) {
+    SceneDescription scene = scene_of(1, "screen");
+    scene.videos = {"another", video};
+    StandardParameters parameters;
+    parameters.emission_video = 1;
+    scene.materials = {make_standard_material("screen", parameters)};
+    return scene;
+  };
+  SceneDescription whole = screen_of("first");
+  join(whole, screen_of("second"));
+  const auto video = standard_parameters(whole.materials.at(1), 2, 4).emission_video;
+  EXPECT_EQ(whole.videos.at(static_cast<std::size_t>(video)), "second");
+}
+
 TEST(Join, LeavesATextureThatIsNoneNone) {
   SceneDescription whole = scene_of(1, "first");
   SceneDescription plain;

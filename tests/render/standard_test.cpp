@@ -167,6 +167,18 @@ TEST(StandardParameters, ComeBackFromTheirMaterial) {
   EXPECT_THROW(render::standard_parameters(material, 2), std::invalid_argument);
 }
 
+TEST(StandardParameters, RefuseAVideoThatIsNotThere) {
+  render::StandardParameters p;
+  p.emission_video = 1;
+  const auto material = render::make_standard_material("screen", p);
+  EXPECT_EQ(render::standard_parameters(material, 0, 2).emission_video, 1);
+  EXPECT_THROW(render::standard_parameters(material, 0, 1), std::invalid_argument);
+  EXPECT_THROW(render::standard_parameters(material, 0), std::invalid_argument);
+  p.emission_video = -2;
+  EXPECT_THROW(render::standard_parameters(render::make_standard_material("screen", p), 0, 2),
+               std::invalid_argument);
+}
+
 TEST(StandardParameters, RefuseAnotherShaderAWrongSizeAndNaN) {
   render::StandardParameters p;
   auto material = render::make_standard_material("paint", p);
