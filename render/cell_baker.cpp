@@ -60,6 +60,7 @@ void CellBaker::bake(const FrameContext& frame,
   counts_.fill(0);
   lender_.fill(-1);
   queue_.clear();
+  lamp_terms_.clear();
   trace_centres();
   const bool smooth_edges = frame.job->effort.aa_samples > 1;
   if (smooth_edges) keep_centres();
@@ -121,7 +122,7 @@ void CellBaker::pack() {
   std::copy_n(base_.begin(), cell_pixels, t.base.begin());
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
   t.empty = t.receiving == CellMask{} && t.environment.empty() && t.lights.empty() &&
-            t.bent.empty() && t.video.empty();
+            t.bent.empty() && t.video.empty() && lamp_terms_.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;
@@ -134,7 +135,8 @@ void CellBaker::pack() {
           {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(centre), borrowed_[k][i]});
     }
   }
-  pack_lights();
+  pack_lights(t.lights, t.lights);
+  pack_lights(lamp_terms_, t.lamp_terms);
   pack_environment();
   std::ranges::sort(t.shared, {}, [](const CellTransport::SharedTerm& s) {
     return key_of(s);
@@ -143,12 +145,13 @@ void CellBaker::pack() {
 }
 
 // One term for each light of a slot: by slots first, of which there are few.
-void CellBaker::pack_lights() {
-  auto& terms = transport_->lights;
-  sort_by_slot(terms, sorted_lights_, [](auto of_slot) {
+void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
+                            std::vector<CellTransport::LightTerm>& to) {
+  sort_by_slot(from, sorted_lights_, [](auto of_slot) {
     std::ranges::sort(of_slot, {}, &CellTransport::LightTerm::light);
   });
-  terms.resize(join(sorted_lights_, terms));
+  const auto kept = static_cast<std::ptrdiff_t>(join(sorted_lights_, sorted_lights_));
+  to.assign(sorted_lights_.begin(), sorted_lights_.begin() + kept);
 }
 
 // Places of a slot that lie between the same four texels of a level become one, in their middle:
@@ -333,7 +336,7 @@ void CellBaker::collect(const ShadePoint& p) {
   const Light& light = light_of_point_[static_cast<std::size_t>(&p - points_.data())];
   const Vec3f own = p.throughput * p.radiance;
   base.radiance += own;
-  sample.added += own + p.throughput * p.diffuse * light.arriving;
+  sample.added += own + p.throughput * p.diffuse * (light.arriving + light.lamps);
   if (p.video.index >= 0) add_video(p);
   if (p.environment_share != Vec3f{}) {
     add_environment(p.slot, target_of(p), p.incoming, 0, {}, false,
@@ -400,6 +403,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
 void CellBaker::receive(int count, bool grid) {
   Receivers& r = receivers_;
   r.active = {};
+  r.by_lamps = {};
   r.count = 0;
   r.real_first.fill(0);
   tested_.clear();
@@ -426,13 +430,16 @@ void CellBaker::receive(int count, bool grid) {
     set_receiver(k, p);
     ++r.count;
     r.active[k / 64] |= std::uint64_t{1} << (k % 64);
+    if (p.diffuse != Vec3f{} || p.catches_lamps) {
+      r.by_lamps[k / 64] |= std::uint64_t{1} << (k % 64);
+    }
+  }
+  std::array<std::uint32_t, cell_pixels> shadow_rays;
+  if (counting_) {
+    shadow_rays.fill(0);
+    gather_.counts = shadow_rays.data();
   }
   if (r.count > 0) {
-    std::array<std::uint32_t, cell_pixels> shadow_rays;
-    if (counting_) {
-      shadow_rays.fill(0);
-      gather_.counts = shadow_rays.data();
-    }
     if (grid) {
       for (std::size_t k = 0; k < cell_pixels; ++k) {
         if (!(r.active[k / 64] >> (k % 64) & 1)) r.nx[k] = r.ny[k] = r.nz[k] = 0;
@@ -442,22 +449,27 @@ void CellBaker::receive(int count, bool grid) {
     } else {
       gather_points(frame_->light, r, gather_, tested_, *statistics_);
     }
-    gather_.counts = nullptr;
-    for (std::size_t i = 0; counting_ && i < static_cast<std::size_t>(count); ++i) {
-      if (place[i] != nowhere) counting_[points_[i].pixel].shadow_rays += shadow_rays[place[i]];
-    }
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const std::size_t k = place[i];
     if (k == nowhere) continue;
     const Vec3f open{r.open_r[k], r.open_g[k], r.open_b[k]};
-    light_of_point_[i] = {open, open - Vec3f{r.lost_r[k], r.lost_g[k], r.lost_b[k]}};
+    light_of_point_[i] = {open, open - Vec3f{r.lost_r[k], r.lost_g[k], r.lost_b[k]}, {}};
     if (!grid) continue;
     light_[k] = light_of_point_[i];
     add_centre(points_[i]);
   }
-  if (!grid && r.count > 0)
-    add_tested(std::span(point_at).first(static_cast<std::size_t>(r.count)));
+  if (grid) {
+    add_centre_lamps(std::span(place).first(static_cast<std::size_t>(count)));
+  } else if (r.count > 0) {
+    const auto points = std::span(point_at).first(static_cast<std::size_t>(r.count));
+    add_tested(points);
+    add_point_lamps(points);
+  }
+  gather_.counts = nullptr;
+  for (std::size_t i = 0; counting_ && i < static_cast<std::size_t>(count); ++i) {
+    if (place[i] != nowhere) counting_[points_[i].pixel].shadow_rays += shadow_rays[place[i]];
+  }
   add_lobes(place, grid);
 }
 
@@ -467,7 +479,6 @@ void CellBaker::add_centre(const ShadePoint& p) {
   t.nx[k] = receivers_.nx[k], t.ny[k] = receivers_.ny[k], t.nz[k] = receivers_.nz[k];
   t.diffuse[k] = p.throughput * p.diffuse;
   if (p.catches_shadow) t.shadow[k] = p.throughput * p.plate_share;
-  add_lamps(p, k);
 }
 
 // Lights of points that are no centres, in the order of `tested_`.
@@ -482,10 +493,8 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
   }
   for (std::size_t k = 0; k < point_at.size(); ++k) {
     const ShadePoint& p = points_[point_at[k]];
-    if (!p.catches_shadow && !p.catches_lamps) {
-      add_lamps(p, 0);
-      continue;
-    }
+    catcher_of_receiver_[k] = no_catcher;
+    if (!p.catches_shadow && !p.catches_lamps) continue;
     const auto first = static_cast<std::uint32_t>(t.shadow_lights.size());
     for (const PointLight& l : tested_) {
       if (l.point != k) continue;
@@ -500,7 +509,12 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
                static_cast<std::uint32_t>(t.shadow_points.size()) - 1);
       continue;
     }
-    add_lamps(p, cell_pixels + t.shadow_points.size() - 1);
+    if (p.catches_lamps && !frame_->job->lights.lamps.empty()) {
+      catcher_of_receiver_[k] = static_cast<std::uint32_t>(t.catchers.size());
+      t.catchers.push_back({static_cast<std::uint16_t>(target_of(p)),
+                            static_cast<std::uint32_t>(cell_pixels + t.shadow_points.size() - 1),
+                            p.throughput, p.albedo});
+    }
   }
 }
 
@@ -514,31 +528,7 @@ void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
   if (p.catches_shadow) {
     transport_->shared.push_back({slot, c, true, p.throughput * p.plate_share});
   }
-  add_lamps(p, centre);
-}
-
-// Light of the set's lamps, which stays as it is. `light_point` tells a stand-in's irradiance.
-void CellBaker::add_lamps(const ShadePoint& p, std::size_t light_point) {
-  if (frame_->job->lights.lamps.empty() || !receives_light(p)) return;
-  const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
-  const std::uint64_t before = statistics_->shadow_rays;
-  const Vec3f irradiance =
-      gather_lamps(frame_->light, origin, p.light_normal, p.hit.geometric_normal,
-                   mask_virtual | mask_real_blocker, *statistics_);
-  if (counting_) {
-    counting_[p.pixel].shadow_rays += static_cast<std::uint32_t>(statistics_->shadow_rays - before);
-  }
-  if (irradiance == Vec3f{}) return;
-  const Vec3f added = p.throughput * p.diffuse * irradiance;
-  base_[target_of(p)].radiance += added;
-  samples_[p.slot].added += added;
-  if (p.catches_lamps) {
-    transport_->lamps.push_back({static_cast<std::uint16_t>(target_of(p)),
-                                 static_cast<std::uint32_t>(light_point), p.throughput, irradiance,
-                                 p.albedo});
-    samples_[p.slot].added +=
-        p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);
-  }
+  catch_lamps(p, centre, light_[centre].lamps);
 }
 
 // What a ray that clear bodies bent sees where it leaves the scene: as the background says, the

@@ -42,6 +42,7 @@ class CellBaker final : public RaySink {
   static constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
   static constexpr int ring_pixels = ring_size * ring_size;
   static constexpr std::uint16_t nowhere = 0xFFFF;  // no receiver
+  static constexpr std::uint32_t no_catcher = ~0U;
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;
@@ -101,6 +102,7 @@ class CellBaker final : public RaySink {
   // Of points: the irradiance that is planned.
   struct Light {
     Vec3f open, arriving;
+    Vec3f lamps;  // of the lamps
     friend bool operator==(const Light&, const Light&) = default;
   };
 
@@ -129,7 +131,6 @@ class CellBaker final : public RaySink {
   void add_centre(const ShadePoint& p);
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_shared(const ShadePoint& p, std::size_t centre);
-  void add_lamps(const ShadePoint& p, std::size_t light_point);
   void collect(const ShadePoint& p);
   void leave_bent(
       std::size_t slot, std::uint32_t pixel, Vec3f direction, const Spread& spread, Vec3f weight);
@@ -143,8 +144,14 @@ class CellBaker final : public RaySink {
                  std::uint32_t shadow_point);
   void bounce();
   void pack();
-  void pack_lights();
+  void pack_lights(const std::vector<CellTransport::LightTerm>& from,
+                   std::vector<CellTransport::LightTerm>& to);
   void pack_environment();
+
+  // cell_lamps.cpp
+  void add_centre_lamps(std::span<const std::uint16_t> receiver_of_point);
+  void add_point_lamps(std::span<const std::uint16_t> point_of_receiver);
+  void catch_lamps(const ShadePoint& p, std::size_t light_point, Vec3f irradiance);
 
   // cell_video.cpp
   void add_video(const ShadePoint& p);
@@ -193,6 +200,9 @@ class CellBaker final : public RaySink {
   std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<CellTransport::EnvironmentTerm> sorted_places_;
   std::vector<PointLight> tested_;
+  std::vector<PointLamp> reached_;
+  std::vector<CellTransport::LightTerm> lamp_terms_;  // many times the transport's
+  std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::vector<Lobe> lobes_;
   std::vector<QueuedRay> queue_;         // capacity reserved
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays

@@ -140,7 +140,7 @@ bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
     return false;
   const auto shown = [&](std::size_t k) {
     const Light& light = light_[k];
-    return transport_->diffuse[k] * light.arriving +
+    return transport_->diffuse[k] * (light.arriving + light.lamps) +
            transport_->shadow[k] * passing(light.open, light.open - light.arriving) *
                plate_contrast;
   };

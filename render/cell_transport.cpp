@@ -54,6 +54,30 @@ void add_irradiance(const CellTransport& cell, const FrameLight& light, RelightW
   }
 }
 
+// Irradiance of the lamps at the centres.
+void add_lamps(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
+  const CellLamps& lamps = cell.lamps;
+  for (std::size_t k = 0; k < cell_pixels; k += lanes) {
+    Lanes r = all(0), g = all(0), b = all(0);
+    if (static_cast<unsigned>(cell.receiving[k / 64] >> (k % 64)) & ((1U << lanes) - 1)) {
+      for (std::size_t i = 0; i < lamps.numbers.size(); ++i) {
+        const Lanes factor = load(&lamps.factors[i].at[k]);
+        const Vec3f intensity = light.lamps[lamps.numbers[i]].intensity;
+        r = add(r, multiply(factor, all(intensity.x)));
+        g = add(g, multiply(factor, all(intensity.y)));
+        b = add(b, multiply(factor, all(intensity.z)));
+      }
+    }
+    store(&w.lamps_r[k], r), store(&w.lamps_g[k], g), store(&w.lamps_b[k], b);
+  }
+  for (const TintedLight& tint : lamps.tints) {
+    const std::size_t k = tint.centre;
+    const Vec3f lost = light.lamps[lamps.numbers[tint.light]].intensity * tint.lost_share *
+                       lamps.factors[tint.light].at[k];
+    w.lamps_r[k] -= lost.x, w.lamps_g[k] -= lost.y, w.lamps_b[k] -= lost.z;
+  }
+}
+
 void light_centres(const CellTransport& cell, RelightWorkspace& w) {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     const CellTransport::Base& base = cell.base[k];
@@ -63,7 +87,7 @@ void light_centres(const CellTransport& cell, RelightWorkspace& w) {
     if (!(cell.receiving[k / 64] >> (k % 64) & 1)) continue;
     const Vec3f open{w.open_r[k], w.open_g[k], w.open_b[k]};
     const Vec3f lost{w.lost_r[k], w.lost_g[k], w.lost_b[k]};
-    w.arriving[k] = open - lost;
+    w.arriving[k] = open - lost + Vec3f{w.lamps_r[k], w.lamps_g[k], w.lamps_b[k]};
     w.passing[k] = passing(open, lost);
     w.added[k] += cell.diffuse[k] * w.arriving[k];
     const Vec3f share = cell.shadow[k] * w.passing[k];
@@ -73,23 +97,30 @@ void light_centres(const CellTransport& cell, RelightWorkspace& w) {
 }
 
 // What lamps add on a stand-in. Where the plate tells its albedo, they brighten the plate.
-void light_lamps(const CellTransport& cell,
-                 std::span<const Vec3f, cell_pixels> plate,
-                 RelightWorkspace& w,
-                 RenderStatistics& statistics) {
-  for (const CellTransport::LampCatcher& lamp : cell.lamps) {
-    const std::size_t k = lamp.point;
-    const Vec3f open = k < cell_pixels ? Vec3f{w.open_r[k], w.open_g[k], w.open_b[k]}
-                                       : w.open_at_points[k - cell_pixels];
-    const Vec3f behind = plate[lamp.slot % cell_pixels];
+void light_catchers(const CellTransport& cell,
+                    const FrameLight& light,
+                    std::span<const Vec3f, cell_pixels> plate,
+                    RelightWorkspace& w,
+                    RenderStatistics& statistics) {
+  w.caught.assign(cell.catchers.size(), {});
+  for (const CellTransport::CaughtLamp& c : cell.caught) {
+    w.caught[c.catcher] += c.factor * light.lamps[c.lamp].intensity;
+  }
+  for (std::size_t i = 0; i < cell.catchers.size(); ++i) {
+    const CellTransport::LampCatcher& c = cell.catchers[i];
+    const std::size_t k = c.point;
+    const bool centre = k < cell_pixels;
+    const Vec3f irradiance = centre ? Vec3f{w.lamps_r[k], w.lamps_g[k], w.lamps_b[k]} : w.caught[i];
+    if (irradiance == Vec3f{}) continue;
+    const Vec3f open =
+        centre ? Vec3f{w.open_r[k], w.open_g[k], w.open_b[k]} : w.open_at_points[k - cell_pixels];
+    const Vec3f behind = plate[c.slot % cell_pixels];
     if (std::max({behind.x, behind.y, behind.z}) >= clipped_plate) ++statistics.clipped_plate;
     if (plate_tells_albedo(behind, open) && open.x > 0 && open.y > 0 && open.z > 0) {
-      w.share[lamp.slot] +=
-          lamp.share *
-          Vec3f{lamp.irradiance.x / open.x, lamp.irradiance.y / open.y, lamp.irradiance.z / open.z};
+      w.share[c.slot] +=
+          c.share * Vec3f{irradiance.x / open.x, irradiance.y / open.y, irradiance.z / open.z};
     } else {
-      w.added[lamp.slot] +=
-          lamp.share * lamp.albedo * lamp.irradiance * (1 / std::numbers::pi_v<float>);
+      w.added[c.slot] += c.share * c.albedo * irradiance * (1 / std::numbers::pi_v<float>);
     }
   }
 }
@@ -139,7 +170,9 @@ void CellTransport::clear() {
   receiving = {};
   visibility.lit.clear(), visibility.seen.clear(), visibility.tints.clear();
   shared.clear(), lights.clear();
-  environment.clear(), shadow_points.clear(), shadow_lights.clear(), lamps.clear();
+  environment.clear(), shadow_points.clear(), shadow_lights.clear();
+  lamps.numbers.clear(), lamps.factors.clear(), lamps.tints.clear();
+  lamp_terms.clear(), catchers.clear(), caught.clear();
   bent.clear(), video.clear(), borrowed.clear(), further.clear();
   rays = 0;
   counts.clear();
@@ -149,7 +182,8 @@ std::size_t CellTransport::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
          of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
-         of(lamps) + of(bent) + of(video) + of(borrowed) + of(further) + of(counts);
+         of(lamps.numbers) + of(lamps.factors) + of(lamps.tints) + of(lamp_terms) + of(catchers) +
+         of(caught) + of(bent) + of(video) + of(borrowed) + of(further) + of(counts);
 }
 
 void relight(const CellTransport& cell,
@@ -158,7 +192,10 @@ void relight(const CellTransport& cell,
              RelightWorkspace& w,
              CellPicture& picture,
              RenderStatistics& statistics) {
-  if (cell.receiving != CellMask{}) add_irradiance(cell, light, w);
+  if (cell.receiving != CellMask{}) {
+    add_irradiance(cell, light, w);
+    add_lamps(cell, light, w);
+  }
   light_centres(cell, w);
   for (const CellTransport::Further& f : cell.further) {
     const std::size_t slot = cell_pixels + f.pixel;
@@ -167,7 +204,7 @@ void relight(const CellTransport& cell,
     w.passed[slot] = f.base.passed;
   }
   light_shadow_points(cell, light, w);
-  light_lamps(cell, plate, w, statistics);
+  light_catchers(cell, light, plate, w, statistics);
   for (const CellTransport::SharedTerm& s : cell.shared) {
     if (s.shadow) {
       const Vec3f share = s.weight * w.passing[s.centre];
@@ -179,6 +216,9 @@ void relight(const CellTransport& cell,
   }
   for (const CellTransport::LightTerm& l : cell.lights) {
     w.added[l.slot] += l.weight * light.lights[l.light].irradiance;
+  }
+  for (const CellTransport::LightTerm& l : cell.lamp_terms) {
+    w.added[l.slot] += l.weight * light.lamps[l.light].intensity;
   }
   for (const CellTransport::EnvironmentTerm& e : cell.environment) {
     w.added[e.slot] += e.weight * radiance_at(*light.levels[e.level], e.x, e.y);

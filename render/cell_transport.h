@@ -33,7 +33,7 @@ struct CellTransport {
     float seen = 0;    // 1 - coverage by virtual objects
     friend bool operator==(const Base&, const Base&) = default;
   };
-  // Slot += weight * light of the table.
+  // Slot += weight * light of the table, or intensity of a lamp.
   struct LightTerm {
     std::uint16_t slot, light;
     Vec3f weight;
@@ -65,7 +65,13 @@ struct CellTransport {
   struct LampCatcher {
     std::uint16_t slot;
     std::uint32_t point;  // a centre, or cell_pixels + a shadow point
-    Vec3f share, irradiance, albedo;
+    Vec3f share, albedo;
+  };
+  // Irradiance of a catcher that is at no centre += factor * intensity of a lamp.
+  struct CaughtLamp {
+    std::uint32_t catcher;
+    std::uint16_t lamp;
+    Vec3f factor;
   };
   // Slot += weight * the plate at a place, that clear bodies show there; less where it lies in a
   // shadow.
@@ -105,7 +111,10 @@ struct CellTransport {
   std::vector<EnvironmentTerm> environment;
   std::vector<ShadowPoint> shadow_points;
   std::vector<ShadowLight> shadow_lights;
-  std::vector<LampCatcher> lamps;
+  CellLamps lamps;  // that centres see
+  std::vector<LightTerm> lamp_terms;
+  std::vector<LampCatcher> catchers;
+  std::vector<CaughtLamp> caught;
   std::vector<BentPlate> bent;
   std::vector<VideoTerm> video;
   std::vector<Borrowed> borrowed;
@@ -121,6 +130,7 @@ struct CellTransport {
 // The light of one frame, as relight() wants it.
 struct FrameLight {
   std::span<const DirectionalLight> lights;
+  std::span<const LocalLight> lamps;
   std::span<const capture::Image* const>
       levels;  // of the environment: levels_of(), then the plate's, then those of live textures
 };
@@ -139,9 +149,12 @@ Vec3f plate_at(const capture::Image& level, float x, float y);
 // What relight() works in.
 struct RelightWorkspace {
   alignas(64) std::array<float, cell_pixels> open_r, open_g, open_b, lost_r, lost_g, lost_b;
+  alignas(64) std::array<float, cell_pixels> lamps_r, lamps_g, lamps_b;
   std::array<Vec3f, slots> added, share;
   std::array<float, slots> passed;
-  std::array<Vec3f, cell_pixels> arriving, passing;  // irradiance; share of it that is seen
+  // Irradiance, lamps' too; share that is seen of what is not lamps'.
+  std::array<Vec3f, cell_pixels> arriving, passing;
+  std::vector<Vec3f> caught;  // irradiance of lamps at catchers
   // At shadow points: irradiance, where nothing virtual is in the way; share of it that arrives.
   std::vector<Vec3f> open_at_points, passing_at_points;
 };

@@ -2,13 +2,6 @@
 #include "render/cell_baker.h"
 
 namespace render {
-namespace {
-
-// The grey that decides where rays are worth their time, whatever the video shows: so what is
-// decided stays while the video runs.
-constexpr float planned_grey = 0.5F;
-
-}  // namespace
 
 void CellBaker::add_video(const ShadePoint& p) {
   const auto index = static_cast<std::size_t>(p.video.index);

@@ -51,8 +51,9 @@ std::uint64_t transport_key(const FrameContext& context) {
     key.mix(light.direction), key.mix(light.irradiance);
     key.mix(light.spread), key.mix(std::uint64_t{light.compact});
   }
-  for (const LocalLight& lamp : job.lights.lamps) {
+  for (const LocalLight& lamp : context.planned_table->lamps) {
     key.mix(lamp.position), key.mix(lamp.normal), key.mix(lamp.intensity);
+    key.mix(lamp.area_m2), key.mix(std::uint64_t{lamp.ambient});
   }
   for (const capture::Image* level : context.planned_levels) key.mix(level->height);
   key.mix(context.planned->radiance.pixels);
@@ -182,6 +183,15 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
       throw std::invalid_argument("a light of the table is not finite");
     }
   }
+  if (job.lights.lamps.size() > most_lights) {
+    throw std::invalid_argument("a table holds at most " + std::to_string(most_lights) + " lamps");
+  }
+  for (const LocalLight& lamp : job.lights.lamps) {
+    if (!finite(lamp.position) || !finite(lamp.normal) || !finite(lamp.intensity) ||
+        !finite(lamp.planned) || !(lamp.area_m2 >= 0) || !std::isfinite(lamp.area_m2)) {
+      throw std::invalid_argument("a lamp is not finite");
+    }
+  }
   FrameContext context;
   context.planned = inputs.planned && alike(*inputs.planned, *inputs.environment)
                         ? inputs.planned
@@ -194,6 +204,9 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
     DirectionalLight& light = planned_table->lights[i];
     if (light.planned != Vec3f{}) light.irradiance = light.planned;
     if (light.compact != 0) context.compact.push_back(static_cast<std::uint32_t>(i));
+  }
+  for (LocalLight& lamp : planned_table->lamps) {
+    if (lamp.planned != Vec3f{}) lamp.intensity = lamp.planned;
   }
   context.planned_table = std::move(planned_table);
   if (context.compact.size() > most_compact_lights) {

@@ -91,13 +91,19 @@ void add_ray(GatherWorkspace& w,
              std::size_t point,
              std::uint32_t light,
              Vec3f direction,
-             unsigned mask) {
+             unsigned mask,
+             float far_m = ray_far) {
   const auto i = static_cast<std::size_t>(w.rays++);
   w.ox[i] = r.px[point], w.oy[i] = r.py[point], w.oz[i] = r.pz[point];
   w.dx[i] = direction.x, w.dy[i] = direction.y, w.dz[i] = direction.z;
   w.mask[i] = mask;
+  w.far_m[i] = far_m;
   w.ray_light[i] = light;
   w.ray_point[i] = static_cast<std::uint32_t>(point);
+}
+
+LampReceiver lamp_receiver(const Receivers& r, std::size_t k) {
+  return {{r.px[k], r.py[k], r.pz[k]}, {r.nx[k], r.ny[k], r.nz[k]}, {r.gx[k], r.gy[k], r.gz[k]}};
 }
 
 // Shoots the stream's rays. Afterwards far_m < 0 marks what is blocked; tr, tg, tb what glass let
@@ -106,7 +112,7 @@ void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics)
   const auto n = static_cast<unsigned>(w.rays);
   TraceContext context(scene, RayKind::shadow, false);
   for (unsigned i = 0; i < n; ++i) {
-    w.near_m[i] = 0, w.far_m[i] = ray_far, w.time[i] = 0, w.id[i] = i, w.flags[i] = 0;
+    w.near_m[i] = 0, w.time[i] = 0, w.id[i] = i, w.flags[i] = 0;
   }
   if (scene.has_filters()) {
     for (unsigned i = 0; i < n; ++i) w.tr[i] = w.tg[i] = w.tb[i] = 1;
@@ -216,15 +222,21 @@ bool can_be_blocked(const LightContext& context, const Box& box, Vec3f l) {
                      [&](const Scene::Bounds& b) { return may_block(b, box, l); });
 }
 
-// Pixels of one light whose visibility must be tested: see gather_cell.
+// Pixels of one light, or lamp, whose visibility must be tested: see gather_cell.
 class VisibilityFinder {
  public:
   VisibilityFinder(const LightContext& context,
                    const Receivers& r,
                    GatherWorkspace& w,
                    RenderStatistics& statistics,
-                   unsigned ray_mask)
-      : context_(context), r_(r), w_(w), statistics_(statistics), ray_mask_(ray_mask) {}
+                   unsigned ray_mask,
+                   bool lamps = false)
+      : context_(context),
+        r_(r),
+        w_(w),
+        statistics_(statistics),
+        ray_mask_(ray_mask),
+        lamps_(lamps) {}
 
   // Fills w.seen for lights first .. first + count - 1 from w.lit; tints what glass weakens.
   void find(std::uint32_t first, std::size_t count) {
@@ -256,7 +268,12 @@ class VisibilityFinder {
     const auto point = static_cast<std::size_t>(point_of(word, k));
     const auto light = first + static_cast<std::uint32_t>(i);
     const unsigned mask = ray_mask_ ? ray_mask_ : r_.mask[point];
-    add_ray(w_, r_, point, light, context_.table->lights[light].direction, mask);
+    if (lamps_) {
+      const auto ray = ray_to_lamp(lamp_receiver(r_, point), context_.table->lamps[light]);
+      add_ray(w_, r_, point, light, ray->direction, mask, ray->far_m);
+    } else {
+      add_ray(w_, r_, point, light, context_.table->lights[light].direction, mask);
+    }
     if (w_.rays == stream_rays) shoot_rest(first);
   }
 
@@ -295,7 +312,7 @@ class VisibilityFinder {
 
   void test_first(std::uint32_t first, std::size_t i) {
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
-    const bool compact = context_.table->lights[light].compact != 0;
+    const bool compact = !lamps_ && context_.table->lights[light].compact != 0;
     for (int word = 0; word < 4; ++word) {
       const auto wi = static_cast<std::size_t>(word);
       const std::uint64_t lit = w_.lit[i][wi];
@@ -388,6 +405,7 @@ class VisibilityFinder {
   GatherWorkspace& w_;
   RenderStatistics& statistics_;
   unsigned ray_mask_;
+  bool lamps_;
   int block_ = context_.effort->interleave;
   bool coarse_ = context_.effort->adaptive_visibility || block_ == 4;
   std::array<CellMask, GatherWorkspace::group> tinted_{};
@@ -518,27 +536,80 @@ void gather_points(const LightContext& context,
   flush(*context.scene, w, statistics, visit);
 }
 
-Vec3f gather_lamps(const LightContext& context,
-                   Vec3f origin,
-                   Vec3f normal,
-                   Vec3f geometric_normal,
-                   unsigned mask,
-                   RenderStatistics& statistics) {
-  Vec3f sum;
-  for (const LocalLight& lamp : context.table->lamps) {
-    const Vec3f to = lamp.position - origin;
-    const float distance = length(to);
-    if (!(distance > 1e-6F)) continue;
-    const Vec3f l = to * (1 / distance);
-    const float cosine = dot(normal, l);
-    if (!(cosine > 0) || !(dot(geometric_normal, l) > 0)) continue;
-    const float facing_lamp = lamp.normal == Vec3f{} ? 1.0F : -dot(lamp.normal, l);
-    if (!(facing_lamp > 0)) continue;
-    const Vec3f share = transmittance(*context.scene, origin, l, 0, distance * (1 - 1e-3F), mask);
-    ++statistics.shadow_rays;
-    sum += lamp.intensity * share * (cosine * facing_lamp / (distance * distance));
+void gather_cell_lamps(const LightContext& context,
+                       const Receivers& r,
+                       GatherWorkspace& w,
+                       CellLamps& cell,
+                       RenderStatistics& statistics) {
+  const auto& lamps = context.table->lamps;
+  for (std::size_t first = 0; first < lamps.size(); first += GatherWorkspace::group) {
+    const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lamps.size() - first);
+    VisibilityFinder finder(context, r, w, statistics, mask_virtual | mask_real_blocker, true);
+    std::array<std::uint16_t, GatherWorkspace::group> place{};
+    w.tints.clear();
+    for (std::size_t i = 0; i < count; ++i) {
+      const LocalLight& lamp = lamps[first + i];
+      w.lit[i] = {};
+      finder.skip_[i] = lamp.ambient != 0;
+      if (lamp.intensity == Vec3f{}) continue;
+      CellLamps::Factors factors{};
+      for (std::size_t word = 0; word < 4; ++word) {
+        for (std::uint64_t bits = r.by_lamps[word]; bits != 0; bits &= bits - 1) {
+          const std::size_t k = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
+          const auto ray = ray_to_lamp(lamp_receiver(r, k), lamp);
+          if (!ray) continue;
+          factors.at[k] = ray->per_intensity;
+          w.lit[i][word] |= std::uint64_t{1} << (k % 64);
+        }
+      }
+      if (w.lit[i] == CellMask{}) continue;
+      place[i] = static_cast<std::uint16_t>(cell.numbers.size());
+      cell.numbers.push_back(static_cast<std::uint16_t>(first + i));
+      cell.factors.push_back(factors);
+    }
+    finder.find(static_cast<std::uint32_t>(first), count);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t word = 0; word < 4; ++word) {
+        for (std::uint64_t bits = w.lit[i][word] & ~w.seen[i][word]; bits != 0; bits &= bits - 1) {
+          cell.factors[place[i]].at[word * 64 + static_cast<std::size_t>(std::countr_zero(bits))] =
+              0;
+        }
+      }
+    }
+    for (const auto& tint : w.tints) {
+      cell.tints.push_back(
+          {place[tint.light - first], static_cast<std::uint16_t>(tint.point), tint.lost_share});
+    }
   }
-  return sum;
+}
+
+void gather_point_lamps(const LightContext& context,
+                        const Receivers& r,
+                        GatherWorkspace& w,
+                        std::vector<PointLamp>& reached,
+                        RenderStatistics& statistics) {
+  const auto& lamps = context.table->lamps;
+  const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
+    const auto ray = ray_to_lamp(lamp_receiver(r, k), lamps[i]);
+    if (blocked || !ray) return;
+    reached.push_back(
+        {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), share * ray->per_intensity});
+  };
+  for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
+    if (!(r.by_lamps[k / 64] >> (k % 64) & 1)) continue;
+    for (std::uint32_t i = 0; i < lamps.size(); ++i) {
+      if (lamps[i].intensity == Vec3f{}) continue;
+      const auto ray = ray_to_lamp(lamp_receiver(r, k), lamps[i]);
+      if (!ray) continue;
+      if (!(ray->far_m > 0)) {
+        visit(static_cast<std::uint32_t>(k), i, false, {1, 1, 1});
+        continue;
+      }
+      add_ray(w, r, k, i, ray->direction, mask_virtual | mask_real_blocker, ray->far_m);
+      if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
+    }
+  }
+  flush(*context.scene, w, statistics, visit);
 }
 
 }  // namespace render

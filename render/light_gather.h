@@ -32,8 +32,9 @@ struct Receivers {
       real_first;  // light that real things block does not count as open
   // Of the pixel: weak points test fewer lights, those of 0 only the compact ones.
   std::array<float, cell_pixels> share;
-  std::array<std::uint64_t, 4> active;  // bit y % 4 * 16 + x of word y / 4
-  int count = 0;                        // of entries, if not a grid
+  std::array<std::uint64_t, 4> active;    // bit y % 4 * 16 + x of word y / 4
+  std::array<std::uint64_t, 4> by_lamps;  // of these, those that lamps matter to
+  int count = 0;                          // of entries, if not a grid
 };
 
 // 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.
@@ -105,12 +106,36 @@ void gather_points(const LightContext& context,
                    std::vector<PointLight>& tested,
                    RenderStatistics& statistics);
 
-// Irradiance of the table's lamps at one point, as it arrives.
-Vec3f gather_lamps(const LightContext& context,
-                   Vec3f origin,
-                   Vec3f normal,
-                   Vec3f geometric_normal,
-                   unsigned mask,
-                   RenderStatistics& statistics);
+// What a cell's centres get of the table's lamps: for each that reaches any of them, irradiance per
+// intensity, 0 where it is hidden.
+struct CellLamps {
+  struct alignas(64) Factors {
+    std::array<float, cell_pixels> at;
+  };
+  std::vector<std::uint16_t> numbers;  // of the lamps
+  std::vector<Factors> factors;        // of each of them
+  std::vector<TintedLight> tints;      // `light` is a place in `numbers`
+};
+
+// Finds that, for the points of Receivers::by_lamps, with shadow rays as in gather_cell. Whatever
+// it is, virtual or real, blocks a lamp.
+void gather_cell_lamps(const LightContext& context,
+                       const Receivers& receivers,
+                       GatherWorkspace& workspace,
+                       CellLamps& lamps,
+                       RenderStatistics& statistics);
+
+// A lamp that reaches a point: irradiance per intensity.
+struct PointLamp {
+  std::uint16_t point, lamp;
+  Vec3f factor;
+};
+
+// The same for any points, point by point, appended to `reached`: every point tests every lamp.
+void gather_point_lamps(const LightContext& context,
+                        const Receivers& receivers,
+                        GatherWorkspace& workspace,
+                        std::vector<PointLamp>& reached,
+                        RenderStatistics& statistics);
 
 }  // namespace render

@@ -20,13 +20,35 @@ struct DirectionalLight {
   friend bool operator==(const DirectionalLight&, const DirectionalLight&) = default;
 };
 
-// A small lamp of the set: a point, or one sample of a glowing surface.
+// A small lamp of the set: a point, or one sample of a glowing surface. Its intensity may change
+// from frame to frame without a ray being taken; what shadows it casts depends on the rest.
 struct LocalLight {
   Vec3f position;
   Vec3f normal;     // zero = shines to all sides; else cosine-weighted about it
   Vec3f intensity;  // radiant intensity (along the normal), so irradiance = intensity / distance^2
+  Vec3f planned{};  // the intensity by which sampling is decided; zero = as is
+  // Of the glowing surface, m^2: irradiance is about that of a disc, and has an end where surfaces
+  // meet. 0 = a point.
+  float area_m2 = 0;
+  // 1 = light from everywhere: irradiance = intensity on any surface, without shadow.
+  std::uint32_t ambient = 0;
   friend bool operator==(const LocalLight&, const LocalLight&) = default;
 };
+
+// A point that a lamp may shine on, off its surface.
+struct LampReceiver {
+  Vec3f origin, normal, geometric_normal;
+};
+
+// The way from a point to a lamp.
+struct LampRay {
+  Vec3f direction;      // unit
+  float far_m = 0;      // just before the lamp; 0 = nothing can be in the way
+  float per_intensity;  // irradiance
+};
+
+// Nothing if the lamp does not shine there, whatever is in the way.
+std::optional<LampRay> ray_to_lamp(const LampReceiver& point, const LocalLight& lamp);
 
 struct LightTable {
   std::vector<DirectionalLight> lights;

@@ -212,18 +212,16 @@ void PathTracer::add_sky(const Walk& w, Vec3f& radiance) const {
 
 Vec3f PathTracer::lamp_irradiance(const HitPoint& hit, Vec3f normal) const {
   Vec3f sum;
+  const LampReceiver point{offset_origin(hit, hit.geometric_normal), normal, hit.geometric_normal};
   for (const LocalLight& lamp : lamps_) {
-    const Vec3f origin = offset_origin(hit, hit.geometric_normal);
-    const Vec3f to = lamp.position - origin;
-    const float distance = length(to);
-    if (!(distance > 1e-6F)) continue;
-    const Vec3f l = to / distance;
-    const float cosine = dot(normal, l);
-    const float facing = lamp.normal == Vec3f{} ? 1.0F : -dot(lamp.normal, l);
-    if (!(cosine > 0) || !(facing > 0) || !(dot(hit.geometric_normal, l) > 0)) continue;
-    const Vec3f passing =
-        transmittance(scene_, origin, l, 0, distance * (1 - 1e-3F), rules_.diffuse_blockers);
-    sum += times(lamp.intensity, passing) * (cosine * facing / (distance * distance));
+    const auto ray = ray_to_lamp(point, lamp);
+    if (!ray) continue;
+    Vec3f light = lamp.intensity * ray->per_intensity;
+    if (ray->far_m > 0) {
+      light = times(light, transmittance(scene_, point.origin, ray->direction, 0, ray->far_m,
+                                         rules_.diffuse_blockers));
+    }
+    sum += light;
   }
   return sum;
 }

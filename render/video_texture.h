@@ -26,6 +26,10 @@ struct VideoTexture {
   int height() const { return levels.empty() ? 0 : levels.front().height; }
 };
 
+// What is decided by the radiance of a video takes it for an even grey of this, so that it stays
+// while the video runs.
+inline constexpr float planned_grey = 0.5F;
+
 // How texels are packed, row 0 on top, without padding; words are little-endian.
 enum class VideoFormat : std::uint8_t {
   rgb565,     // 16 bits, red in the highest

@@ -9,7 +9,9 @@
 #include <random>
 
 #include "../render/sun_and_sky.h"
+#include "made_room.h"
 #include "made_shot.h"
+#include "render/area_light.h"
 #include "render/kept_transport.h"
 #include "render/light_follower.h"
 #include "render/reference.h"
@@ -421,6 +423,29 @@ TEST(RenderTile, DoesNotAllocate) {
     counting = false;
     EXPECT_EQ(allocations, 0) << count_rays;
   }
+}
+
+TEST(RenderTile, DoesNotAllocateUnderLiveVideo) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer allocates by itself";
+#endif
+  MadeRoom room(128, 96);
+  const render::AreaLight screen =
+      render::sample_area_light(room.scene->description(), MadeRoom::screen_instance, 3, {5, 5});
+  room.job.lights.lamps = lamps_of(screen, room.video, {});
+  const render::FrameContext context = make_frame_context(room.inputs(), room.job);
+  render::TileWorkspace workspace;
+  render::TileJob tile;
+  render::TileResult result;
+  const render::Rect rect{0, 0, 128, 96};
+  cut_tile(room.plate, rect, 0, tile);
+  size_result(rect, result);
+  render_tile(context, tile, workspace, result);
+  allocations = 0;
+  counting = true;
+  render_tile(context, tile, workspace, result);
+  counting = false;
+  EXPECT_EQ(allocations, 0);
 }
 
 TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {

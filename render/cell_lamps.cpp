@@ -1,0 +1,65 @@
+// The set's lamps at a cell's points.
+#include <numbers>
+
+#include "render/cell_baker.h"
+
+namespace render {
+
+// At the centres, after their other light is known.
+void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_point) {
+  if (receivers_.by_lamps == CellMask{} || frame_->job->lights.lamps.empty()) return;
+  CellLamps& cell = transport_->lamps;
+  gather_cell_lamps(frame_->light, receivers_, gather_, cell, *statistics_);
+  const auto planned = [&](std::size_t place) {
+    return frame_->planned_table->lamps[cell.numbers[place]].intensity;
+  };
+  for (std::size_t i = 0; i < cell.numbers.size(); ++i) {
+    const Vec3f intensity = planned(i);
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      light_[k].lamps += intensity * cell.factors[i].at[k];
+    }
+  }
+  for (const TintedLight& tint : cell.tints) {
+    light_[tint.centre].lamps -=
+        planned(tint.light) * tint.lost_share * cell.factors[tint.light].at[tint.centre];
+  }
+  for (std::size_t i = 0; i < receiver_of_point.size(); ++i) {
+    const std::size_t k = receiver_of_point[i];
+    if (k == nowhere) continue;
+    light_of_point_[i].lamps = light_[k].lamps;
+    catch_lamps(points_[i], k, light_[k].lamps);
+  }
+}
+
+// At points that are no centres, whose catchers add_tested has made.
+void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver) {
+  if (frame_->job->lights.lamps.empty()) return;
+  reached_.clear();
+  gather_point_lamps(frame_->light, receivers_, gather_, reached_, *statistics_);
+  CellTransport& t = *transport_;
+  for (const PointLamp& l : reached_) {
+    const std::size_t i = point_of_receiver[l.point];
+    const ShadePoint& p = points_[i];
+    const Vec3f irradiance = l.factor * frame_->planned_table->lamps[l.lamp].intensity;
+    const Vec3f weight = p.throughput * p.diffuse * l.factor;
+    light_of_point_[i].lamps += irradiance;
+    if (weight != Vec3f{}) {
+      lamp_terms_.push_back({static_cast<std::uint16_t>(target_of(p)), l.lamp, weight});
+    }
+    const std::uint32_t catcher = catcher_of_receiver_[l.point];
+    if (catcher == no_catcher) continue;
+    t.caught.push_back({catcher, l.lamp, l.factor});
+    samples_[p.slot].added +=
+        p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);
+  }
+}
+
+// At a stand-in's point that has the light of a centre.
+void CellBaker::catch_lamps(const ShadePoint& p, std::size_t centre, Vec3f irradiance) {
+  if (!p.catches_lamps || irradiance == Vec3f{}) return;
+  transport_->catchers.push_back({static_cast<std::uint16_t>(target_of(p)),
+                                  static_cast<std::uint32_t>(centre), p.throughput, p.albedo});
+  samples_[p.slot].added += p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);
+}
+
+}  // namespace render
