@@ -135,6 +135,7 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
   if (plate_->is_live() && plate_rate.num > 0 && rate_.value() > plate_rate.value()) {
     rate_ = plate_rate;
   }
+  videos_ = std::make_unique<VideoFeed>(set_, plate_->first().time, plate_->is_live());
   build_scene();
   light_ = light.get();
 }
@@ -144,6 +145,7 @@ void FrameMaker::build_scene() {
   described.description.version = ++scene_version_;
   try {
     scene_ = std::make_shared<render::Scene>(described.description);
+    videos_->place(set_, described);
     set_scene_ = std::move(described);
   } catch (const std::invalid_argument& error) {
     fail(set_, {}, error.what());
@@ -200,6 +202,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   prepared.arrived = Clock::now();
 
   std::optional<capture::Frame> frame;
+  std::vector<VideoFrame> videos;
   {
     const StageTimer timer(prepared, Stage::capture);
     frame = plate_->at(time);
@@ -212,6 +215,8 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.plate_status = frame->status;
     prepared.plate_exposure_s = frame->exposure_s;
     prepared.sound = plate_->take_sound();
+    videos = videos_->at(time);
+    prepared.notes = videos_->take_notes();
   }
 
   render::FrameJob& job = prepared.job;
@@ -233,6 +238,13 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     job.textures = {{0, frame->time}, {1, light.time}};
     job.lights = std::move(light.table);
     job.lights.lamps.insert(job.lights.lamps.end(), lamps_.begin(), lamps_.end());
+    const auto shining = videos_->lamps(videos);
+    job.lights.lamps.insert(job.lights.lamps.end(), shining.begin(), shining.end());
+    for (VideoFrame& video : videos) {
+      job.textures.push_back({static_cast<std::uint32_t>(job.textures.size()), video.time});
+      prepared.video_frames.push_back(video.texture.get());
+      prepared.videos.push_back(std::move(video.texture));
+    }
     job.match = render::matrix_of(light.match);
     prepared.match = std::move(light.match);
     prepared.probe = std::move(light.probe);
@@ -261,7 +273,14 @@ void FrameMaker::move_object(const std::string& name, const PlacementSettings& p
     throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
   }
   set_scene_.description.version = ++scene_version_;
+  videos_->place(set_, set_scene_);
   scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_);
+}
+
+void FrameMaker::change_video(const std::string& name, const std::string& uri) {
+  videos_->change_source(name, uri);
+  const auto video = std::ranges::find(set_.videos, name, &VideoSettings::name);
+  if (video != set_.videos.end()) video->source = uri;
 }
 
 void FrameMaker::change_set(Set set) {
@@ -275,14 +294,17 @@ void FrameMaker::change_set(Set set) {
   }
   // All that may fail comes before anything is taken over.
   auto light = std::make_unique<LightFeed>(set);
+  auto videos = std::make_unique<VideoFeed>(set, std::nullopt, plate_->is_live(), videos_.get());
   auto track = track_of(set);
   auto directions = directions_of(set);
   auto lens = std::make_shared<calibrate::Lens>(lens_of(set));
   Set before = std::exchange(set_, std::move(set));
+  std::swap(videos_, videos);
   try {
     build_scene();
   } catch (const SetError&) {
     set_ = std::move(before);
+    std::swap(videos_, videos);
     throw;
   }
   light_ = std::move(light);

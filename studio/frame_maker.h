@@ -17,6 +17,7 @@
 #include "studio/set.h"
 #include "studio/set_scene.h"
 #include "studio/source.h"
+#include "studio/video_feed.h"
 
 namespace studio {
 
@@ -34,6 +35,9 @@ struct PreparedFrame {
   std::shared_ptr<const render::Scene> scene;
   std::shared_ptr<const calibrate::DirectionTable> directions;
   std::shared_ptr<const calibrate::Lens> lens;
+  std::vector<std::shared_ptr<const render::VideoTexture>> videos;
+  std::vector<const render::VideoTexture*> video_frames;  // the same, for inputs()
+  std::vector<std::string> notes;                         // what went wrong while it was made
   std::vector<capture::Sound> sound;
   std::chrono::steady_clock::time_point arrived;  // of the plate
   render::MatchResult match;
@@ -47,6 +51,7 @@ struct PreparedFrame {
             .directions = directions.get(),
             .environment = environment.get(),
             .planned = planned.get(),
+            .videos = video_frames,
             .plate = plate.get(),
             .lens = lens.get()};
   }
@@ -86,6 +91,9 @@ class FrameMaker {
   void set_effort(const render::Effort& effort) { set_.effort = effort; }
   // Throws std::invalid_argument if no object has that name.
   void move_object(const std::string& name, const PlacementSettings& pose);
+  // Another source for one of the set's videos. Throws std::invalid_argument if none has that name,
+  // std::runtime_error if the source cannot be opened.
+  void change_video(const std::string& name, const std::string& uri);
   // Takes over another set file's content. Sources that stay the same run on. Throws SetError and
   // changes nothing if it cannot be used, std::invalid_argument if the picture's size or rate
   // differ.
@@ -99,6 +107,7 @@ class FrameMaker {
   capture::Rational rate_;
   std::unique_ptr<Source> plate_;
   std::unique_ptr<LightFeed> light_;
+  std::unique_ptr<VideoFeed> videos_;
   std::optional<calibrate::Track> track_;
   std::shared_ptr<const render::Scene> scene_;
   SetScene set_scene_;

@@ -174,6 +174,13 @@ Set read_set(const std::string& path) {
   for (const Section& section : root.tables("lamp")) {
     set.lamps.push_back(read_lamp_section(section));
   }
+  for (const Section& section : root.tables("video")) {
+    set.videos.push_back(read_video_section(section, context, false));
+  }
+  for (const Section& section : root.tables("video_light")) {
+    set.videos.push_back(read_video_section(section, context, true));
+  }
+  name_videos(set.videos, faults);
   context.has_scene = !set.objects.empty() || !set.stand_ins.empty();
 
   if (auto section = root.table("rig")) context.rig = read_rig_section(*section, context.base);

@@ -149,6 +149,22 @@ struct ToneSettings {
   double seconds = 1;        // in which the curve follows the picture's levels to 63 %
 };
 
+// Video that the surfaces of objects show, and shine by.
+struct VideoSettings {
+  std::string name;    // to change its source by while the show runs
+  std::string source;  // URI
+  Place source_place;
+  std::string object;    // "OBJECT" or "OBJECT/PART"; "" = any
+  std::string material;  // by its name in the model; "" = any
+  Place object_place;
+  std::array<float, 3> gain{1, 1, 1};  // radiance of its white, in the plate's units
+  bool loop = false;
+  capture::Transfer colour = capture::Transfer::rec1886;
+  bool lights = false;               // its surroundings as well:
+  std::array<int, 2> samples{5, 5};  // by so many lamps,
+  float ambient = 0;                 // and by a share of its mean from everywhere
+};
+
 struct DisplayChoice {
   std::string display;  // "" = compositing's default
   std::string view;
@@ -173,6 +189,7 @@ struct Set {
   std::vector<ObjectSettings> objects;
   std::vector<StandInSettings> stand_ins;
   std::vector<LampSettings> lamps;
+  std::vector<VideoSettings> videos;
   render::Effort effort;
   DisplayChoice display;
   RecordSettings record;

@@ -210,6 +210,8 @@ SetScene describe_scene(const Set& set) {
     }
   }
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+  show_videos(set, result, faults);
+  if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
   if (scene.instances.size() > static_cast<std::size_t>(most_instances)) {
     faults.add({}, fmt::format("{} instances of parts, but a set holds at most {}",
                                scene.instances.size(), most_instances));

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/area_light.h"
 #include "render/scene.h"
 #include "studio/set.h"
 
@@ -45,6 +46,16 @@ void move_parts(const Set& set,
 
 // Rows of the 3x4 matrix set_from_object of a placement.
 std::array<float, 12> matrix_of(const PlacementSettings& placement);
+
+// Lets the set's videos be shown where it says, and names them in the scene, in the set's order.
+// What describe_scene ends with; adds a fault for each that is shown nowhere.
+void show_videos(const Set& set, SetScene& scene, Faults& faults);
+
+// The surfaces that show a video of the scene, as lights. Throws std::invalid_argument as
+// render::sample_area_light.
+std::vector<render::AreaLight> area_lights_of(const SetScene& scene,
+                                              std::size_t video,
+                                              std::array<int, 2> samples);
 
 // The set's own lamps.
 std::vector<render::LocalLight> describe_lamps(const Set& set);

@@ -44,6 +44,9 @@ ProbeSettings read_probe_section(Section section, const SetContext& context);
 ObjectSettings read_object_section(Section section, const SetContext& context);
 StandInSettings read_stand_in_section(Section section, const SetContext& context);
 LampSettings read_lamp_section(Section section);
+VideoSettings read_video_section(Section section, const SetContext& context, bool lights);
+// Names those that have none, with faults for names that there are twice.
+void name_videos(std::vector<VideoSettings>& videos, Faults& faults);
 render::Effort read_effort_section(Section section);
 
 // The lens of a section: `lens` as a file's name or a table, or `model` and its values beside the

@@ -215,6 +215,7 @@ class Show::Stages {
                             [&](const StopRecording& c) { work.recorder.emplace_back(c); },
                             [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
                             [&](const SetView& c) { view_ = c.view; },
+                            [&](const SetVideo& c) { maker_.change_video(c.name, c.uri); },
                             [&](const SetPaused& c) { paused_ = c.paused; },
                             [&](ChangeSet& c) { maker_.change_set(std::move(c.set)); },
                             [](const Quit&) {}},
@@ -252,6 +253,7 @@ class Show::Stages {
 
     timed(shown, Stage::record, [&] { recording_.record(shown, !options_.live); });
     note_probe(shown.prepared);
+    for (const std::string& what : shown.prepared.notes) note(what);
     tally_.add(shown, displayed);
     tally_.status().dropped = work.dropped;
     tally_.status().lost_plate_frames = work.plate.lost;

@@ -38,6 +38,11 @@ struct MoveObject {
 struct SetView {
   std::optional<render::RayView> view;
 };
+// Another camera or file for one of the set's videos.
+struct SetVideo {
+  std::string name;
+  std::string uri;
+};
 struct SetPaused {
   bool paused = false;
 };
@@ -50,6 +55,7 @@ using ShowCommand = std::variant<SetEffort,
                                  StopRecording,
                                  MoveObject,
                                  SetView,
+                                 SetVideo,
                                  SetPaused,
                                  ChangeSet,
                                  Quit>;

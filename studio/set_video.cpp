@@ -1,0 +1,164 @@
+// Set files: video on surfaces, and as light.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "render/area_light.h"
+#include "render/standard.h"
+#include "studio/set_scene.h"
+#include "studio/set_sections.h"
+
+namespace studio {
+namespace {
+
+using render::Instance;
+using render::Mesh;
+using render::SceneDescription;
+
+// "OBJECT", or "OBJECT/PART" with the beginning of the part's name.
+bool is_of(const std::string& instance, const std::string& object) {
+  if (object.empty()) return true;
+  if (!instance.starts_with(object)) return false;
+  const bool whole = object.find('/') == std::string::npos;
+  return !whole || instance.size() == object.size() || instance[object.size()] == '/';
+}
+
+std::uint32_t material_of(const Mesh& mesh, std::size_t triangle) {
+  return mesh.materials[mesh.materials.size() == 1 ? 0 : triangle];
+}
+
+// The material that shows video `index` in the place of `from`.
+render::Material showing(const render::Material& from,
+                         const SceneDescription& scene,
+                         const VideoSettings& video,
+                         std::int32_t index) {
+  render::StandardParameters p =
+      render::standard_parameters(from, scene.textures.size(), scene.videos.size());
+  std::ranges::copy(video.gain, p.emission);
+  p.emission_gain = 1;
+  p.emission_texture = -1;
+  p.emission_video = index;
+  return render::make_standard_material(from.name, p);
+}
+
+// Whether a triangle's material is one that the video covers.
+bool is_covered(const render::Material& material, const VideoSettings& video) {
+  return material.shader == "standard" &&
+         (video.material.empty() || material.name == video.material);
+}
+
+// Gives an instance a mesh of its own where it shows the video. False if it shows nothing of it.
+bool cover(SceneDescription& scene,
+           Instance& instance,
+           const VideoSettings& video,
+           std::int32_t index) {
+  const Mesh& before = *scene.meshes[instance.mesh];
+  const bool any = std::ranges::any_of(before.materials, [&](std::uint32_t material) {
+    return is_covered(scene.materials[material], video);
+  });
+  if (!any || before.uvs.empty()) return false;
+  Mesh mesh = before;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> replaced;
+  for (std::uint32_t& material : mesh.materials) {
+    if (!is_covered(scene.materials[material], video)) continue;
+    auto found = std::ranges::find(replaced, material, [](const auto& r) { return r.first; });
+    if (found == replaced.end()) {
+      const auto added = static_cast<std::uint32_t>(scene.materials.size());
+      scene.materials.push_back(showing(scene.materials[material], scene, video, index));
+      found = replaced.insert(replaced.end(), {material, added});
+    }
+    material = found->second;
+  }
+  scene.meshes.push_back(std::make_shared<const Mesh>(std::move(mesh)));
+  instance.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+  return true;
+}
+
+}  // namespace
+
+VideoSettings read_video_section(Section section, const SetContext& context, bool lights) {
+  VideoSettings video;
+  video.lights = lights;
+  section.text("name", video.name);
+  section.need("source", "what the surface shows: a file's path or a camera's URI");
+  video.source_place = section.place_of("source");
+  read_source_key(section, "source", context.base, video.source);
+  section.text("object", video.object);
+  section.text("material", video.material);
+  video.object_place = section.place_of(section.has("object") ? "object" : "material");
+  if (!section.has("object") && !section.has("material")) {
+    section.fault("", "must have object = \"NAME\" or material = \"NAME\", or both");
+  }
+  section.colour("gain", video.gain, {0, 1e9});
+  section.boolean("loop", video.loop);
+  std::string colour;
+  if (section.text("colour", colour)) {
+    try {
+      video.colour = capture::transfer_from_name(colour);
+    } catch (const std::invalid_argument& error) {
+      section.fault("colour", fmt::format("\"{}\": {}", colour, error.what()));
+    }
+  }
+  if (lights) {
+    section.integers("samples", video.samples, 1, render::most_area_samples);
+    section.number("ambient", video.ambient, {0, 1});
+  }
+  section.finish();
+  return video;
+}
+
+void name_videos(std::vector<VideoSettings>& videos, Faults& faults) {
+  for (std::size_t i = 0; i < videos.size(); ++i) {
+    VideoSettings& video = videos[i];
+    if (video.name.empty()) video.name = fmt::format("video {}", i + 1);
+    const auto before = std::span(videos).first(i);
+    if (std::ranges::find(before, video.name, &VideoSettings::name) != before.end()) {
+      faults.add(video.source_place, fmt::format("there are two videos named \"{}\"", video.name));
+    }
+  }
+}
+
+void show_videos(const Set& set, SetScene& scene, Faults& faults) {
+  SceneDescription& description = scene.description;
+  for (const VideoSettings& video : set.videos) {
+    const auto index = static_cast<std::int32_t>(description.videos.size());
+    description.videos.push_back(video.name);
+    bool shown = false;
+    for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+      Instance& instance = description.instances[i];
+      if (!is_of(instance.name, video.object)) continue;
+      shown = cover(description, instance, video, index) || shown;
+    }
+    if (!shown) {
+      faults.add(video.object_place,
+                 fmt::format("video \"{}\" is shown nowhere: no object, part or material with "
+                             "texture coordinates is named so",
+                             video.name));
+    }
+  }
+}
+
+std::vector<render::AreaLight> area_lights_of(const SetScene& scene,
+                                              std::size_t video,
+                                              std::array<int, 2> samples) {
+  const SceneDescription& description = scene.description;
+  std::vector<render::AreaLight> lights;
+  for (std::uint32_t i = 0; i < scene.parts.size(); ++i) {
+    const Mesh& mesh = *description.meshes[description.instances[i].mesh];
+    std::vector<std::uint32_t> materials;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+      const std::uint32_t material = material_of(mesh, t);
+      if (std::ranges::find(materials, material) == materials.end()) materials.push_back(material);
+    }
+    for (const std::uint32_t material : materials) {
+      if (description.materials[material].shader != "standard") continue;
+      const auto p = render::standard_parameters(
+          description.materials[material], description.textures.size(), description.videos.size());
+      if (p.emission_video != static_cast<std::int32_t>(video)) continue;
+      lights.push_back(render::sample_area_light(description, i, material, samples));
+    }
+  }
+  return lights;
+}
+
+}  // namespace studio

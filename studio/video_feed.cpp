@@ -1,0 +1,168 @@
+// Live textures, frame by frame.
+#include "studio/video_feed.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "capture/live_reader.h"
+
+namespace studio {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A live source without a new frame for so long stalls.
+constexpr capture::Time patience = 1s;
+
+bool same_source(const VideoSettings& a, const VideoSettings& b) {
+  return a.source == b.source && a.loop == b.loop && a.colour == b.colour;
+}
+
+}  // namespace
+
+VideoFeed::VideoFeed(const Set& set,
+                     std::optional<capture::Time> start,
+                     bool live,
+                     const VideoFeed* before)
+    : base_dir_(std::filesystem::absolute(set.path).parent_path().string()),
+      live_(live),
+      start_(start) {
+  Faults faults(set.path);
+  for (const VideoSettings& video : set.videos) {
+    Channel& channel = channels_.emplace_back();
+    channel.settings = video;
+    try {
+      channel.player = open(video, before);
+    } catch (const std::runtime_error& error) {
+      faults.add(video.source_place, error.what());
+    } catch (const std::invalid_argument& error) {
+      faults.add(video.source_place, error.what());
+    }
+  }
+  start_.reset();
+  if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+}
+
+std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings,
+                                                   const VideoFeed* before) {
+  for (const VideoFeed* feed : {static_cast<const VideoFeed*>(this), before}) {
+    if (feed == nullptr) continue;
+    for (const Channel& channel : feed->channels_) {
+      if (channel.player && same_source(channel.player->settings, settings)) return channel.player;
+    }
+  }
+  capture::CameraOptions options;
+  options.colour.transfer = settings.colour;
+  options.loop = settings.loop;
+  options.base_dir = base_dir_;
+  auto player = std::make_shared<Player>();
+  player->settings = settings;
+  player->source = std::make_unique<Source>(capture::open_camera(settings.source, options));
+  player->start = start_;
+  return player;
+}
+
+void VideoFeed::place(const Set& set, const SetScene& scene) {
+  Faults faults(set.path);
+  std::size_t lamps = set.lamps.size();
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    const VideoSettings& video = channels_[i].settings;
+    channels_[i].lights.clear();
+    if (!video.lights) continue;
+    try {
+      channels_[i].lights = area_lights_of(scene, i, video.samples);
+      for (const render::AreaLight& light : channels_[i].lights) lamps += light.samples.size() + 1;
+      if (lamps > static_cast<std::size_t>(render::most_lights)) {
+        faults.add(video.object_place,
+                   fmt::format("{} lamps so far, but a set holds at most {}: fewer samples", lamps,
+                               render::most_lights));
+        break;
+      }
+    } catch (const std::invalid_argument& error) {
+      faults.add(video.object_place, error.what());
+    }
+  }
+  if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+}
+
+// Notes once when a source ceases to give frames, and when it does so again.
+void VideoFeed::note_state(Player& player, const capture::Frame* frame, capture::Time asked) {
+  const bool stalls =
+      frame != nullptr && player.source->is_live() && asked - frame->time > patience;
+  const bool lost = frame != nullptr && frame->status == capture::FrameStatus::lost;
+  const bool holds = frame == nullptr || stalls || lost;
+  if (holds && !player.holds) {
+    notes_.push_back(fmt::format("video {} {}: its last picture stays", player.settings.source,
+                                 frame == nullptr ? "has ended"
+                                 : lost           ? "lost a frame"
+                                                  : "stalls"));
+  }
+  player.holds = holds;
+}
+
+void VideoFeed::update(Player& player, capture::Time time) {
+  Source& source = *player.source;
+  capture::Time asked = time;
+  if (!source.is_live()) {
+    if (!player.start) player.start = time;
+    asked = source.first().time + (time - *player.start);
+  } else if (!live_) {
+    asked = capture::monotonic_now();
+  }
+  const std::optional<capture::Frame> frame = source.at(asked);
+  note_state(player, frame ? &*frame : nullptr, asked);
+  if (player.frame.texture != nullptr && (!frame || frame->image == player.image)) return;
+  auto texture = textures_.lend();
+  const capture::Frame& shown = frame ? *frame : source.first();
+  render::make_video_texture(shown.image ? *shown.image : capture::make_image(1, 1), *texture);
+  player.image = shown.image;
+  if (texture->not_numbers > 0 && !player.reported) {
+    notes_.push_back(fmt::format("video {}: {} values of a picture are no numbers, and count as 0",
+                                 player.settings.source, texture->not_numbers));
+    player.reported = true;
+  }
+  player.frame = {std::move(texture), shown.time};
+}
+
+std::vector<VideoFrame> VideoFeed::at(capture::Time time) {
+  std::vector<VideoFrame> frames;
+  for (const Channel& channel : channels_) {
+    update(*channel.player, time);
+    frames.push_back(channel.player->frame);
+  }
+  return frames;
+}
+
+std::vector<render::LocalLight> VideoFeed::lamps(const std::vector<VideoFrame>& frames) const {
+  std::vector<render::LocalLight> all;
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    const VideoSettings& video = channels_[i].settings;
+    const auto& [red, green, blue] = video.gain;
+    for (const render::AreaLight& light : channels_[i].lights) {
+      const auto lamps =
+          render::lamps_of(light, *frames[i].texture, {{red, green, blue}, video.ambient});
+      all.insert(all.end(), lamps.begin(), lamps.end());
+    }
+  }
+  return all;
+}
+
+void VideoFeed::change_source(const std::string& name, const std::string& uri) {
+  const auto channel =
+      std::ranges::find(channels_, name, [](const Channel& c) { return c.settings.name; });
+  if (channel == channels_.end()) {
+    throw std::invalid_argument(fmt::format("the set has no video named \"{}\"", name));
+  }
+  VideoSettings settings = channel->settings;
+  settings.source = uri;
+  channel->player = open(settings, nullptr);
+  channel->settings = std::move(settings);
+}
+
+std::vector<std::string> VideoFeed::take_notes() { return std::exchange(notes_, {}); }
+
+}  // namespace studio

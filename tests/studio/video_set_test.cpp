@@ -1,0 +1,162 @@
+// Sets whose objects show live video, and are lit by it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "studio/show.h"
+#include "tests/made_files.h"
+#include "tests/studio/made_show.h"
+
+namespace studio {
+namespace {
+
+using capture::float_from_half;
+using testing::Contains;
+using testing::HasSubstr;
+
+class VideoSetTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    start();
+    register_grey_camera();
+  }
+  void SetUp() override {
+    dir_ = made::make_temporary_directory();
+    // A screen of 2 m x 1.5 m that faces the camera.
+    std::ofstream(dir_ / "tv.obj") << "mtllib tv.mtl\nv -1 0 3\nv 1 0 3\nv 1 1.5 3\nv -1 1.5 3\n"
+                                      "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl screen\n"
+                                      "f 1/1 2/2 3/3 4/4\n";
+    std::ofstream(dir_ / "tv.mtl") << "newmtl screen\nKd 0 0 0\n";
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+
+  Set made_set(const std::string& video, const std::string& plate = "grey:6,25,0") const {
+    return read_set(
+        write_made_set(dir_, plate, "[[object]]\nname = \"tv\"\nmesh = \"tv.obj\"\n" + video));
+  }
+
+  std::filesystem::path dir_;
+};
+
+constexpr const char* light = R"([[video_light]]
+name = "news"
+source = "grey:6,25,0"
+object = "tv"
+gain = 2
+samples = [5, 4]
+)";
+
+// What the screen mirrors of the sky, at most.
+constexpr float glare = 0.05F;
+
+// Of the middle of the screen.
+float screen_of(const ShownFrame& shown) {
+  const capture::HalfImage& rgba = shown.result->rgba;
+  return float_from_half(rgba.pixels[rgba.index(33, 32, 0)]);
+}
+
+std::vector<float> screens_of(Show& show, const std::function<void(int)>& before = {}) {
+  std::vector<float> screens;
+  show.run([&](const ShownFrame& shown) {
+    screens.push_back(screen_of(shown));
+    if (before) before(static_cast<int>(screens.size()));
+  });
+  return screens;
+}
+
+TEST_F(VideoSetTest, ShowsTheVideosFrameOfItsTimeAndIsLitByIt) {
+  Show show(made_set(light));
+  int frame = 0;
+  show.run([&](const ShownFrame& shown) {
+    const float grey = 2 * (0.1F + 0.01F * static_cast<float>(frame));
+    EXPECT_NEAR(screen_of(shown), grey, glare) << frame;
+    const render::FrameJob& job = shown.prepared.job;
+    ASSERT_EQ(job.textures.size(), 3U);
+    EXPECT_EQ(job.textures[2].stream, 2U);
+    EXPECT_EQ(job.textures[2].time, capture::time_of_frame(frame, {25, 1}));
+    ASSERT_EQ(job.lights.lamps.size(), 20U);
+    EXPECT_NEAR(job.lights.lamps[7].intensity.x, grey * 3 / 20, 1e-3F);
+    EXPECT_NEAR(job.lights.lamps[7].normal.y, -1, 1e-5F) << "towards the camera";
+    ++frame;
+  });
+  EXPECT_EQ(frame, 6);
+  EXPECT_TRUE(show.status()->notes.empty());
+}
+
+TEST_F(VideoSetTest, GivesTheSameBitsWhateverTheTiming) {
+  const Set set = made_set(light);
+  Show slow(set), fast(set);
+  EXPECT_EQ(screens_of(
+                slow, [](int n) { std::this_thread::sleep_for(std::chrono::milliseconds(9 * n)); }),
+            screens_of(fast));
+}
+
+TEST_F(VideoSetTest, TakesRaysForTheFirstFrameOnly) {
+  Show show(made_set(light, "grey:3,25,0"));
+  std::vector<std::uint64_t> rays;
+  show.run([&](const ShownFrame& shown) {
+    rays.push_back(shown.result->statistics.primary_rays + shown.result->statistics.shadow_rays);
+  });
+  ASSERT_EQ(rays.size(), 3U);
+  EXPECT_GT(rays[0], 0U);
+  EXPECT_EQ(rays[1] + rays[2], 0U);
+}
+
+TEST_F(VideoSetTest, HoldsTheLastPictureOfAVideoThatEndsAndSaysSo) {
+  Show show(made_set("[[video]]\nsource = \"grey:2,25,0\"\nmaterial = \"screen\"\n"));
+  const std::vector<float> screens = screens_of(show);
+  ASSERT_EQ(screens.size(), 6U);
+  EXPECT_NEAR(screens[0], 0.10F, glare);
+  for (std::size_t i = 1; i < 6; ++i) EXPECT_NEAR(screens[i], screens[0] + 0.01F, 0.002F);
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("has ended")));
+  EXPECT_EQ(show.status()->notes.size(), 1U);
+}
+
+TEST_F(VideoSetTest, ChangesTheSourceByNameWhileItRuns) {
+  Show show(made_set(light, "grey:40,25,0"));
+  const std::vector<float> screens = screens_of(show, [&](int n) {
+    if (n == 8) show.post(SetVideo{"news", "grey:1,25,0"});
+    if (n == 10) show.post(SetVideo{"old news", "grey:1,25,0"});
+    if (n == 12) show.post(SetVideo{"news", "file:nowhere.mp4"});
+  });
+  ASSERT_EQ(screens.size(), 40U);
+  EXPECT_NEAR(screens[5], screens[0] + 0.1F, 0.005F);
+  EXPECT_NEAR(screens[20], screens[0], 0.005F) << "the other source's only picture";
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("old news")));
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("nowhere.mp4")));
+}
+
+TEST_F(VideoSetTest, RefusesAVideoThatNothingShowsAtItsPlace) {
+  for (const char* where : {"object = \"radio\"", "material = \"tin\"", "object = \"cube\""}) {
+    const Set set = made_set(std::string("[[video]]\nsource = \"grey:6,25,0\"\n") + where + "\n");
+    try {
+      FrameMaker maker(set);
+      FAIL() << where;
+    } catch (const SetError& error) {
+      ASSERT_EQ(error.diagnostics().size(), 1U);
+      EXPECT_EQ(error.diagnostics()[0].line, set.videos[0].object_place.line);
+      EXPECT_THAT(error.what(), HasSubstr("shown nowhere"));
+    }
+  }
+}
+
+TEST_F(VideoSetTest, RefusesASourceThatCannotBeOpenedAtItsPlace) {
+  const Set set = made_set("[[video]]\nsource = \"none:1\"\nobject = \"tv\"\n");
+  try {
+    FrameMaker maker(set);
+    FAIL();
+  } catch (const SetError& error) {
+    EXPECT_EQ(error.diagnostics().at(0).line, set.videos[0].source_place.line);
+  }
+}
+
+TEST_F(VideoSetTest, MovesTheLightWithTheObject) {
+  FrameMaker maker(made_set(light));
+  const auto before = maker.make(0)->job.lights.lamps.at(3).position;
+  PlacementSettings pose;
+  pose.position = {1, 0, 0};
+  maker.move_object("tv", pose);
+  EXPECT_NEAR(maker.make(1)->job.lights.lamps.at(3).position.x, before.x + 1, 1e-5F);
+}
+
+}  // namespace
+}  // namespace studio
