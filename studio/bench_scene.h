@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "calibrate/lens.h"
 #include "capture/image.h"
@@ -10,6 +11,7 @@
 #include "render/made_sky.h"
 #include "render/reference.h"
 #include "render/renderer.h"
+#include "render/video_texture.h"
 
 namespace studio {
 
@@ -19,11 +21,18 @@ struct BenchScene {
   std::unique_ptr<render::Scene> scene;
   calibrate::DirectionTable directions;
   render::Environment environment;
-  capture::Image plate;           // (height, width, 3)
-  capture::HalfImage half_plate;  // the same
-  render::FrameJob job;           // without lights
+  capture::Image plate;                               // (height, width, 3)
+  capture::HalfImage half_plate;                      // the same
+  render::FrameJob job;                               // without lights
+  std::unique_ptr<const render::VideoTexture> video;  // a frame of the scene's only video, if it
+  std::vector<const render::VideoTexture*> videos;    // has one
 
-  render::FrameInputs inputs() const { return {scene.get(), &directions, &environment}; }
+  render::FrameInputs inputs() const {
+    return {.scene = scene.get(),
+            .directions = &directions,
+            .environment = &environment,
+            .videos = videos};
+  }
 };
 
 // Surfaces of the car.

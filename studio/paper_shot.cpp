@@ -1,17 +1,66 @@
 // The papers' scenes as shots to measure with.
 #include "studio/paper_shot.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
+#include "render/area_light.h"
 #include "render/paper_scenes.h"
+#include "render/standard.h"
+#include "render/texture.h"
 
 namespace studio {
 
+namespace {
+
+// Radiance of the white of a screen that lights its room, where 1 is the display's.
+constexpr float screen_white = 3;
+// Share of the directions around that shows what walls send back of it.
+constexpr float from_walls = 0.1F;
+
+// Makes the picture on an object a video that lights its surroundings, by 5x5 lamps as the paper
+// has it. Returns the lamps of its one frame.
+std::vector<render::LocalLight> light_by(const std::string& object,
+                                         render::SceneDescription& scene,
+                                         render::VideoTexture& video) {
+  const auto instance = std::ranges::find(scene.instances, object, &render::Instance::name);
+  const auto index = static_cast<std::uint32_t>(instance - scene.instances.begin());
+  const std::uint32_t material = scene.meshes[instance->mesh]->materials[0];
+  render::Material& screen = scene.materials[material];
+  render::StandardParameters p = standard_parameters(screen, scene.textures.size());
+  const render::Texture& picture = *scene.textures[static_cast<std::size_t>(p.emission_texture)];
+  capture::Image frame = capture::make_image(picture.height, picture.width, 3);
+  const auto w = static_cast<float>(frame.width), h = static_cast<float>(frame.height);
+  for (int y = 0; y < frame.height; ++y) {
+    for (int x = 0; x < frame.width; ++x) {
+      const auto texel = sample(picture, (static_cast<float>(x) + 0.5F) / w,
+                                (static_cast<float>(y) + 0.5F) / h, 0);
+      std::copy_n(texel.begin(), 3, &frame.at(y, x));
+    }
+  }
+  video = render::make_video_texture(frame);
+  scene.videos = {"screen"};
+  p.emission_texture = -1;
+  p.emission_video = 0;
+  p.emission_gain = screen_white;
+  screen = make_standard_material(screen.name, p);
+  const render::AreaLight light = sample_area_light(scene, index, material, {5, 5});
+  return lamps_of(light, video, {{screen_white, screen_white, screen_white}, from_walls});
+}
+
+}  // namespace
+
 PaperShot make_paper_shot(std::string_view name, int width, int height) {
-  const render::PaperScene paper = render::made_paper_scene(name);
+  render::PaperScene paper = render::made_paper_scene(name);
   PaperShot made;
   BenchScene& shot = made.shot;
+  if (!paper.lit_by.empty()) {
+    auto video = std::make_unique<render::VideoTexture>();
+    paper.lamps = light_by(paper.lit_by, paper.scene, *video);
+    shot.video = std::move(video);
+    shot.videos = {shot.video.get()};
+  }
   const auto start = std::chrono::steady_clock::now();
   shot.scene = std::make_unique<render::Scene>(paper.scene);
   made.compile_ms =

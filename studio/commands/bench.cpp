@@ -67,7 +67,7 @@ namespace {
 struct BenchOptions {
   std::string what;
   std::string set;
-  std::string pictures;
+  std::string pictures, scene;
   std::optional<std::int64_t> runs = 5;
   std::optional<std::int64_t> check = 64;
 };
@@ -90,6 +90,7 @@ Command bench_command() {
         arguments.option(
             "--pictures", o->pictures,
             "papers: a directory for pictures of every scene: itself, and depth and rays by pixel");
+        arguments.option("--scene", o->scene, "papers: only this one");
         arguments.option("--check-error", o->check, 0, 65536,
                          "papers: paths a pixel of the reference; 0 = none");
         arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
@@ -98,7 +99,8 @@ Command bench_command() {
           if (o->what == "kernel") return bench_kernel(runs, console);
           if (o->what == "hdr") return bench_hdr(runs, console);
           if (o->what == "papers") {
-            return bench_papers({runs, static_cast<int>(*o->check), o->pictures}, console);
+            return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene},
+                                console);
           }
           if (o->what != "inputs") {
             throw UsageError(fmt::format(

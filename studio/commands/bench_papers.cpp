@@ -146,6 +146,7 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
 }  // namespace
 
 void bench_papers(const PapersBench& bench, Console& console) {
+  if (!bench.scene.empty()) render::made_paper_scene(bench.scene);  // throws for another name
   if (!bench.pictures.empty()) std::filesystem::create_directories(bench.pictures);
   console.say(
       "              triangles    paper   1 ray a    error   default   error    still       rays   "
@@ -155,6 +156,7 @@ void bench_papers(const PapersBench& bench, Console& console) {
       "           Embree");
   Json rows = Json::array();
   for (const std::string_view name : render::paper_scene_names()) {
+    if (!bench.scene.empty() && name != bench.scene) continue;
     rows.push_back(row_of(name, bench, console));
   }
   const Machine machine = this_machine();

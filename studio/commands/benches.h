@@ -14,6 +14,7 @@ struct PapersBench {
   int runs = 5;
   int check = 64;        // paths a pixel of the reference; 0 = no error
   std::string pictures;  // directory, or none
+  std::string scene;     // this one only; "" = all
 };
 // Both papers' scenes at 640x480: the papers' table with ours beside it.
 void bench_papers(const PapersBench& bench, Console& console);
