@@ -132,6 +132,17 @@ class CellBaker final : public RaySink {
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_shared(const ShadePoint& p, std::size_t centre);
   void collect(const ShadePoint& p);
+  void bounce();
+
+  // cell_lamps.cpp
+  void add_centre_lamps(std::span<const std::uint16_t> receiver_of_point);
+  void add_point_lamps(std::span<const std::uint16_t> point_of_receiver);
+  void catch_lamps(const ShadePoint& p, std::size_t light_point, Vec3f irradiance);
+
+  // cell_video.cpp
+  void add_video(const ShadePoint& p);
+
+  // cell_bent.cpp
   void leave_bent(
       std::size_t slot, std::uint32_t pixel, Vec3f direction, const Spread& spread, Vec3f weight);
   void add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point);
@@ -142,19 +153,12 @@ class CellBaker final : public RaySink {
                  Vec3f planned_direction,
                  Vec3f weight,
                  std::uint32_t shadow_point);
-  void bounce();
+
+  // cell_pack.cpp
   void pack();
   void pack_lights(const std::vector<CellTransport::LightTerm>& from,
                    std::vector<CellTransport::LightTerm>& to);
   void pack_environment();
-
-  // cell_lamps.cpp
-  void add_centre_lamps(std::span<const std::uint16_t> receiver_of_point);
-  void add_point_lamps(std::span<const std::uint16_t> point_of_receiver);
-  void catch_lamps(const ShadePoint& p, std::size_t light_point, Vec3f irradiance);
-
-  // cell_video.cpp
-  void add_video(const ShadePoint& p);
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;

@@ -1,0 +1,82 @@
+// What rays that clear bodies bent see of the plate.
+#include <algorithm>
+#include <cmath>
+
+#include "calibrate/lens.h"
+#include "render/cell_baker.h"
+#include "render/trace.h"
+
+namespace render {
+
+// What a ray that clear bodies bent sees where it leaves the scene: as the background says, the
+// plate, if that lies in the picture, or the environment. What the plate adds is planned by the
+// environment, so that what is decided by it does not change with the plate.
+void CellBaker::leave_bent(
+    std::size_t slot, std::uint32_t pixel, Vec3f direction, const Spread& spread, Vec3f weight) {
+  ShadePoint p{};
+  p.incoming = direction;
+  p.throughput = weight;
+  p.kind = RayKind::bent;
+  p.pixel = pixel;
+  p.slot = static_cast<std::uint32_t>(slot);
+  ShadePoint* const leaving = &p;
+  const Scene& scene = *frame_->inputs.scene;
+  scene.background().shade({&scene.description(), &scene}, {&leaving, 1});
+  Vec3f sees_environment = p.environment_share;
+  if (p.plate_share != Vec3f{}) {
+    const float width_rad = std::sqrt(length(spread.a) * length(spread.b));
+    if (!add_plate(slot, target_of(p), direction, width_rad, direction, weight * p.plate_share,
+                   CellTransport::BentPlate::lit)) {
+      sees_environment += p.plate_share;
+    }
+  }
+  if (sees_environment != Vec3f{}) {
+    add_environment(slot, target_of(p), direction, 0, spread, false, weight * sees_environment);
+  }
+}
+
+// The same where it meets a stand-in.
+void CellBaker::add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point) {
+  const Vec3f from_camera = p.hit.position - frame_->camera;
+  const float distance_m = length(from_camera);
+  const float width_rad = p.footprint_m / std::max(distance_m, 1e-6F);
+  if (!add_plate(p.slot, target_of(p), from_camera, width_rad, p.incoming, weight, shadow_point)) {
+    add_environment(p.slot, target_of(p), p.incoming, 0, {}, false, weight);
+  }
+}
+
+// False if the camera does not see that way.
+bool CellBaker::add_plate(std::size_t slot,
+                          std::size_t target,
+                          Vec3f from_camera,
+                          float width_rad,
+                          Vec3f planned_direction,
+                          Vec3f weight,
+                          std::uint32_t shadow_point) {
+  if (!frame_->lens) return false;
+  const auto& m = frame_->set_from_cam;
+  const Vec3f& d = from_camera;
+  const auto q = calibrate::project(
+      *frame_->lens, calibrate::to_double(Vec3f{m[0] * d.x + m[3] * d.y + m[6] * d.z,
+                                                m[1] * d.x + m[4] * d.y + m[7] * d.z,
+                                                m[2] * d.x + m[5] * d.y + m[8] * d.z}));
+  const auto& whole = frame_->plate_levels.front();
+  if (!q || !(q->x >= -0.5 && q->x <= whole.width - 0.5) ||
+      !(q->y >= -0.5 && q->y <= whole.height - 0.5)) {
+    return false;
+  }
+  const float width_px = width_rad / frame_->pixel_angle;
+  const int last = static_cast<int>(frame_->plate_levels.size()) - 1;
+  const int level =
+      width_px > 1 ? std::min(static_cast<int>(std::lround(std::log2(width_px))), last) : 0;
+  const double shrunk = 1.0 / (1 << level);
+  transport_->bent.push_back(
+      {weight, static_cast<float>((q->x + 0.5) * shrunk - 0.5),
+       static_cast<float>((q->y + 0.5) * shrunk - 0.5), static_cast<std::uint16_t>(target),
+       static_cast<std::uint16_t>(frame_->first_plate_level + static_cast<std::size_t>(level)),
+       shadow_point});
+  samples_[slot].added += weight * radiance_of(*frame_->planned, planned_direction, 0);
+  return true;
+}
+
+}  // namespace render
