@@ -235,7 +235,8 @@ namespace {
 // Whether two scenes differ in nothing but where moving instances stand.
 bool differ_in_moves_only(const SceneDescription& a, const SceneDescription& b) {
   if (a.meshes != b.meshes || a.textures != b.textures || a.materials != b.materials ||
-      a.background != b.background || a.instances.size() != b.instances.size()) {
+      a.background != b.background || a.videos != b.videos ||
+      a.instances.size() != b.instances.size()) {
     return false;
   }
   return std::ranges::equal(a.instances, b.instances, [](Instance x, const Instance& y) {

@@ -13,14 +13,6 @@ namespace {
 using capture::float_from_half;
 using render::FrameResult;
 
-FrameResult render(const MadeRoom& room, render::KeptTransport* kept = nullptr) {
-  FrameResult result;
-  render::FrameInputs inputs = room.inputs();
-  inputs.kept = kept;
-  render_frame(inputs, room.job, room.plate, result);
-  return result;
-}
-
 // The room's screen lights it by its video.
 void light(MadeRoom& room, std::array<int, 2> samples = {5, 5}, float ambient = 0) {
   const auto screen =
@@ -56,7 +48,7 @@ TEST(VideoLight, IsTheSameColdAndWarmAndTakesNoRays) {
       if (frame == 3) std::ranges::fill(image.pixels, 0.0F);  // black
       room.show(image);
       light(room, {5, 5}, 0.02F);
-      const FrameResult cold = render(room), warm = render(room, &kept);
+      const FrameResult cold = render_room(room), warm = render_room(room, &kept);
       EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
       EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
       const auto& s = warm.statistics;
@@ -73,12 +65,12 @@ TEST(VideoLight, DoesNotDependOnTilesOrThreads) {
   for (const int interleave : {1, 4}) {
     room.job.effort.interleave = interleave;
     room.job.effort.tile_size = 96;
-    const FrameResult first = render(room);
+    const FrameResult first = render_room(room);
     for (const int tile : {16, 48}) {
       room.job.effort.tile_size = tile;
       for (const std::size_t threads : {1U, 2U}) {
         const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-        EXPECT_EQ(render(room).rgba.pixels, first.rgba.pixels) << tile << " " << threads;
+        EXPECT_EQ(render_room(room).rgba.pixels, first.rgba.pixels) << tile << " " << threads;
       }
     }
   }
@@ -117,7 +109,7 @@ TEST(VideoLight, LightsAFloorAsTheReferenceSays) {
   settings.samples = 64;
   const capture::Image black = capture::make_image(48, 64);
   const capture::Image truth = render_reference(room.inputs(), room.job, black, settings);
-  const capture::Image shown = capture::to_float(render(room).rgba);
+  const capture::Image shown = capture::to_float(render_room(room).rgba);
   capture::Image mask = render::affected_mask(truth, black);
   std::fill_n(mask.pixels.begin(), 20 * 64, 0.0F);  // the floor alone
   const auto error = render::picture_error(shown, truth, mask);
@@ -133,7 +125,7 @@ TEST(VideoLight, LightsAFloorAsTheClosedFormSays) {
   std::ranges::fill(white.pixels, 1.0F);
   room.show(white);
   room.job.lights.lamps = lamps_of(floor.light, room.video, {{4, 4, 4}, 0});
-  const FrameResult result = render(room);
+  const FrameResult result = render_room(room);
   const calibrate::Lens lens{"pinhole", 64, 48, {57.6, 57.6, 31.5, 23.5}};
   const auto q = calibrate::project(lens, room.job.cam_from_set * calibrate::Vec3{0, 0, 0});
   const float shown = float_from_half(result.rgba.pixels[result.rgba.index(
@@ -153,7 +145,7 @@ TEST(VideoLight, LightsTheRoomAsTheReferenceSays) {
     settings.samples = 64;
     const capture::Image plate = capture::to_float(room.plate);
     const capture::Image truth = render_reference(room.inputs(), room.job, plate, settings);
-    const capture::Image shown = capture::to_float(render(room).rgba);
+    const capture::Image shown = capture::to_float(render_room(room).rgba);
     int lit = 0, alike = 0;
     for (std::size_t i = 0; i < truth.pixels.size(); i += 4) {
       const float r = truth.pixels[i];
@@ -170,17 +162,17 @@ TEST(VideoLight, TakesRaysAnewWhereALampMoves) {
   MadeRoom room(64, 48);
   light(room);
   render::KeptTransport kept;
-  render(room, &kept);
+  render_room(room, &kept);
   room.job.lights.lamps[3].position.z += 0.1F;
-  EXPECT_GT(render(room, &kept).statistics.primary_rays, 0U);
-  EXPECT_EQ(render(room, &kept).statistics.primary_rays, 0U);
+  EXPECT_GT(render_room(room, &kept).statistics.primary_rays, 0U);
+  EXPECT_EQ(render_room(room, &kept).statistics.primary_rays, 0U);
 }
 
 TEST(VideoLight, RefusesLampsThatAreNotFinite) {
   MadeRoom room(32, 32);
   light(room);
   room.job.lights.lamps[3].intensity.y = std::nanf("");
-  EXPECT_THROW(render(room), std::invalid_argument);
+  EXPECT_THROW(render_room(room), std::invalid_argument);
 }
 
 }  // namespace

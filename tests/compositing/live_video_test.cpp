@@ -12,18 +12,10 @@ namespace {
 using capture::float_from_half;
 using render::FrameResult;
 
-FrameResult render(const MadeRoom& room, render::KeptTransport* kept = nullptr) {
-  FrameResult result;
-  render::FrameInputs inputs = room.inputs();
-  inputs.kept = kept;
-  render_frame(inputs, room.job, room.plate, result);
-  return result;
-}
-
 TEST(LiveVideo, IsSeenWhereItsTextureCoordinatesSay) {
   MadeRoom room(81, 61);
   room.job.cam_from_set = calibrate::look_at({0.2, 1.9, 1.2}, {0.2, 2.9, 1.2}, 0);
-  const FrameResult result = render(room);
+  const FrameResult result = render_room(room);
   const calibrate::Lens lens{"pinhole", 81, 61, {72.9, 72.9, 40, 30}};
   for (const auto& [u, v] : {std::pair(0.3F, 0.4F), {0.62F, 0.5F}, {0.5F, 0.3F}}) {
     const calibrate::Vec3 p{0.2 + 1.6 * (u - 0.5), 2.9, 1.2 + 0.9 * (0.5 - v)};
@@ -49,7 +41,7 @@ TEST(LiveVideo, IsSeenInMirrorsAndGlassAsInTheReference) {
   settings.samples = 128;
   const capture::Image truth =
       render_reference(room.inputs(), room.job, capture::make_image(72, 96), settings);
-  const capture::Image shown = capture::to_float(render(room).rgba);
+  const capture::Image shown = capture::to_float(render_room(room).rgba);
   int bright = 0, alike = 0, mirrored = 0;
   for (int y = 0; y < 72; ++y) {
     for (int x = 0; x < 96; ++x) {
@@ -73,7 +65,7 @@ TEST(LiveVideo, IsTheSameColdAndWarmAndTakesNoRays) {
     capture::Image image = made_video(frame < 4 ? 90 : 60, frame < 4 ? 160 : 81, frame);
     if (frame == 2) image.at(20, 30, 1) = std::nanf("");
     room.show(image);
-    const FrameResult cold = render(room), warm = render(room, &kept);
+    const FrameResult cold = render_room(room), warm = render_room(room, &kept);
     EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
     EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
     const bool keeps = frame > 0 && frame < 4;
@@ -88,12 +80,12 @@ TEST(LiveVideo, IsTheSameColdAndWarmAndTakesNoRays) {
 TEST(LiveVideo, DoesNotDependOnTilesOrThreads) {
   MadeRoom room(96, 72);
   room.job.effort.tile_size = 96;
-  const FrameResult first = render(room);
+  const FrameResult first = render_room(room);
   for (const int tile : {16, 48}) {
     room.job.effort.tile_size = tile;
     for (const std::size_t threads : {1U, 2U}) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-      EXPECT_EQ(render(room).rgba.pixels, first.rgba.pixels) << tile << " " << threads;
+      EXPECT_EQ(render_room(room).rgba.pixels, first.rgba.pixels) << tile << " " << threads;
     }
   }
 }
@@ -114,7 +106,7 @@ TEST(LiveVideo, IsBlurredByRoughSurfaces) {
         stripes.at(y, x, 0) = 1 + std::sin(phase + 3.14159265F / 4 * static_cast<float>(x));
     }
     room.show(stripes);
-    const FrameResult result = render(room);
+    const FrameResult result = render_room(room);
     std::vector<float> row;
     for (int x = 40; x < 50; ++x)
       row.push_back(float_from_half(result.rgba.pixels[result.rgba.index(59, x, 0)]));
@@ -127,12 +119,12 @@ TEST(LiveVideo, IsBlurredByRoughSurfaces) {
 TEST(LiveVideo, MustBeThereForEveryTextureOfTheScene) {
   MadeRoom room(32, 32);
   room.videos.clear();
-  EXPECT_THROW(render(room), std::invalid_argument);
+  EXPECT_THROW(render_room(room), std::invalid_argument);
   room.videos = {nullptr};
-  EXPECT_THROW(render(room), std::invalid_argument);
+  EXPECT_THROW(render_room(room), std::invalid_argument);
   const render::VideoTexture none;
   room.videos = {&none};
-  EXPECT_THROW(render(room), std::invalid_argument);
+  EXPECT_THROW(render_room(room), std::invalid_argument);
 }
 
 }  // namespace

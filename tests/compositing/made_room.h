@@ -8,6 +8,7 @@
 
 #include "made_shot.h"
 #include "render/glass.h"
+#include "render/kept_transport.h"
 #include "render/video_texture.h"
 
 namespace compositing {
@@ -125,5 +126,14 @@ struct MadeRoom {
     return inputs;
   }
 };
+
+inline render::FrameResult render_room(const MadeRoom& room,
+                                       render::KeptTransport* kept = nullptr) {
+  render::FrameResult result;
+  render::FrameInputs inputs = room.inputs();
+  inputs.kept = kept;
+  render_frame(inputs, room.job, room.plate, result);
+  return result;
+}
 
 }  // namespace compositing

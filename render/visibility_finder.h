@@ -1,0 +1,211 @@
+// Which pixels of a cell see which light, with few rays. Private to the kernel.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+
+#include "render/light_gather.h"
+#include "render/shadow_stream.h"
+
+namespace render {
+
+inline constexpr std::uint64_t block4 = 0x000F000F000F000FULL;  // columns 0-3 of a word's four rows
+inline constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 of its first two rows
+
+inline int bit_of(int x, int y) { return (y & 3) * 16 + x; }
+inline int point_of(int word, int bit) { return word * 64 + bit; }
+
+// Marks the blocks of a cell that are one smooth surface.
+void find_smooth_blocks(const Receivers& r, GatherWorkspace& w);
+
+// Pixels of one light, or lamp, whose visibility must be tested: see gather_cell.
+class VisibilityFinder {
+ public:
+  VisibilityFinder(const LightContext& context,
+                   const Receivers& r,
+                   GatherWorkspace& w,
+                   RenderStatistics& statistics,
+                   unsigned ray_mask,
+                   bool lamps = false)
+      : context_(context),
+        r_(r),
+        w_(w),
+        statistics_(statistics),
+        ray_mask_(ray_mask),
+        lamps_(lamps) {}
+
+  // Fills w.seen for lights first .. first + count - 1 from w.lit; tints what glass weakens.
+  void find(std::uint32_t first, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i) {
+      w_.seen[i] = w_.lit[i];
+      w_.tested[i] = {};
+      if (skip_[i]) continue;
+      test_first(first, i);
+    }
+    shoot_rest(first);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!skip_[i]) refine(first, i);
+    }
+    shoot_rest(first);
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!skip_[i]) spread(i);
+    }
+  }
+
+  std::array<bool, GatherWorkspace::group> skip_{};  // lights that nothing can block here
+
+ private:
+  static std::uint64_t bit(int k) { return std::uint64_t{1} << k; }
+
+  void test(std::uint32_t first, std::size_t i, int word, int k) {
+    const auto wi = static_cast<std::size_t>(word);
+    if (w_.tested[i][wi] & bit(k)) return;
+    w_.tested[i][wi] |= bit(k);
+    const auto point = static_cast<std::size_t>(point_of(word, k));
+    const auto light = first + static_cast<std::uint32_t>(i);
+    const unsigned mask = ray_mask_ ? ray_mask_ : r_.mask[point];
+    if (lamps_) {
+      const auto ray = ray_to_lamp(lamp_receiver(r_, point), context_.table->lamps[light]);
+      add_ray(w_, r_, point, light, ray->direction, mask, ray->far_m);
+    } else {
+      add_ray(w_, r_, point, light, context_.table->lights[light].direction, mask);
+    }
+    if (w_.rays == stream_rays) shoot_rest(first);
+  }
+
+  void shoot_rest(std::uint32_t first) {
+    flush(*context_.scene, w_, statistics_,
+          [&](std::uint32_t point, std::uint32_t light, bool blocked, Vec3f share) {
+            const std::size_t i = light - first;
+            if (blocked) {
+              w_.seen[i][point / 64] &= ~bit(static_cast<int>(point % 64));
+            } else if (share != Vec3f{1, 1, 1} && w_.tints.size() < w_.tints.capacity()) {
+              w_.tints.push_back({light, point, Vec3f{1, 1, 1} - share});
+              tinted_[i][point / 64] |= bit(static_cast<int>(point % 64));
+            }
+          });
+  }
+
+  // The pixel that stands for a block: another one for each light. Where blocks are looked at more
+  // closely, it is an outermost one at the border of the cell, so that no shadow comes in unseen
+  // from the cell beside, and the two cells agree where they meet.
+  int first_of_block(std::uint32_t light, int word, int bx) const {
+    const auto any = static_cast<int>((light * 7 + light / 16) & 15);
+    if (block_ == 4) return bit_of(bx + (any & 3), any >> 2);
+    return bit_of(bx + outermost(bx / 4, any & 3), outermost(word, any >> 2));
+  }
+  // The same block's pixel towards the middle of the cell: thin shadows of bright light slip
+  // through where blocks' pixels are far apart.
+  static int second_of_block(std::uint32_t light, int word, int bx) {
+    const auto any = static_cast<int>((light * 7 + light / 16) & 15);
+    return bit_of(bx + outermost(3 - bx / 4, any & 3), outermost(3 - word, any >> 2));
+  }
+  // Of four pixels, in the first to last of four blocks.
+  static int outermost(int block, int any) { return block == 0 ? 0 : block == 3 ? 3 : any; }
+  static int offset2(std::uint32_t light) {
+    return bit_of(static_cast<int>(light & 1), static_cast<int>((light >> 1) & 1));
+  }
+
+  void test_first(std::uint32_t first, std::size_t i) {
+    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    const bool compact = !lamps_ && context_.table->lights[light].compact != 0;
+    for (int word = 0; word < 4; ++word) {
+      const auto wi = static_cast<std::size_t>(word);
+      const std::uint64_t lit = w_.lit[i][wi];
+      std::uint64_t rest = lit;
+      if (coarse_) {
+        for (int bx = 0; bx < cell_size; bx += 4) {
+          const std::uint64_t bits = block4 << bx;
+          if ((lit & w_.same4[wi] & bits) != bits) continue;
+          test(first, i, word, first_of_block(light, word, bx));
+          if (compact && block_ < 4) test(first, i, word, second_of_block(light, word, bx));
+          rest &= ~bits;
+        }
+      }
+      test_pixels(first, i, word, rest);
+    }
+  }
+
+  // Tests pixels one by one, or one of each smooth 2x2 block.
+  void test_pixels(std::uint32_t first, std::size_t i, int word, std::uint64_t pixels) {
+    const auto wi = static_cast<std::size_t>(word);
+    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    if (block_ >= 2) {
+      const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
+      for (std::uint64_t left = pixels; left != 0;) {
+        const int k = std::countr_zero(left);
+        const int corner = (k / 32) * 32 + (k % 16) / 2 * 2;
+        const std::uint64_t bits = block2 << corner;
+        left &= ~bits;
+        if ((smooth & bits) != bits) continue;
+        test(first, i, word, corner + offset2(light));
+        pixels &= ~bits;
+      }
+    }
+    for (; pixels != 0; pixels &= pixels - 1) test(first, i, word, std::countr_zero(pixels));
+  }
+
+  // Where what was tested of a block disagrees in itself or with the blocks around it, looks
+  // closer.
+  void refine(std::uint32_t first, std::size_t i) {
+    if (!coarse_) return;
+    // 4 x 4 flags of blocks: bit by * 4 + bx.
+    unsigned whole = 0, sees = 0, hidden = 0, tinted = 0;
+    for (int by = 0; by < 4; ++by) {
+      const auto wi = static_cast<std::size_t>(by);
+      for (int bx = 0; bx < 4; ++bx) {
+        const std::uint64_t bits = block4 << (4 * bx);
+        if ((w_.lit[i][wi] & w_.same4[wi] & bits) == bits) whole |= 1U << (by * 4 + bx);
+        const std::uint64_t tested = w_.tested[i][wi] & bits;
+        if (w_.seen[i][wi] & tested) sees |= 1U << (by * 4 + bx);
+        if (~w_.seen[i][wi] & tested) hidden |= 1U << (by * 4 + bx);
+        if (tinted_[i][wi] & tested) tinted |= 1U << (by * 4 + bx);
+      }
+    }
+    const auto grown = [](unsigned f) {
+      const unsigned rows = f | (f << 4) | (f >> 4);
+      return (rows | ((rows & 0x7777U) << 1) | ((rows & 0xEEEEU) >> 1)) & 0xFFFFU;
+    };
+    const unsigned differ = (grown(hidden) & sees) | (grown(sees) & hidden) | grown(tinted);
+    for (int by = 0; by < 4; ++by) {
+      const auto wi = static_cast<std::size_t>(by);
+      for (int bx = 0; bx < 4; ++bx) {
+        const unsigned flag = 1U << (by * 4 + bx);
+        if (!(whole & flag)) continue;
+        const std::uint64_t bits = block4 << (4 * bx);
+        if (!(differ & flag) || block_ == 4) {
+          if (!(sees & flag)) w_.seen[i][wi] &= ~bits;
+          continue;
+        }
+        test_pixels(first, i, by, bits);
+      }
+    }
+  }
+
+  // Gives a 2x2 block's answer to its four pixels.
+  void spread(std::size_t i) {
+    if (block_ < 2) return;
+    for (std::size_t wi = 0; wi < 4; ++wi) {
+      const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
+      std::uint64_t left = smooth & w_.tested[i][wi] & ~w_.seen[i][wi];
+      for (; left != 0; left &= left - 1) {
+        const int k = std::countr_zero(left);
+        const std::uint64_t bits = block2 << ((k / 32) * 32 + (k % 16) / 2 * 2);
+        if ((smooth & bits) == bits) w_.seen[i][wi] &= ~(bits & ~(w_.tested[i][wi]));
+      }
+    }
+  }
+
+  const LightContext& context_;
+  const Receivers& r_;
+  GatherWorkspace& w_;
+  RenderStatistics& statistics_;
+  unsigned ray_mask_;
+  bool lamps_;
+  int block_ = context_.effort->interleave;
+  bool coarse_ = context_.effort->adaptive_visibility || block_ == 4;
+  std::array<CellMask, GatherWorkspace::group> tinted_{};
+};
+
+}  // namespace render
