@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "render/embree_context.h"
+#include "render/kept_transport.h"
 #include "render/standard.h"
 #include "render/trace.h"
 
@@ -39,11 +40,16 @@ CellBaker::CellBaker() {
 }
 
 void CellBaker::bake(const FrameContext& frame,
+                     int stage,
                      int x0,
                      int y0,
                      CellTransport& transport,
                      RenderStatistics& statistics) {
   frame_ = &frame;
+  effort_ = frame.efforts[static_cast<std::size_t>(stage)];
+  const bool may_move = frame.inputs.kept && frame.inputs.scene->has_moving();
+  grid_ = may_move ? &frame.inputs.kept->grid() : nullptr;
+  shadow_rays_ = {frame.inputs.scene, frame.planned_table.get(), &effort_};
   x0_ = x0;
   y0_ = y0;
   transport_ = &transport;
@@ -62,7 +68,7 @@ void CellBaker::bake(const FrameContext& frame,
   queue_.clear();
   lamp_terms_.clear();
   trace_centres();
-  const bool smooth_edges = frame.job->effort.aa_samples > 1;
+  const bool smooth_edges = effort_.aa_samples > 1;
   if (smooth_edges) keep_centres();
   shade_centres();
   if (smooth_edges) {
@@ -267,6 +273,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   Receivers& r = receivers_;
   const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
   r.px[k] = origin.x, r.py[k] = origin.y, r.pz[k] = origin.z;
+  if (grid_) transport_->reach.add_receiver(*grid_, origin);
   r.nx[k] = p.light_normal.x, r.ny[k] = p.light_normal.y, r.nz[k] = p.light_normal.z;
   const Vec3f g = p.hit.geometric_normal;
   r.gx[k] = g.x, r.gy[k] = g.y, r.gz[k] = g.z;
@@ -276,7 +283,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   r.real_first[k] = real;
   r.surface[k] = p.hit.instance * 4096 + p.hit.material;
   // Further samples of an edge pixel share its weight.
-  const float further_share = 1 / static_cast<float>(frame_->job->effort.aa_samples);
+  const float further_share = 1 / static_cast<float>(effort_.aa_samples);
   r.share[k] = largest(p.throughput) * (p.slot < cell_pixels ? 1.0F : further_share);
   // What is dark shows little of the light, what only mirrors nothing but compact lights.
   if (!p.catches_shadow && !p.catches_lamps) {
@@ -330,10 +337,10 @@ void CellBaker::receive(int count, bool grid) {
       for (std::size_t k = 0; k < cell_pixels; ++k) {
         if (!(r.active[k / 64] >> (k % 64) & 1)) r.nx[k] = r.ny[k] = r.nz[k] = 0;
       }
-      gather_cell(frame_->light, r, gather_, transport_->visibility, *statistics_);
+      gather_cell(shadow_rays_, r, gather_, transport_->visibility, *statistics_);
       transport_->receiving = r.active;
     } else {
-      gather_points(frame_->light, r, gather_, tested_, *statistics_);
+      gather_points(shadow_rays_, r, gather_, tested_, *statistics_);
     }
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -417,6 +424,17 @@ void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
   catch_lamps(p, centre, light_[centre].lamps);
 }
 
+// The space that the stream's rays passed, up to what they met.
+void CellBaker::mark_passed(std::size_t count) {
+  const RayStream& s = stream_;
+  for (std::size_t i = 0; i < count; ++i) {
+    // A real surface may let a ray see what is behind it.
+    const float far_m = s.mask[i] & mask_stand_in ? ray_far : s.far_m[i];
+    grid_->mark_line({s.ox[i], s.oy[i], s.oz[i]}, {s.dx[i], s.dy[i], s.dz[i]}, far_m,
+                     transport_->reach.passed);
+  }
+}
+
 void CellBaker::bounce() {
   while (!queue_.empty()) {
     const std::size_t n = std::min<std::size_t>(queue_.size(), stream_rays);
@@ -434,6 +452,7 @@ void CellBaker::bounce() {
       stream_.mask[i] = sees_stand_ins(q.kind) ? mask_virtual | mask_stand_in : mask_virtual;
     }
     trace(static_cast<int>(n), false, RayKind::reflection);
+    if (grid_) mark_passed(n);
     statistics_->secondary_rays += n;
     int count = 0;
     std::size_t leaving = 0;

@@ -28,8 +28,9 @@ struct RayStream {
 class CellBaker final : public RaySink {
  public:
   CellBaker();
-  // The cell whose top-left pixel is (x0, y0), into `transport`.
+  // The cell whose top-left pixel is (x0, y0), at that stage, into `transport`.
   void bake(const FrameContext& frame,
+            int stage,
             int x0,
             int y0,
             CellTransport& transport,
@@ -132,6 +133,7 @@ class CellBaker final : public RaySink {
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_shared(const ShadePoint& p, std::size_t centre);
   void collect(const ShadePoint& p);
+  void mark_passed(std::size_t count);
   void bounce();
 
   // cell_lamps.cpp
@@ -226,6 +228,9 @@ class CellBaker final : public RaySink {
 
   // Of the cell at work.
   const FrameContext* frame_ = nullptr;
+  Effort effort_;  // of its stage
+  LightContext shadow_rays_;
+  const SpaceGrid* grid_ = nullptr;  // if anything moves and cells are kept
   RenderStatistics* statistics_ = nullptr;
   CellTransport* transport_ = nullptr;
   RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for

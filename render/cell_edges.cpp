@@ -105,7 +105,7 @@ void CellBaker::find_edges() {
 // Marks pixels whose virtual light, or the shadow that they catch, differs from a neighbour's by
 // more than the effort allows.
 void CellBaker::find_glints() {
-  const float least = frame_->job->effort.glint_contrast;
+  const float least = effort_.glint_contrast;
   if (!(least > 0)) return;
   const auto compare = [&](std::size_t a, std::size_t b) {
     if (!is_inside(a) || !is_inside(b)) return;
@@ -144,7 +144,7 @@ bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
            transport_->shadow[k] * passing(light.open, light.open - light.arriving) *
                plate_contrast;
   };
-  return largest(abs(clipped(shown(a)) - clipped(shown(b)))) > frame_->job->effort.glint_contrast;
+  return largest(abs(clipped(shown(a)) - clipped(shown(b)))) > effort_.glint_contrast;
 }
 
 // The nearest pixel whose centre shows the same surface as a further_ ray met_, or -1.
@@ -217,14 +217,13 @@ void CellBaker::finish_further(int count) {
 // More camera rays in pixels that an edge crosses. The centre's own sample makes room for them.
 // Pixels that are still uncertain take more, three times as many as they have, and again.
 void CellBaker::sample_edges() {
-  const Effort& effort = frame_->job->effort;
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (edge_[k] == Edge::none) continue;
     squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
     borrowed_[k] = {};
   }
   int first = 0;
-  for (int end = effort.aa_samples; end <= samples_max; first = end, end *= 4) {
+  for (int end = effort_.aa_samples; end <= samples_max; first = end, end *= 4) {
     samples_each_ = end;
     const CellMask chosen = first == 0 ? edges() : uncertain(first);
     int count = 0;
@@ -243,7 +242,7 @@ void CellBaker::sample_edges() {
       }
     }
     if (count > 0) finish_further(count);
-    if (!(effort.aa_tolerance > 0)) break;
+    if (!(effort_.aa_tolerance > 0)) break;
   }
 }
 
@@ -278,7 +277,7 @@ CellMask CellBaker::uncertain(int n) const {
 bool CellBaker::is_uncertain(std::size_t k, int n) const {
   if (counts_[k] != n) return false;
   const auto samples_n = static_cast<float>(n);
-  const float tolerance = frame_->job->effort.aa_tolerance;
+  const float tolerance = effort_.aa_tolerance;
   return largest(spread_of_further(k)) >
          tolerance * tolerance * samples_n * std::max(samples_n - 1, 1.0F);
 }

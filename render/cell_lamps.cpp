@@ -9,7 +9,7 @@ namespace render {
 void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_point) {
   if (receivers_.by_lamps == CellMask{} || frame_->job->lights.lamps.empty()) return;
   CellLamps& cell = transport_->lamps;
-  gather_cell_lamps(frame_->light, receivers_, gather_, cell, *statistics_);
+  gather_cell_lamps(shadow_rays_, receivers_, gather_, cell, *statistics_);
   const auto planned = [&](std::size_t place) {
     return frame_->planned_table->lamps[cell.numbers[place]].intensity;
   };
@@ -35,7 +35,7 @@ void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_poin
 void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver) {
   if (frame_->job->lights.lamps.empty()) return;
   reached_.clear();
-  gather_point_lamps(frame_->light, receivers_, gather_, reached_, *statistics_);
+  gather_point_lamps(shadow_rays_, receivers_, gather_, reached_, *statistics_);
   CellTransport& t = *transport_;
   for (const PointLamp& l : reached_) {
     const std::size_t i = point_of_receiver[l.point];

@@ -92,12 +92,11 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
                         asked.kind == RayKind::difference});
     }
   }
-  const Effort& effort = frame_->job->effort;
   // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
-  const bool deep = from.depth >= effort.max_depth || queue_.size() == queue_.capacity();
+  const bool deep = from.depth >= effort_.max_depth || queue_.size() == queue_.capacity();
   if (deep) ++statistics_->depth_limit_hits;
   const auto too_dim = [&] {
-    const float least = 1 - effort.accuracy;
+    const float least = 1 - effort_.accuracy;
     if (straight || weight >= least) return weight < least;
     const float brightest =
         std::max(largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread)),
@@ -105,7 +104,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     return weight * brightest < least;
   };
   if (deep || too_dim()) {
-    if (effort.dark_cuts) return;
+    if (effort_.dark_cuts) return;
     if (straight) {
       CellTransport::Base& base = base_[target_of(from)];
       samples_[from.slot].plate += ray.throughput;

@@ -174,6 +174,7 @@ void CellTransport::clear() {
   lamps.numbers.clear(), lamps.factors.clear(), lamps.tints.clear();
   lamp_terms.clear(), catchers.clear(), caught.clear();
   bent.clear(), video.clear(), borrowed.clear(), further.clear();
+  reach = {};
   rays = 0;
   counts.clear();
 }

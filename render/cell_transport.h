@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "render/cell_reach.h"
 #include "render/environment.h"
 #include "render/frame_job.h"
 #include "render/light_gather.h"
@@ -119,6 +120,7 @@ struct CellTransport {
   std::vector<VideoTerm> video;
   std::vector<Borrowed> borrowed;
   std::vector<Further> further;
+  CellReach reach;         // if anything moves
   std::uint64_t rays = 0;  // that it took
   // By pixel, or empty if nobody has asked: a cell that is kept without them is found anew, once.
   std::vector<RayCount> counts;

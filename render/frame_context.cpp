@@ -37,11 +37,10 @@ class Key {
   std::uint64_t value_ = 0x9E3779B97F4A7C15ULL;
 };
 
-// Changes whenever the cells' transport may.
+// Changes whenever the cells' transport may, but for things that move.
 std::uint64_t transport_key(const FrameContext& context) {
   Key key;
   const FrameJob& job = *context.job;
-  key.mix(context.inputs.scene->id());
   for (const double value : job.cam_from_set.R.m) key.mix(value);
   const calibrate::Vec3& t = job.cam_from_set.t;
   key.mix(t.x), key.mix(t.y), key.mix(t.z);
@@ -150,6 +149,14 @@ std::vector<capture::Image> plate_levels_of(const capture::HalfImage& plate) {
   return levels;
 }
 
+std::array<Effort, refinement_stages> efforts_of(const Effort& effort) {
+  std::array<Effort, refinement_stages> efforts;
+  for (int stage = 0; stage < refinement_stages; ++stage) {
+    efforts[static_cast<std::size_t>(stage)] = effort_of_stage(effort, stage);
+  }
+  return efforts;
+}
+
 }  // namespace
 
 FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) {
@@ -223,7 +230,6 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
     for (const capture::Image& level : context.plate_levels) context.levels.push_back(&level);
   }
   add_videos(context);
-  context.light = {inputs.scene, context.planned_table.get(), &job.effort};
   const auto& R = job.cam_from_set.R.m;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j)
@@ -236,11 +242,24 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
                     b = d.index(d.height / 2, d.width / 2 + 1);
   context.pixel_angle =
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
-  if (inputs.kept) {
-    inputs.kept->begin_frame(transport_key(context), (d.width + cell_size - 1) / cell_size,
-                             (d.height + cell_size - 1) / cell_size);
-  }
+  context.columns = (d.width + cell_size - 1) / cell_size;
+  context.rows = (d.height + cell_size - 1) / cell_size;
+  context.efforts = efforts_of(e);
+  check_stages(context);
+  if (inputs.kept) inputs.kept->begin_frame(transport_key(context), context);
   return context;
+}
+
+void check_stages(const FrameContext& context) {
+  const std::vector<std::uint8_t>& stages = context.job->stages;
+  const std::size_t cells = context.cell_at(0, context.rows);
+  if (!stages.empty() && stages.size() != cells) {
+    throw std::invalid_argument("a frame of " + std::to_string(cells) + " cells has stages for " +
+                                std::to_string(stages.size()));
+  }
+  if (std::ranges::any_of(stages, [](std::uint8_t s) { return s > finished_stage; })) {
+    throw std::invalid_argument("a cell's stage must be 0 to " + std::to_string(finished_stage));
+  }
 }
 
 void cut_tile(const capture::HalfImage& plate, Rect rect, int margin, TileJob& job) {

@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t frame_job_magic = 0x344A4650;  // "PFJ4"
+constexpr std::uint32_t frame_job_magic = 0x354A4650;  // "PFJ5"
 constexpr std::uint32_t tile_job_magic = 0x314A5450;   // "PTJ1"
 
 // Calls visit on every single number of an Effort, so that writing and reading cannot differ.
@@ -16,7 +16,7 @@ void for_each_setting(E& effort, F&& visit) {
       visit(effort.light_samples), visit(effort.interleave);
   visit(effort.adaptive_visibility), visit(effort.cull_lights), visit(effort.accuracy),
       visit(effort.dark_cuts);
-  visit(effort.max_depth), visit(effort.tile_size), visit(effort.progressive_sample);
+  visit(effort.max_depth), visit(effort.tile_size);
 }
 
 template <class R, class F>
@@ -49,6 +49,7 @@ std::vector<std::byte> serialize(const FrameJob& job) {
   out.put(job.lights.version);
   out.put(job.lights.unseen_share), out.put(job.lights.error_estimate);
   for (const float value : job.match) out.put(value);
+  out.put_all(job.stages);
   for (const float parameter : job.tone) out.put(parameter);
   return out.take();
 }
@@ -77,6 +78,7 @@ FrameJob parse_frame_job(std::span<const std::byte> bytes) {
   in.get(job.lights.version);
   in.get(job.lights.unseen_share), in.get(job.lights.error_estimate);
   for (float& value : job.match) in.get(value);
+  in.get_all(job.stages);
   for (float& parameter : job.tone) in.get(parameter);
   in.expect_end();
   return job;

@@ -30,11 +30,10 @@ struct Effort {
   int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
   bool cull_lights = true;          // skip shadow rays that no object can block
-  float accuracy = 0.97F;      // rays whose share of the pixel falls below 1 - accuracy are cut
-  bool dark_cuts = false;      // cut rays see nothing, instead of the environment: for charts
-  int max_depth = 64;          // safety net; counted when hit
-  int tile_size = 32;          // pixels, a multiple of 16
-  int progressive_sample = 0;  // samples accumulated so far (later issues)
+  float accuracy = 0.97F;  // rays whose share of the pixel falls below 1 - accuracy are cut
+  bool dark_cuts = false;  // cut rays see nothing, instead of the environment: for charts
+  int max_depth = 64;      // safety net; counted when hit
+  int tile_size = 32;      // pixels, a multiple of 16
   friend bool operator==(const Effort&, const Effort&) = default;
 };
 
@@ -54,7 +53,9 @@ struct FrameJob {
   std::vector<TextureTime> textures;  // [0] is the plate, [1] the environment
   LightTable lights;
   ColourMatrix match = same_colours;  // probe radiance to plate units, already in `lights`
-  std::array<float, 2> tone{1, 0};    // of the display's curve: p and the brightest, 0 = none
+  // How fine each cell is, row by row (refinement.h); none = all of them as the effort asks.
+  std::vector<std::uint8_t> stages;
+  std::array<float, 2> tone{1, 0};  // of the display's curve: p and the brightest, 0 = none
   friend bool operator==(const FrameJob&, const FrameJob&) = default;
 };
 

@@ -1,43 +1,95 @@
 // Transport kept from frame to frame.
 #include "render/kept_transport.h"
 
+#include <algorithm>
+
+#include "render/kernel.h"
+
 namespace render {
 
-void KeptTransport::begin_frame(std::uint64_t key, int columns, int rows) {
-  if (key == key_ && columns == columns_ && rows == rows_) return;
-  if (columns != columns_ || rows != rows_) {
-    cells_.clear();
-    cells_.resize(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-    bytes_ = 0;
+void KeptTransport::begin_frame(std::uint64_t key, const FrameContext& frame) {
+  const Scene& scene = *frame.inputs.scene;
+  const bool same_size = frame.columns == columns_ && frame.rows == rows_;
+  auto moved = Scene::moved(places_, scene.places());
+  if (key == key_ && same_size && moved) {
+    if (moved->empty()) return;
+    if (std::ranges::all_of(*moved, [&](const auto& bounds) { return grid_.holds(bounds); })) {
+      forget(std::move(*moved), frame);
+    } else {
+      forget_all(scene);
+    }
+  } else {
+    if (!same_size) {
+      cells_.clear();
+      cells_.resize(static_cast<std::size_t>(frame.columns) * static_cast<std::size_t>(frame.rows));
+      bytes_ = 0;
+    }
+    forget_all(scene);
   }
   key_ = key;
-  columns_ = columns;
-  rows_ = rows;
-  for (Cell& cell : cells_) cell.kept = false;
+  places_ = scene.places();
+  columns_ = frame.columns;
+  rows_ = frame.rows;
+  full_ = false;
 }
 
-const CellTransport* KeptTransport::find(int column, int row) const {
+void KeptTransport::forget_all(const Scene& scene) {
+  for (Cell& cell : cells_) cell.stage = none;
+  cones_.clear();
+  grid_ = SpaceGrid(scene.virtual_bounds());
+}
+
+void KeptTransport::forget(std::vector<Scene::Bounds> moved, const FrameContext& frame) {
+  if (cones_.empty()) cones_ = cell_cones(*frame.inputs.directions, frame.set_from_cam);
+  SpaceGrid::Mask receivers{};
+  for (const Cell& cell : cells_) {
+    if (cell.stage == none) continue;
+    const SpaceGrid::Mask& lit = cell.transport->reach.lit;
+    for (std::size_t i = 0; i < lit.size(); ++i) receivers[i] |= lit[i];
+  }
+  const MovedThings things(std::move(moved), grid_, *frame.planned_table, receivers);
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    Cell& cell = cells_[i];
+    if (cell.stage == none) continue;
+    if (things.may_be_seen(cones_[i], frame.camera) || things.may_change(cell.transport->reach)) {
+      cell.stage = none;
+    }
+  }
+}
+
+const CellTransport* KeptTransport::find(int column, int row, int stage) const {
   const Cell& cell = cells_[index(column, row)];
-  return cell.kept ? cell.transport.get() : nullptr;
+  return cell.stage == stage ? cell.transport.get() : nullptr;
+}
+
+std::vector<int> KeptTransport::stages() const {
+  std::vector<int> stages;
+  stages.reserve(cells_.size());
+  for (const Cell& cell : cells_) stages.push_back(cell.stage);
+  return stages;
 }
 
 CellTransport* KeptTransport::place(int column, int row) {
   Cell& cell = cells_[index(column, row)];
   if (!cell.transport) {
-    if (bytes_ >= max_bytes) return nullptr;
+    if (bytes_ >= max_bytes) {
+      full_ = true;
+      return nullptr;
+    }
     cell.transport = std::make_unique<CellTransport>();
   }
   return cell.transport.get();
 }
 
-void KeptTransport::keep(int column, int row) {
+void KeptTransport::keep(int column, int row, int stage) {
   Cell& cell = cells_[index(column, row)];
   const std::size_t bytes = cell.transport->bytes();
   const std::size_t before = bytes_.fetch_add(bytes - cell.bytes);
   cell.bytes = bytes;
-  cell.kept = true;
+  cell.stage = stage;
   if (before + bytes <= max_bytes) return;
   // Too much: this cell's is given back.
+  full_ = true;
   bytes_ -= cell.bytes;
   cell = {};
 }

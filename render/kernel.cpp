@@ -119,20 +119,21 @@ void TileWorkspace::Impl::render_cell(
   load_plate(tile, x0, y0);
   KeptTransport* memory = frame.inputs.kept;
   const int column = x0 / cell_size, row = y0 / cell_size;
-  const CellTransport* kept = memory ? memory->find(column, row) : nullptr;
+  const int stage = frame.stage_of(column, row);
+  const CellTransport* kept = memory ? memory->find(column, row, stage) : nullptr;
   const bool counts = frame.inputs.count_rays;
   if (kept && (!counts || !kept->counts.empty())) {
     light(frame, *kept, result.statistics);
     result.statistics.kept_rays += kept->rays;
     if (counts) write_counts(*kept, tile, x0, y0, result);
   } else {
-    baker.bake(frame, x0, y0, transport, result.statistics);
+    baker.bake(frame, stage, x0, y0, transport, result.statistics);
     light(frame, transport, result.statistics);
     if (counts) write_counts(transport, tile, x0, y0, result);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
     if (CellTransport* room = memory ? memory->place(column, row) : nullptr) {
       *room = transport;
-      memory->keep(column, row);
+      memory->keep(column, row, stage);
     }
   }
   write(frame, tile, x0, y0, result);

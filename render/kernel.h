@@ -6,6 +6,7 @@
 
 #include "render/light_gather.h"
 #include "render/ray_log.h"
+#include "render/refinement.h"
 #include "render/renderer.h"
 #include "render/shader.h"
 
@@ -20,8 +21,16 @@ struct FrameContext {
   const Environment* planned = nullptr;  // its light decides
   std::vector<const capture::Image*> levels, planned_levels;
   std::shared_ptr<const LightTable> planned_table;  // the job's, with its planned irradiances
-  std::vector<std::uint32_t> compact;  // lights of the table that are compact and apart
-  LightContext light;
+  std::vector<std::uint32_t> compact;             // lights of the table that are compact and apart
+  std::array<Effort, refinement_stages> efforts;  // of each stage
+  int columns = 0, rows = 0;                      // of cells
+  std::size_t cell_at(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+           static_cast<std::size_t>(column);
+  }
+  int stage_of(int column, int row) const {
+    return job->stages.empty() ? finished_stage : job->stages[cell_at(column, row)];
+  }
   // For rays that clear bodies bend: the plate, halved again and again, and the way to its pixels.
   // Empty where the scene has none, or no plate is given.
   std::vector<capture::Image> plate_levels;
@@ -38,6 +47,8 @@ struct FrameContext {
 // Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not
 // finite).
 FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job);
+// Throws std::invalid_argument where the job's stages are not those of the frame's cells.
+void check_stages(const FrameContext& context);
 
 // All memory that rendering tiles takes on one thread. Nothing else is allocated in the tile loop.
 class TileWorkspace {

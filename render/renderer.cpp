@@ -53,19 +53,35 @@ void copy_rows(const std::vector<capture::Half>& from, const Rect& rect, capture
 
 }  // namespace
 
-void render_frame(const FrameInputs& inputs,
-                  const FrameJob& job,
-                  const capture::HalfImage& plate,
-                  FrameResult& result) {
+std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
+                                            const FrameJob& job,
+                                            const capture::HalfImage& plate) {
   FrameInputs with_plate = inputs;
   with_plate.plate = &plate;
-  const FrameContext context = make_frame_context(with_plate, job);
+  auto context = std::make_shared<FrameContext>(make_frame_context(with_plate, job));
   const int width = inputs.directions->width, height = inputs.directions->height;
   if (plate.width != width || plate.height != height || plate.channels != 3) {
     throw std::invalid_argument("the plate is " + std::to_string(plate.width) + "x" +
                                 std::to_string(plate.height) + ", but its lens is for " +
                                 std::to_string(width) + "x" + std::to_string(height));
   }
+  return context;
+}
+
+void render_frame(const FrameInputs& inputs,
+                  const FrameJob& job,
+                  const capture::HalfImage& plate,
+                  FrameResult& result) {
+  render_frame(*prepare_frame(inputs, job, plate), plate, result);
+}
+
+void render_frame(const FrameContext& context,
+                  const capture::HalfImage& plate,
+                  FrameResult& result) {
+  const FrameInputs& inputs = context.inputs;
+  const FrameJob& job = *context.job;
+  check_stages(context);
+  const int width = inputs.directions->width, height = inputs.directions->height;
   size_image(result.rgba, height, width, 4);
   size_image(result.matte, height, width, 1);
   result.statistics = {};

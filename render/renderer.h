@@ -1,6 +1,7 @@
 // One frame, tile by tile, on this machine's threads.
 #pragma once
 
+#include <memory>
 #include <span>
 
 #include "calibrate/lens.h"
@@ -39,6 +40,19 @@ struct FrameResult {
   RayCounts rays;            // if asked for, else empty
   RenderStatistics statistics;
 };
+
+// What all tiles of a frame share (kernel.h).
+struct FrameContext;
+
+// The two halves of render_frame, for who decides on the stages of cells by what is still kept:
+// job.stages may change in between. Inputs, job and plate must outlive the context. Both throw
+// std::invalid_argument if sizes disagree.
+std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
+                                            const FrameJob& job,
+                                            const capture::HalfImage& plate);
+void render_frame(const FrameContext& context,
+                  const capture::HalfImage& plate,
+                  FrameResult& result);
 
 // Renders a frame with oneTBB over tiles. `plate` is (height, width, 3) of the picture's size,
 // linear. `result` keeps its buffers from frame to frame. Throws std::invalid_argument if sizes

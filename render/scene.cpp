@@ -256,7 +256,7 @@ Scene::Scene(SceneDescription description) : impl_(std::make_unique<Impl>()) {
   check(description);
   auto compiled = std::make_shared<Compiled>();
   compiled->build(description);
-  impl_->id = next_id();
+  compiled->id = impl_->id = next_id();
   impl_->description = std::move(description);
   impl_->compiled = std::move(compiled);
   impl_->assemble();
@@ -271,6 +271,7 @@ Scene::Scene(SceneDescription description, const Scene& before) : impl_(std::mak
   } else {
     auto compiled = std::make_shared<Compiled>();
     compiled->build(description);
+    compiled->id = impl_->id;
     impl_->compiled = std::move(compiled);
   }
   impl_->description = std::move(description);
@@ -302,6 +303,7 @@ const Glass* Scene::glass_of(std::uint32_t material) const {
   return glass ? &*glass : nullptr;
 }
 bool Scene::has_glass() const { return impl_->compiled->has_glass; }
+bool Scene::has_moving() const { return impl_->compiled->two_level; }
 const BackgroundShader& Scene::background() const { return *impl_->compiled->background; }
 bool Scene::has_real_blockers() const { return impl_->compiled->real_blockers; }
 bool Scene::has_filters() const { return impl_->compiled->filters; }
@@ -310,5 +312,18 @@ Scene::Bounds Scene::bounds() const { return impl_->all_bounds; }
 Scene::Bounds Scene::blocker_bounds() const { return impl_->blocker_bounds; }
 const std::vector<Scene::Bounds>& Scene::blocker_boxes() const { return impl_->blocker_boxes; }
 std::size_t Scene::skipped_triangles() const { return impl_->compiled->skipped; }
+const Scene::Places& Scene::places() const { return impl_->places; }
+
+std::optional<std::vector<Scene::Bounds>> Scene::moved(const Places& before, const Places& now) {
+  if (before.parts != now.parts) return std::nullopt;
+  std::vector<Bounds> where;
+  for (std::size_t i = 0; i < now.bounds.size(); ++i) {
+    if (before.set_from_object[i] == now.set_from_object[i]) continue;
+    for (const Bounds& bounds : {before.bounds[i], now.bounds[i]}) {
+      if (bounds.lower.x <= bounds.upper.x) where.push_back(bounds);
+    }
+  }
+  return where;
+}
 
 }  // namespace render

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -117,6 +118,7 @@ class Scene {
   // Of a material of the shader "glass"; null for others.
   const Glass* glass_of(std::uint32_t material) const;
   bool has_glass() const;
+  bool has_moving() const;  // whether any instance does
   const BackgroundShader& background() const;
   // Whether any stand-in blocks light; whether any surface lets some through.
   bool has_real_blockers() const;
@@ -132,6 +134,15 @@ class Scene {
   Bounds blocker_bounds() const;
   const std::vector<Bounds>& blocker_boxes() const;
   std::size_t skipped_triangles() const;
+  // Where the moving instances of a scene stand, and what else it is made of.
+  struct Places {
+    std::uint64_t parts = 0;  // differs between scenes that share nothing
+    std::vector<std::array<float, 12>> set_from_object;
+    std::vector<Bounds> bounds;
+  };
+  const Places& places() const;
+  // Bounds, before and after, of what stands elsewhere in `now`; nothing if more than that differs.
+  static std::optional<std::vector<Bounds>> moved(const Places& before, const Places& now);
 
  private:
   struct Part;

@@ -24,7 +24,7 @@ Scene::Bounds bounds_of(const Mesh& mesh, const std::array<float, 12>& m) {
 }
 
 // A box around a box that is moved.
-Scene::Bounds moved(const Scene::Bounds& box, const std::array<float, 12>& m) {
+Scene::Bounds placed_bounds(const Scene::Bounds& box, const std::array<float, 12>& m) {
   if (!(box.lower.x <= box.upper.x)) return no_bounds;
   Scene::Bounds bounds = no_bounds;
   for (unsigned i = 0; i < 8; ++i) {
@@ -122,6 +122,7 @@ void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
 // Puts the scene together from what is compiled.
 void Scene::Impl::assemble() {
   const Compiled& c = *compiled;
+  places.parts = c.id;
   if (c.two_level) {
     scene = rtcNewScene(c.device);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
@@ -141,7 +142,9 @@ void Scene::Impl::assemble() {
     if (RTCScene inner = c.mesh_scenes[instance.mesh]) add_instance(i, inner);
     if (!instance.moves) continue;
     normal_matrices[i] = normal_matrix(instance.set_from_object);
-    const Bounds bounds = moved(c.mesh_bounds[instance.mesh], instance.set_from_object);
+    const Bounds bounds = placed_bounds(c.mesh_bounds[instance.mesh], instance.set_from_object);
+    places.set_from_object.push_back(instance.set_from_object);
+    places.bounds.push_back(bounds);
     all_bounds = joined(all_bounds, bounds);
     if (instance.kind == ObjectKind::virtual_object) {
       virtual_bounds = joined(virtual_bounds, bounds);

@@ -31,6 +31,7 @@ struct Scene::Part {
 
 // All of a scene but where its moving instances stand.
 struct Scene::Compiled {
+  std::uint64_t id = 0;                                // of this process
   std::vector<std::shared_ptr<const Shader>> shaders;  // per material
   std::shared_ptr<const BackgroundShader> background;
   std::vector<std::optional<Glass>> glass;   // per material
@@ -88,6 +89,7 @@ struct Scene::Impl {
   RTCScene scene = nullptr;
   // By geometry of `scene`: the instance that it is, or Part::none where it holds what is placed.
   std::vector<std::uint32_t> instance_of_geometry;
+  Places places;
   std::vector<std::array<float, 9>> normal_matrices;  // per instance
   std::vector<std::uint8_t> mirrored;                 // per instance: inside out by its matrix
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds, blocker_bounds = no_bounds;

@@ -1,0 +1,206 @@
+// Cells and moving things.
+#include "render/cell_reach.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace render {
+namespace {
+
+constexpr float infinite = std::numeric_limits<float>::infinity();
+
+float part(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+bool is_empty(const Scene::Bounds& b) { return !(b.lower.x <= b.upper.x); }
+
+Vec3f middle(const Scene::Bounds& b) { return (b.lower + b.upper) * 0.5F; }
+Vec3f half_size(const Scene::Bounds& b) { return (b.upper - b.lower) * 0.5F; }
+
+Scene::Bounds grown(const Scene::Bounds& b, Vec3f by) { return {b.lower - by, b.upper + by}; }
+
+// The stretch of from + t * direction, 0 <= t <= far, inside of a box; first > last: none.
+struct Stretch {
+  float first, last;
+};
+Stretch inside(const Scene::Bounds& box, Vec3f from, Vec3f direction, float far) {
+  Stretch s{0, far};
+  for (int axis = 0; axis < 3; ++axis) {
+    const float o = part(from, axis), d = part(direction, axis);
+    const float low = part(box.lower, axis), high = part(box.upper, axis);
+    if (d == 0) {
+      if (o < low || o > high) return {1, 0};
+      continue;
+    }
+    const float a = (low - o) / d, b = (high - o) / d;
+    s.first = std::max(s.first, std::min(a, b));
+    s.last = std::min(s.last, std::max(a, b));
+  }
+  return s;
+}
+
+bool meets(const Scene::Bounds& box, Vec3f from, Vec3f direction, float far) {
+  const auto [first, last] = inside(box, from, direction, far);
+  return first <= last;
+}
+
+bool have_common(const SpaceGrid::Mask& a, const SpaceGrid::Mask& b) {
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a[i] & b[i]) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+SpaceGrid::SpaceGrid(const Scene::Bounds& bounds) {
+  if (is_empty(bounds)) return;
+  const Vec3f half = half_size(bounds);
+  const float least = 1e-3F * std::max({half.x, half.y, half.z, 1e-6F});
+  const Vec3f wide{std::max(half.x, least), std::max(half.y, least), std::max(half.z, least)};
+  const Scene::Bounds all = grown({middle(bounds), middle(bounds)}, wide * 1.5F);
+  lower_ = all.lower;
+  size_ = (all.upper - all.lower) * (1.0F / side);
+  per_size_ = {1 / size_.x, 1 / size_.y, 1 / size_.z};
+}
+
+bool SpaceGrid::holds(const Scene::Bounds& bounds) const {
+  return is_empty(bounds) || (box_at(bounds.lower) >= 0 && box_at(bounds.upper) >= 0);
+}
+
+int SpaceGrid::box_at(Vec3f p) const {
+  const Vec3f at{(p.x - lower_.x) * per_size_.x, (p.y - lower_.y) * per_size_.y,
+                 (p.z - lower_.z) * per_size_.z};
+  constexpr auto end = static_cast<float>(side);
+  const auto in = [](float v) { return v >= 0 && v < end; };
+  if (!in(at.x) || !in(at.y) || !in(at.z)) return -1;
+  return (static_cast<int>(at.z) * side + static_cast<int>(at.y)) * side + static_cast<int>(at.x);
+}
+
+Scene::Bounds SpaceGrid::box(int index) const {
+  const Vec3f at{static_cast<float>(index % side), static_cast<float>(index / side % side),
+                 static_cast<float>(index / (side * side))};
+  const Vec3f corner = lower_ + at * size_;
+  return {corner, corner + size_};
+}
+
+void SpaceGrid::mark_line(Vec3f from, Vec3f direction, float far_m, Mask& mask) const {
+  constexpr auto end = static_cast<float>(side);
+  const Vec3f along = direction * per_size_;
+  const Vec3f begin = (from - lower_) * per_size_;
+  const auto [first, last] = inside({{0, 0, 0}, {end, end, end}}, begin, along, far_m);
+  if (!(first <= last)) return;
+  std::array<int, 3> box, step;
+  std::array<float, 3> next, between;
+  const Vec3f entry = begin + along * first;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    const float d = part(along, axis);
+    box[a] = std::clamp(static_cast<int>(part(entry, axis)), 0, side - 1);
+    step[a] = d < 0 ? -1 : 1;
+    const auto wall = static_cast<float>(box[a] + (d < 0 ? 0 : 1));
+    next[a] = d == 0 ? infinite : (wall - part(begin, axis)) / d;
+    between[a] = d == 0 ? infinite : std::abs(1 / d);
+  }
+  while (true) {
+    const auto i = static_cast<std::size_t>((box[2] * side + box[1]) * side + box[0]);
+    mask[i / 64] |= std::uint64_t{1} << (i % 64);
+    const std::size_t a =
+        next[0] < next[1] ? (next[0] < next[2] ? 0U : 2U) : (next[1] < next[2] ? 1U : 2U);
+    if (!(next[a] <= last)) return;
+    box[a] += step[a];
+    if (box[a] < 0 || box[a] >= side) return;
+    next[a] += between[a];
+  }
+}
+
+void SpaceGrid::mark_bounds(const Scene::Bounds& bounds, Mask& mask) const {
+  for (int i = 0; i < side * side * side; ++i) {
+    // A little larger: a line that runs along a wall may be counted to either side.
+    const Scene::Bounds b = grown(box(i), size_ * 0.01F);
+    const bool apart = b.lower.x > bounds.upper.x || b.upper.x < bounds.lower.x ||
+                       b.lower.y > bounds.upper.y || b.upper.y < bounds.lower.y ||
+                       b.lower.z > bounds.upper.z || b.upper.z < bounds.lower.z;
+    const auto at = static_cast<std::size_t>(i);
+    if (!apart) mask[at / 64] |= std::uint64_t{1} << (at % 64);
+  }
+}
+
+std::vector<CellCone> cell_cones(const calibrate::DirectionTable& table,
+                                 const std::array<float, 9>& m) {
+  const auto direction_at = [&](int x, int y) {
+    const std::size_t t =
+        table.index(std::clamp(y, 0, table.height - 1), std::clamp(x, 0, table.width - 1));
+    const Vec3f v{table.x[t], table.y[t], table.z[t]};
+    return normalize(Vec3f{m[0] * v.x + m[1] * v.y + m[2] * v.z,
+                           m[3] * v.x + m[4] * v.y + m[5] * v.z,
+                           m[6] * v.x + m[7] * v.y + m[8] * v.z});
+  };
+  std::vector<CellCone> cones;
+  for (int y0 = 0; y0 < table.height; y0 += cell_size) {
+    for (int x0 = 0; x0 < table.width; x0 += cell_size) {
+      CellCone cone;
+      cone.axis = direction_at(x0 + cell_size / 2, y0 + cell_size / 2);
+      float cosine = 1;
+      for (int y = y0 - 2; y <= y0 + cell_size + 1; ++y) {
+        for (int x = x0 - 2; x <= x0 + cell_size + 1; ++x) {
+          cosine = std::min(cosine, dot(cone.axis, direction_at(x, y)));
+        }
+      }
+      // Where the lens sees nothing there is no direction: then any may be.
+      if (dot(cone.axis, cone.axis) > 0.5F && cosine > 0) {
+        cone.half_rad = std::acos(std::min(cosine, 1.0F)) + 1e-3F;
+      }
+      cones.push_back(cone);
+    }
+  }
+  return cones;
+}
+
+MovedThings::MovedThings(std::vector<Scene::Bounds> where,
+                         const SpaceGrid& grid,
+                         const LightTable& lights,
+                         const SpaceGrid::Mask& receivers)
+    : where_(std::move(where)), lights_(lights) {
+  for (const Scene::Bounds& bounds : where_) grid.mark_bounds(bounds, filled_);
+  for (int i = 0; i < SpaceGrid::side * SpaceGrid::side * SpaceGrid::side; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (!(receivers[at / 64] >> (at % 64) & 1) || !may_shade(grid.box(i))) continue;
+    shaded_[at / 64] |= std::uint64_t{1} << (at % 64);
+  }
+}
+
+// Whether anything that moved lies between any of those points and a light: between their middle
+// and the light, if it is larger by as much as they are apart.
+bool MovedThings::may_shade(const Scene::Bounds& receivers) const {
+  constexpr float margin = 1.02F;
+  const Vec3f from = middle(receivers);
+  const Vec3f half = half_size(receivers) * margin;
+  return std::ranges::any_of(where_, [&](const Scene::Bounds& bounds) {
+    const Scene::Bounds larger = grown(bounds, half);
+    return std::ranges::any_of(lights_.lights,
+                               [&](const DirectionalLight& l) {
+                                 return meets(larger, from, l.direction, infinite);
+                               }) ||
+           std::ranges::any_of(lights_.lamps, [&](const LocalLight& lamp) {
+             return meets(larger, from, lamp.position - from, 1);
+           });
+  });
+}
+
+bool MovedThings::may_be_seen(const CellCone& cone, Vec3f camera) const {
+  return std::ranges::any_of(where_, [&](const Scene::Bounds& bounds) {
+    const Vec3f to = middle(bounds) - camera;
+    const float distance = length(to), radius = length(half_size(bounds));
+    if (!(distance > radius)) return true;
+    const float away = std::acos(std::clamp(dot(to, cone.axis) / distance, -1.0F, 1.0F));
+    return away <= cone.half_rad + std::asin(radius / distance) + 1e-3F;
+  });
+}
+
+bool MovedThings::may_change(const CellReach& reach) const {
+  return have_common(reach.passed, filled_) || have_common(reach.lit, shaded_) ||
+         (!is_empty(reach.lit_outside) && may_shade(reach.lit_outside));
+}
+
+}  // namespace render

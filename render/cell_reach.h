@@ -1,0 +1,86 @@
+// What space a cell's rays pass, so that its transport can be kept while things move elsewhere.
+// Private to the kernel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "calibrate/lens.h"
+#include "render/blocker_boxes.h"
+#include "render/light_gather.h"
+#include "render/light_table.h"
+
+namespace render {
+
+// Space around what is virtual, in 16x16x16 boxes.
+class SpaceGrid {
+ public:
+  static constexpr int side = 16;
+  using Mask = std::array<std::uint64_t, side * side * side / 64>;  // of boxes
+
+  SpaceGrid() = default;
+  // Half as large again as those bounds, to all sides.
+  explicit SpaceGrid(const Scene::Bounds& bounds);
+
+  bool holds(const Scene::Bounds& bounds) const;
+  // The box that a point lies in, or -1.
+  int box_at(Vec3f p) const;
+  Scene::Bounds box(int index) const;
+  // Those that a straight line from `from`, `far_m` along the unit `direction`, passes (Amanatides
+  // and Woo, "A Fast Voxel Traversal Algorithm for Ray Tracing", Eurographics 1987).
+  void mark_line(Vec3f from, Vec3f direction, float far_m, Mask& mask) const;
+  void mark_bounds(const Scene::Bounds& bounds, Mask& mask) const;
+
+ private:
+  Vec3f lower_{}, size_{}, per_size_{};  // of a box; 1 / size
+};
+
+// What a cell depends on beside its camera rays.
+struct CellReach {
+  SpaceGrid::Mask passed{};  // boxes that bounced rays cross
+  SpaceGrid::Mask lit{};     // that hold points from which shadow rays go
+  Scene::Bounds lit_outside = no_bounds;
+
+  void add_receiver(const SpaceGrid& grid, Vec3f p) {
+    if (const int box = grid.box_at(p); box >= 0) {
+      const auto i = static_cast<std::size_t>(box);
+      lit[i / 64] |= std::uint64_t{1} << (i % 64);
+    } else {
+      lit_outside = joined(lit_outside, {p, p});
+    }
+  }
+};
+
+// The directions from a camera that rays through each cell and the pixels around it may take.
+struct CellCone {
+  Vec3f axis;           // unit, in the set's frame
+  float half_rad = 10;  // more than a half turn: any direction
+};
+std::vector<CellCone> cell_cones(const calibrate::DirectionTable& directions,
+                                 const std::array<float, 9>& set_from_cam);
+
+// Whether what moved may have changed what a cell's rays met: things that filled `where`, before
+// or after. Never says no where it is yes.
+class MovedThings {
+ public:
+  // `receivers` are the boxes that any cell's shadow rays begin in.
+  MovedThings(std::vector<Scene::Bounds> where,
+              const SpaceGrid& grid,
+              const LightTable& lights,
+              const SpaceGrid::Mask& receivers);
+
+  bool may_be_seen(const CellCone& cone, Vec3f camera) const;
+  bool may_change(const CellReach& reach) const;
+
+ private:
+  bool may_shade(const Scene::Bounds& receivers) const;
+
+  std::vector<Scene::Bounds> where_;
+  const LightTable& lights_;
+  SpaceGrid::Mask filled_{}, shaded_{};
+};
+
+}  // namespace render

@@ -1,0 +1,31 @@
+// Stages of cells.
+#include "render/refinement.h"
+
+#include <algorithm>
+
+namespace render {
+
+namespace {
+
+constexpr float coarse_accuracy = 0.95F, coarse_contrast = 0.4F;
+
+}  // namespace
+
+Effort effort_of_stage(const Effort& effort, int stage) {
+  Effort coarse = effort;
+  if (stage >= finished_stage) return coarse;
+  coarse.accuracy = std::min(effort.accuracy, coarse_accuracy);
+  if (stage > 0) {
+    const auto at_least = [](float value) {
+      return value > 0 ? std::max(value, coarse_contrast) : 0.0F;
+    };
+    coarse.aa_samples = std::min(effort.aa_samples, 4);
+    coarse.aa_tolerance = at_least(effort.aa_tolerance);
+    coarse.glint_contrast = at_least(effort.glint_contrast);
+  } else {
+    coarse.aa_samples = 1;
+  }
+  return coarse;
+}
+
+}  // namespace render

@@ -1,0 +1,120 @@
+// Pictures that sharpen: cells at their stages.
+#include "render/refinement.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "made_shot.h"
+#include "render/kept_transport.h"
+
+namespace compositing {
+namespace {
+
+using render::FrameResult;
+
+constexpr int cells = 6 * 4;  // of a picture of 96x64
+
+using Stages = std::vector<std::uint8_t>;
+
+FrameResult render_at(const MadeShot& shot,
+                      const Stages& stages,
+                      render::KeptTransport* kept = nullptr) {
+  render::FrameJob job = shot.job;
+  job.stages = stages;
+  render::FrameInputs inputs = shot.inputs();
+  inputs.kept = kept;
+  FrameResult result;
+  render_frame(inputs, job, shot.plate, result);
+  return result;
+}
+
+Stages all_at(int stage, std::size_t cells_n = cells) {
+  return Stages(cells_n, static_cast<std::uint8_t>(stage));
+}
+
+TEST(Refinement, EndsWithTheSameBitsAsAtOnce) {
+  const MadeShot shot = made_shot(96, 64, made_scene());
+  const FrameResult at_once = render_at(shot, {});
+  render::KeptTransport kept;
+  FrameResult last;
+  Stages stages = all_at(0);
+  for (std::size_t n = 0; n < 2 * cells; ++n) {
+    ++stages[n * 7 % cells];
+    if (n % 6 == 5) last = render_at(shot, stages, &kept);
+  }
+  EXPECT_EQ(last.rgba.pixels, at_once.rgba.pixels);
+  EXPECT_EQ(last.matte.pixels, at_once.matte.pixels);
+  EXPECT_NE(render_at(shot, all_at(0)).rgba.pixels, at_once.rgba.pixels);
+}
+
+TEST(Refinement, TakesRaysOnlyForCellsThatGoOn) {
+  const MadeShot shot = made_shot(96, 64, made_scene());
+  render::KeptTransport kept;
+  const auto rays = [&](const Stages& stages) {
+    return render_at(shot, stages, &kept).statistics.primary_rays;
+  };
+  Stages stages = all_at(0);
+  EXPECT_EQ(rays(stages), 96U * 64U);
+  EXPECT_EQ(rays(stages), 0U);
+  stages[9] = 1;
+  const std::uint64_t one = rays(stages);
+  EXPECT_GE(one, 256U);
+  EXPECT_LE(one, 256U * (1 + render::samples_max));
+  EXPECT_EQ(rays(stages), 0U);
+}
+
+// Plate, light and what is moved change between frames, and so does how sharp they are.
+TEST(Refinement, IsTheSameColdAndWarm) {
+  render::SceneDescription scene = made_scene();
+  scene.instances[2].moves = true;
+  MadeShot shot = made_shot(96, 64, scene);
+  for (render::DirectionalLight& light : shot.job.lights.lights) light.planned = light.irradiance;
+  render::KeptTransport kept;
+  std::mt19937 random(5);
+  const auto pick = [&random](int most) {
+    return std::uniform_int_distribution<int>(0, most)(random);
+  };
+  for (int frame = 0; frame < 12; ++frame) {
+    if (pick(3) == 0) {
+      scene.instances[2].set_from_object[7] = 0.1F * static_cast<float>(pick(9));
+      shot.scene = std::make_unique<render::Scene>(scene, *shot.scene);
+    }
+    shot.job.lights.lights[3].irradiance *= 0.9F;
+    for (capture::Half& value : shot.plate.pixels) value ^= static_cast<capture::Half>(pick(1));
+    Stages stages(cells);
+    for (std::uint8_t& stage : stages) stage = static_cast<std::uint8_t>(pick(2));
+    const FrameResult warm = render_at(shot, stages, &kept);
+    const FrameResult cold = render_at(shot, stages);
+    EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
+    EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
+  }
+}
+
+TEST(Refinement, BringsThePictureNearerToTheFinishedOneInEveryStage) {
+  const MadeShot shot = made_shot(192, 128, made_scene());
+  const capture::Image finished = capture::to_float(render_at(shot, {}).rgba);
+  double before = 1e9;
+  for (const int stage : {0, 1}) {
+    const capture::Image shown = capture::to_float(render_at(shot, all_at(stage, 4 * cells)).rgba);
+    double sum = 0;
+    for (std::size_t i = 0; i < shown.pixels.size(); ++i) {
+      sum += std::pow(shown.pixels[i] - finished.pixels[i], 2);
+    }
+    EXPECT_LT(sum, before / 2) << stage;
+    EXPECT_GT(sum, 0) << stage;
+    before = sum;
+  }
+}
+
+TEST(Refinement, RefusesStagesThatAreNotThere) {
+  const MadeShot shot = made_shot(96, 64, made_scene());
+  EXPECT_THROW(render_at(shot, all_at(0, cells - 1)), std::invalid_argument);
+  EXPECT_THROW(render_at(shot, all_at(render::finished_stage + 1)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace compositing
