@@ -63,6 +63,7 @@ ShowSettings read_show_section(Section section) {
   section.integer("width", show.width, 1, largest_picture_side);
   section.integer("height", show.height, 1, largest_picture_side);
   read_fps(section, show.fps);
+  if (bool sharpen = false; section.boolean("sharpen", sharpen)) show.sharpen = sharpen;
   std::int64_t frames = 0;
   if (section.integer("frames", frames, std::int64_t{1}, most_frames)) show.frames = frames;
   section.finish();

@@ -35,6 +35,7 @@ struct ShowSettings {
   int width = 0;  // of the picture
   int height = 0;
   std::optional<capture::Rational> fps;  // nothing = the plate's own, 25 for stills
+  std::optional<bool> sharpen;           // see sharpening.h; nothing = if the show is live
   std::optional<std::int64_t> frames;    // nothing = to the plate's end; endless for stills
 };
 

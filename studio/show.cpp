@@ -15,6 +15,7 @@
 #include "render/kept_transport.h"
 #include "studio/handover.h"
 #include "studio/recording.h"
+#include "studio/sharpening.h"
 #include "studio/tally.h"
 #include "studio/tone_follower.h"
 
@@ -83,6 +84,9 @@ class Show::Stages {
       return std::make_unique<compositing::Display>(display_settings(s));
     });
     if (s.display.tone) tone_.emplace(*s.display.tone);
+    if (s.show.sharpen.value_or(options_.live)) {
+      sharpening_.emplace(maker_.rate(), options_.live);
+    }
     frames_ = options.frames ? options.frames : s.show.frames;
     if (!frames_ && !options_.live && maker_.is_endless()) frames_ = 1;
     planned_frames_ = frames_ ? frames_ : frames_of_plate();
@@ -235,9 +239,16 @@ class Show::Stages {
       render::FrameInputs inputs = shown.prepared.inputs();
       inputs.kept = &kept_;
       inputs.count_rays = work.view.has_value();
-      render::render_frame(inputs, shown.prepared.job, *shown.prepared.plate, *result);
+      const auto frame = render::prepare_frame(inputs, shown.prepared.job, *shown.prepared.plate);
+      if (sharpening_) shown.prepared.job.stages = sharpening_->next(kept_.stages());
+      render::render_frame(*frame, *shown.prepared.plate, *result);
     });
     shown.result = result;
+    if (sharpening_) {
+      constexpr auto stage = static_cast<std::size_t>(Stage::render);
+      sharpening_->took(shown.prepared.stage_ms[stage], kept_.is_full());
+      tally_.status().sharpness = sharpening_->share();
+    }
 
     const auto rgb8 = pictures_.lend();
     timed(shown, Stage::display, [&] {
@@ -355,6 +366,7 @@ class Show::Stages {
   Tally tally_;
   std::unique_ptr<compositing::Display> display_;
   std::optional<ToneFollower> tone_;
+  std::optional<Sharpening> sharpening_;
   render::KeptTransport kept_;
   std::string light_kept_because_;
   capture::Pool<render::FrameResult> results_;

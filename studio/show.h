@@ -84,6 +84,7 @@ struct ShowStatus {
   std::int64_t damaged_plate_frames = 0;
   std::int64_t display_nan = 0;  // pixels that reached the display without a number
   render::Effort effort;
+  double sharpness = 1;             // of the last frame: 0 = coarse, 1 = as the effort asks
   std::array<float, 2> tone{1, 0};  // of the last frame, as render::FrameJob has it
   // What pixels took, by view, in the last frame that had one.
   std::optional<std::array<render::RayViewFigures, render::ray_views>> pixel_figures;

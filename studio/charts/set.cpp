@@ -125,7 +125,8 @@ struct Take {
   ShownFrame last;
 };
 
-Take put_on_air(const Set& set, std::int64_t frames) {
+Take put_on_air(Set set, std::int64_t frames) {
+  set.show.sharpen = false;  // every frame is to be of that setting
   ShowOptions options;
   options.frames = frames;
   Show show(set, options);

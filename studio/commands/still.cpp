@@ -25,6 +25,7 @@ struct StillOptions {
 void still(const StillOptions& options, Console& console) {
   Set set = read_set(options.set);
   if (options.frame) set.camera.frame = set.camera.frame.value_or(0) + *options.frame;
+  set.show.sharpen = false;  // there is time
   ShowOptions show_options;
   show_options.frames = 1;
   show_options.record = false;

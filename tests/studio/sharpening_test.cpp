@@ -1,0 +1,175 @@
+// Pictures that sharpen while nothing moves.
+#include "studio/sharpening.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "studio/show.h"
+#include "tests/made_files.h"
+#include "tests/studio/made_show.h"
+
+namespace studio {
+namespace {
+
+constexpr int none = render::KeptTransport::none;
+constexpr std::size_t cells = 1200;
+
+std::vector<int> as_kept(const std::vector<std::uint8_t>& stages) {
+  return {stages.begin(), stages.end()};
+}
+
+// What rendering takes if every cell of the coarsest stage takes `cell_ms`.
+double ms_of(const std::vector<int>& kept, const std::vector<std::uint8_t>& now, double cell_ms) {
+  double ms = 3;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    if (kept[i] != now[i]) ms += cell_ms * std::pow(4, now[i]);
+  }
+  return ms;
+}
+
+TEST(Sharpening, IsDoneWithinASecondOfFrames) {
+  Sharpening sharpening({25, 1}, false);
+  std::vector<int> kept(cells, none);
+  double before = -1;
+  for (int i = 0; i < 26; ++i) {
+    kept = as_kept(sharpening.next(kept));
+    sharpening.took(10, false);
+    if (i == 0) {
+      EXPECT_EQ(kept, std::vector<int>(cells, 0));
+    }
+    EXPECT_TRUE(sharpening.share() > before || before == 1);
+    before = sharpening.share();
+  }
+  EXPECT_EQ(kept, std::vector<int>(cells, render::finished_stage));
+  EXPECT_EQ(sharpening.share(), 1);
+}
+
+TEST(Sharpening, BeginsAgainOnlyWhereCellsWereLost) {
+  Sharpening sharpening({25, 1}, false);
+  std::vector<int> kept(cells, render::finished_stage);
+  std::fill_n(kept.begin() + 300, 40, none);
+  const auto stages = sharpening.next(kept);
+  for (std::size_t i = 0; i < cells; ++i) {
+    EXPECT_EQ(stages[i], i >= 300 && i < 340 ? 0 : render::finished_stage) << i;
+  }
+}
+
+TEST(Sharpening, SpreadsOverThePicture) {
+  Sharpening sharpening({100, 1}, false);
+  const auto stages = sharpening.next(std::vector<int>(cells, 0));  // 40 x 30
+  std::array<int, 4> quarters{};
+  int all = 0;
+  for (std::size_t i = 0; i < cells; ++i) {
+    const bool below = i / 40 >= 15, right = i % 40 >= 20;
+    quarters[static_cast<std::size_t>(2 * below + right)] += stages[i] > 0;
+    all += stages[i] > 0;
+  }
+  EXPECT_GT(all, 40);
+  for (const int part : quarters) EXPECT_NEAR(part, all / 4.0, all / 10.0);
+}
+
+// A live show keeps to its time whatever a cell takes, and is sharp in the end.
+TEST(Sharpening, KeepsToTheTimeOfALiveFrame) {
+  for (const double coarse_ms : {5.0, 100.0}) {
+    Sharpening sharpening({25, 1}, true);
+    std::vector<int> kept(cells, none);
+    int late = 0, frames = 0;
+    for (; (sharpening.share() < 1 || frames == 0) && frames < 500; ++frames) {
+      const auto now = sharpening.next(kept);
+      const double ms = ms_of(kept, now, coarse_ms / cells);
+      late += frames > 0 && ms > 40;
+      sharpening.took(ms, false);
+      kept = as_kept(now);
+    }
+    EXPECT_EQ(sharpening.share(), 1) << coarse_ms;
+    EXPECT_EQ(late, 0) << coarse_ms;
+    EXPECT_LT(frames, coarse_ms < 10 ? 12 : 150) << coarse_ms;
+  }
+}
+
+// What is lost and can be found anew in the time of a frame is as fine as before at once.
+TEST(Sharpening, FindsAFewLostCellsFinishedAtOnce) {
+  Sharpening sharpening({25, 1}, true);
+  std::vector<int> kept(cells, none);
+  const auto show = [&] {
+    const auto now = sharpening.next(kept);
+    const double ms = ms_of(kept, now, 0.02);
+    sharpening.took(ms, false);
+    kept = as_kept(now);
+    return ms;
+  };
+  for (int i = 0; i < 100; ++i) show();
+  ASSERT_EQ(sharpening.share(), 1);
+  std::fill_n(kept.begin(), 20, none);
+  show();
+  EXPECT_EQ(sharpening.share(), 1);
+  std::fill_n(kept.begin(), 400, none);
+  EXPECT_LE(show(), 40);
+  EXPECT_LT(sharpening.share(), 1);
+}
+
+TEST(Sharpening, StaysWhereTheMemoryEnds) {
+  Sharpening sharpening({25, 1}, false);
+  std::vector<int> kept(cells, none);
+  double last = 0;
+  for (int i = 0; i < 30; ++i) {
+    const auto now = sharpening.next(kept);
+    const bool full = sharpening.share() > 0.3;
+    sharpening.took(10, full);
+    kept = as_kept(now);
+    if (i > 20) {
+      EXPECT_EQ(sharpening.share(), last);
+    }
+    last = sharpening.share();
+  }
+  EXPECT_LT(last, 0.4);
+  EXPECT_GT(last, 0.2);
+}
+
+class SharpeningShow : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    register_grey_camera();
+    start();
+    dir_ = made::make_temporary_directory();
+  }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+  std::filesystem::path dir_;
+};
+
+// What is moved shows in the very next frame, coarse; a second later the picture is as sharp as the
+// effort asks.
+TEST_F(SharpeningShow, ShowsAMoveAtOnceAndIsSharpASecondLater) {
+  Set set = read_set(write_made_set(dir_, "grey:60,25,0"));
+  const auto pictures_of = [&](bool sharpen) {
+    set.show.sharpen = sharpen;
+    Show show(set);
+    std::vector<std::vector<capture::Half>> pictures;
+    std::vector<double> sharpness;
+    show.run([&](const ShownFrame& shown) {
+      pictures.push_back(shown.result->rgba.pixels);
+      sharpness.push_back(show.status()->sharpness);
+      if (pictures.size() == 28) show.post(MoveObject{"cube", {{0.5, 0, 0}, 30, 0, 1}});
+    });
+    return std::pair(pictures, sharpness);
+  };
+  const auto [sharp, _] = pictures_of(false);
+  const auto [pictures, sharpness] = pictures_of(true);
+  ASSERT_EQ(pictures.size(), 60U);
+  EXPECT_EQ(sharpness[0], 0);
+  EXPECT_NE(pictures[0], sharp[0]);
+  EXPECT_EQ(sharpness[26], 1);
+  EXPECT_EQ(pictures[26], sharp[26]);
+  // The next frame whose inputs are made after the command, one or two later.
+  std::size_t moved = 28;
+  while (moved < 60 && sharpness[moved] > 0) ++moved;
+  EXPECT_LE(moved, 31U);
+  EXPECT_NE(pictures[moved], sharp[moved]);
+  ASSERT_LT(moved + 25, 60U);
+  EXPECT_EQ(sharpness[moved + 25], 1);
+  EXPECT_EQ(pictures[moved + 25], sharp[moved + 25]);
+}
+
+}  // namespace
+}  // namespace studio
