@@ -11,9 +11,10 @@ namespace {
 using render::finished_stage;
 
 constexpr double share_of_frame = 0.6;  // of its time, for rendering
+constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
 // Of the cells, as many coarse ones as are found in a frame however long they take.
-constexpr double least = 0.02;
+constexpr double least = 0.01;
 
 // What a stage takes, in cells of the coarsest.
 constexpr std::array<double, render::refinement_stages> cost{1, 4, 16};
@@ -36,7 +37,8 @@ double Sharpening::budget(std::size_t cells) const {
   const auto all = static_cast<double>(cells);
   if (!live_) return all * (cost[1] + cost[2]) / std::max(frames_a_second_ - 1, 1.0);
   if (!(cell_ms_ > 0)) return 0;
-  return std::max((share_of_frame * frame_ms_ - relight_ms_) / cell_ms_, least * all);
+  const double ms = std::max(share_of_frame * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
+  return std::max(ms / cell_ms_, least * all);
 }
 
 std::vector<std::uint8_t> Sharpening::next(std::span<const int> kept) {

@@ -82,15 +82,15 @@ Command bench_command() {
       "platelight bench kernel --json kernel.json",
       [](Arguments& arguments) -> std::function<void(Console&)> {
         auto o = std::make_shared<BenchOptions>();
-        arguments.positional(
-            "WHAT", o->what,
-            "kernel, papers (both papers' scenes), inputs (plate, probe, light table), or hdr (a "
-            "live probe's frames)");
+        arguments.positional("WHAT", o->what,
+                             "kernel, papers (both papers' scenes), drag (a part of them that "
+                             "moves), inputs (plate, "
+                             "probe, light table), or hdr (a live probe's frames)");
         arguments.option("--set", o->set, "the set file whose inputs are measured");
         arguments.option(
             "--pictures", o->pictures,
             "papers: a directory for pictures of every scene: itself, and depth and rays by pixel");
-        arguments.option("--scene", o->scene, "papers: only this one");
+        arguments.option("--scene", o->scene, "papers, drag: only this one");
         arguments.option("--check-error", o->check, 0, 65536,
                          "papers: paths a pixel of the reference; 0 = none");
         arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
@@ -98,13 +98,14 @@ Command bench_command() {
           const int runs = static_cast<int>(*o->runs);
           if (o->what == "kernel") return bench_kernel(runs, console);
           if (o->what == "hdr") return bench_hdr(runs, console);
+          if (o->what == "drag") return bench_drag(o->scene, console);
           if (o->what == "papers") {
             return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene},
                                 console);
           }
           if (o->what != "inputs") {
             throw UsageError(fmt::format(
-                "there is no benchmark of \"{}\": there are kernel, papers, inputs and hdr",
+                "there is no benchmark of \"{}\": there are kernel, papers, drag, inputs and hdr",
                 o->what));
           }
           if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");

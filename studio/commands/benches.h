@@ -19,6 +19,10 @@ struct PapersBench {
 // Both papers' scenes at 640x480: the papers' table with ours beside it.
 void bench_papers(const PapersBench& bench, Console& console);
 
+// A part of each scene of the papers, or of one, dragged for a second of frames at 25 a second and
+// then left alone, as a live show does it: when it shows, what a frame takes, when it is sharp.
+void bench_drag(const std::string& scene, Console& console);
+
 // CPU time a frame that a set's inputs take: plate, probe, light table; the best of `runs` passes.
 // Throws SetError.
 void bench_inputs(const std::string& set_path, int runs, Console& console);

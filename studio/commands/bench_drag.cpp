@@ -1,0 +1,165 @@
+// platelight bench drag: a part of each scene is dragged, then left alone, as on air.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "render/kernel.h"
+#include "studio/commands/benches.h"
+#include "studio/machine.h"
+#include "studio/paper_shot.h"
+#include "studio/sharpening.h"
+
+namespace studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr int width = 640, height = 480;
+constexpr capture::Rational rate{25, 1};
+constexpr int dragged = 25, waited = 250;  // frames; less if the picture is sharp before
+
+struct Drag {
+  const char* scene;
+  const char* part;          // its name's beginning
+  std::array<float, 3> way;  // metres that it is dragged by
+};
+constexpr Drag drags[] = {{"headlight", "bulb", {0.15F, 0, 0}},
+                          {"glass_sphere", "glass sphere", {0.2F, 0, 0}},
+                          {"tv_room", "vase", {0.25F, 0, 0}},
+                          {"car", "wheel front left", {0, 0.3F, 0}}};
+
+double median_of(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values.empty() ? 0 : values[values.size() / 2];
+}
+
+// The scene's frames one after the other, each as soon as the one before is done.
+class Dragging {
+ public:
+  explicit Dragging(const Drag& drag)
+      : drag_(drag),
+        shot_(make_paper_shot(drag.scene, width, height).shot),
+        scene_(shot_.scene->description()),
+        still_(scene_) {
+    for (render::Instance& instance : scene_.instances) {
+      instance.moves = instance.name.starts_with(drag.part);
+    }
+    shot_.scene = std::make_unique<render::Scene>(scene_);
+  }
+
+  Json run() {
+    wait();
+    const capture::HalfImage before = result_.rgba;
+    std::vector<double> ms;
+    double lost = 0;
+    int first_changed = -1;
+    for (int i = 1; i <= dragged; ++i) {
+      move(static_cast<float>(i) / dragged);
+      ms.push_back(show());
+      lost += lost_;
+      if (first_changed < 0 && result_.rgba.pixels != before.pixels) first_changed = i;
+    }
+    const double drag_ms = median_of(ms);
+    const double a_second_later = wait();
+    return {{"scene", drag_.scene},
+            {"part", drag_.part},
+            {"first_changed_frame", first_changed},
+            {"cells_anew", lost / dragged},
+            {"drag_fps", 1000 / drag_ms},
+            {"sharp_after_s", sharp_after_s_},
+            {"sharpness_after_1_s", sharpness_after_1_s_},
+            {"error_after_1_s", a_second_later}};
+  }
+
+ private:
+  void move(float share) {
+    for (std::size_t i = 0; i < scene_.instances.size(); ++i) {
+      if (!scene_.instances[i].moves) continue;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        scene_.instances[i].set_from_object[4 * axis + 3] =
+            still_.instances[i].set_from_object[4 * axis + 3] + share * drag_.way[axis];
+      }
+    }
+    shot_.scene = std::make_unique<render::Scene>(scene_, *shot_.scene);
+  }
+
+  double show() {
+    render::FrameJob job = shot_.job;
+    render::FrameInputs inputs = shot_.inputs();
+    inputs.kept = &kept_;
+    const auto start = std::chrono::steady_clock::now();
+    const auto frame = render::prepare_frame(inputs, job, shot_.half_plate);
+    const std::vector<int> before = kept_.stages();
+    lost_ = static_cast<double>(std::ranges::count(before, render::KeptTransport::none)) /
+            static_cast<double>(before.size());
+    job.stages = sharpening_.next(before);
+    render::render_frame(*frame, shot_.half_plate, result_);
+    const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
+    sharpening_.took(ms.count(), kept_.is_full());
+    return ms.count();
+  }
+
+  // Until the picture is sharp. Returns the error, against the finished picture, of the one that is
+  // shown a second of the clock after the last move.
+  double wait() {
+    double passed_ms = 0;
+    capture::Image after_1_s;
+    sharp_after_s_ = -1;
+    sharpness_after_1_s_ = 1;
+    for (int i = 0; i < waited && sharp_after_s_ < 0; ++i) {
+      passed_ms += std::max(show(), 1000 / rate.value());
+      if (passed_ms >= 1000 && after_1_s.pixels.empty()) {
+        after_1_s = capture::to_float(result_.rgba);
+        sharpness_after_1_s_ = sharpening_.share();
+      }
+      if (sharpening_.share() == 1) sharp_after_s_ = passed_ms * 1e-3;
+    }
+    if (after_1_s.pixels.empty()) return 0;
+    if (sharp_after_s_ < 0) {
+      render::render_frame(shot_.inputs(), shot_.job, shot_.half_plate, result_);
+    }
+    const capture::Image finished = capture::to_float(result_.rgba);
+    const capture::Image mask = render::affected_mask(finished, shot_.plate);
+    return render::picture_error(after_1_s, finished, mask).relative_rms;
+  }
+
+  Drag drag_;
+  BenchScene shot_;
+  render::SceneDescription scene_, still_;
+  render::KeptTransport kept_;
+  Sharpening sharpening_{rate, true};
+  render::FrameResult result_;
+  double lost_ = 0, sharp_after_s_ = -1, sharpness_after_1_s_ = 1;
+};
+
+}  // namespace
+
+void bench_drag(const std::string& only, Console& console) {
+  Json rows = Json::array();
+  console.say(
+      "scene          dragged            first changed  cells anew   fps   sharp after   error "
+      "after 1 s");
+  for (const Drag& drag : drags) {
+    if (!only.empty() && only != drag.scene) continue;
+    const Json row = Dragging(drag).run();
+    const double sharp_s = row["sharp_after_s"];
+    console.say(fmt::format("{:14} {:18} {:>13} {:9.0f} % {:6.1f} {:>13} {:12.1f} %", drag.scene,
+                            drag.part, row["first_changed_frame"].get<int>(),
+                            100 * row["cells_anew"].get<double>(), row["drag_fps"].get<double>(),
+                            sharp_s < 0 ? "not" : fmt::format("{:.1f} s", sharp_s),
+                            100 * row["error_after_1_s"].get<double>()));
+    rows.push_back(row);
+  }
+  const Machine machine = this_machine();
+  console.figures(
+      Json{{"drags", rows}, {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}}}}.dump(
+          2));
+}
+
+}  // namespace studio
