@@ -9,6 +9,7 @@
 #include <spawn.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -23,6 +24,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -78,6 +80,13 @@ void allow_only_computing() {
 #endif
 }
 
+struct Descriptor {
+  int fd = -1;
+  ~Descriptor() {
+    if (fd >= 0) close(fd);
+  }
+};
+
 // Attributes and file actions of posix_spawn, freed whatever happens.
 struct SpawnPlan {
   posix_spawn_file_actions_t files{};
@@ -130,6 +139,23 @@ SandboxedChild::SandboxedChild(const std::string& program,
                                int input_fd,
                                std::chrono::milliseconds time_limit)
     : deadline_(std::chrono::steady_clock::now() + time_limit) {
+  start(program, input_fd);
+}
+
+SandboxedChild::SandboxedChild(const std::string& program, std::chrono::milliseconds time_limit)
+    : deadline_(std::chrono::steady_clock::now() + time_limit) {
+  // A socket, since writing to a pipe whose reader is gone raises a signal.
+  std::array<int, 2> ends{};
+  if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+    throw std::runtime_error("cannot make a socket to " + program + ": " + reason(errno));
+  }
+  Descriptor ours{ends[0]};
+  const Descriptor its{ends[1]};
+  start(program, its.fd);
+  input_fd_ = std::exchange(ours.fd, -1);
+}
+
+void SandboxedChild::start(const std::string& program, int input_fd) {
   std::array<int, 2> pipe_fds{};
   if (pipe2(pipe_fds.data(), O_CLOEXEC) != 0) {
     throw std::runtime_error("cannot make a pipe to " + program + ": " + reason(errno));
@@ -172,29 +198,44 @@ SandboxedChild::~SandboxedChild() {
     reap();
   }
   close(output_fd_);
+  if (input_fd_ >= 0) close(input_fd_);
+}
+
+// Waits until `fd` is ready, a second at most; false if it is not.
+bool SandboxedChild::wait_for(int fd, short event) {
+  const auto left =
+      std::chrono::ceil<std::chrono::milliseconds>(deadline_ - std::chrono::steady_clock::now());
+  if (left.count() <= 0) throw std::runtime_error("it takes too long");
+  pollfd waiting{fd, event, 0};
+  const int ready = poll(&waiting, 1, static_cast<int>(std::min<long>(left.count(), 1000)));
+  if (ready < 0 && errno != EINTR) {
+    throw std::runtime_error("cannot wait for a helper program: " + reason(errno));
+  }
+  return ready > 0;
 }
 
 bool SandboxedChild::read(std::span<std::byte> bytes) {
   while (!bytes.empty()) {
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(deadline_ - std::chrono::steady_clock::now());
-    pollfd waiting{output_fd_, POLLIN, 0};
-    const int ready = left.count() <= 0
-                          ? 0
-                          : poll(&waiting, 1, static_cast<int>(std::min<long>(left.count(), 1000)));
-    if (ready < 0 && errno != EINTR) {
-      throw std::runtime_error("cannot wait for a helper program: " + reason(errno));
-    }
-    if (ready <= 0) {
-      if (left.count() <= 0) throw std::runtime_error("it takes too long");
-      continue;
-    }
+    if (!wait_for(output_fd_, POLLIN)) continue;
     const ssize_t got = ::read(output_fd_, bytes.data(), bytes.size());
     if (got == 0) return false;
     if (got < 0 && errno != EINTR) {
       throw std::runtime_error("cannot read from a helper program: " + reason(errno));
     }
     if (got > 0) bytes = bytes.subspan(static_cast<std::size_t>(got));
+  }
+  return true;
+}
+
+bool SandboxedChild::write(std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    if (!wait_for(input_fd_, POLLOUT)) continue;
+    const ssize_t done = send(input_fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (done < 0 && (errno == EPIPE || errno == ECONNRESET)) return false;
+    if (done < 0 && errno != EINTR && errno != EAGAIN) {
+      throw std::runtime_error("cannot write to a helper program: " + reason(errno));
+    }
+    if (done > 0) bytes = bytes.subspan(static_cast<std::size_t>(done));
   }
   return true;
 }

@@ -24,13 +24,16 @@ void confine_this_process(const SandboxLimits& limits);
 // the places if it is in none.
 std::string helper_path(const std::string& name);
 
-// A helper at work. Its standard input is a file of ours, its standard output a pipe to us; it
-// inherits nothing else. Safe in a threaded process: the child runs no code of ours before exec.
+// A helper at work. Its standard input is a file of ours or what we write, its standard output a
+// pipe to us; it inherits nothing else. Safe in a threaded process: the child runs no code of ours
+// before exec.
 class SandboxedChild {
  public:
   // Starts `program` on `input_fd` (which stays the caller's). Throws std::runtime_error if it does
   // not start.
   SandboxedChild(const std::string& program, int input_fd, std::chrono::milliseconds time_limit);
+  // Starts `program` to be written to.
+  SandboxedChild(const std::string& program, std::chrono::milliseconds time_limit);
   ~SandboxedChild();  // kills it if it still runs
   SandboxedChild(const SandboxedChild&) = delete;
   SandboxedChild& operator=(const SandboxedChild&) = delete;
@@ -38,6 +41,9 @@ class SandboxedChild {
   // Fills `bytes` from the child's output; false if that ends first. Throws std::runtime_error when
   // the time limit has passed.
   bool read(std::span<std::byte> bytes);
+  // Gives the child bytes to read; false if it takes no more. Throws as read.
+  bool write(std::span<const std::byte> bytes);
+  void allow_more_time(std::chrono::milliseconds time) { deadline_ += time; }
 
   // Waits for its end, and says in words how it came: empty if it exited with status 0. The peak
   // memory is known afterwards.
@@ -45,11 +51,14 @@ class SandboxedChild {
   std::size_t peak_memory_bytes() const { return peak_memory_bytes_; }
 
  private:
+  void start(const std::string& program, int input_fd);
+  bool wait_for(int fd, short event);
   void reap();
 
   std::chrono::steady_clock::time_point deadline_;
-  int child_ = -1;  // process id; -1 once reaped
-  int output_fd_ = -1;
+  int child_ = -1;      // process id; -1 once reaped
+  int input_fd_ = -1;   // where we write; -1 = nowhere
+  int output_fd_ = -1;  // where we read
   int status_ = 0;
   std::size_t peak_memory_bytes_ = 0;
 };

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <new>
 #include <stdexcept>
+#include <vector>
 
 #include "tests/made_files.h"
 
@@ -51,6 +52,27 @@ TEST(SandboxedChild, ReadsTheFileItIsGiven) {
   std::array<char, 3> text{};
   EXPECT_TRUE(child.read(std::as_writable_bytes(std::span(text))));
   EXPECT_EQ(std::string(text.data(), text.size()), "abc");
+}
+
+TEST(SandboxedChild, IsWrittenToAndAnswers) {
+  SandboxedChild child(script("head -c 3"), milliseconds(10'000));
+  EXPECT_TRUE(child.write(std::as_bytes(std::span("abcdef").first(6))));
+  std::array<char, 3> text{};
+  EXPECT_TRUE(child.read(std::as_writable_bytes(std::span(text))));
+  EXPECT_EQ(std::string(text.data(), text.size()), "abc");
+}
+
+TEST(SandboxedChild, TakesNoMoreOnceItHasEnded) {
+  SandboxedChild child(script("exit 0"), milliseconds(10'000));
+  const std::vector<std::byte> much(std::size_t{10} << 20);
+  EXPECT_FALSE(child.write(much));
+  EXPECT_EQ(child.ending(), "");
+}
+
+TEST(SandboxedChild, IsGivenUpWhenItDoesNotListen) {
+  SandboxedChild child(script("exec sleep 100"), milliseconds(50));
+  const std::vector<std::byte> much(std::size_t{10} << 20);
+  EXPECT_THROW(child.write(much), std::runtime_error);
 }
 
 TEST(SandboxedChild, TellsACrashFromAFailure) {
