@@ -51,16 +51,18 @@ std::uint32_t little_endian(const std::byte* bytes) {
 
 class Checker {
  public:
-  Checker(std::span<const std::byte> bytes, const std::string& path) : path_(path) {
+  explicit Checker(std::span<const std::byte> bytes) {
     const std::string_view text = json_text(bytes);
-    const auto limit_depth = [this](int depth, json::parse_event_t, json&) {
+    const auto limit_depth = [](int depth, json::parse_event_t, json&) {
       if (depth > max_json_depth) refuse("its JSON is nested too deeply");
       return true;
     };
     try {
       document_ = json::parse(text, limit_depth);
     } catch (const json::exception& error) {
-      refuse(std::string("its JSON is damaged: ") + error.what());
+      // Without the library's name for the error, in brackets.
+      const std::string_view what = error.what();
+      refuse("its JSON is damaged: " + std::string(what.substr(what.find(']') + 2)));
     }
     if (!document_.is_object()) refuse("it is not a glTF file");
   }
@@ -81,11 +83,9 @@ class Checker {
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& why) const {
-    throw std::runtime_error(path_ + ": " + why);
-  }
+  [[noreturn]] static void refuse(const std::string& why) { throw std::runtime_error(why); }
 
-  std::string_view json_text(std::span<const std::byte> bytes) const {
+  static std::string_view json_text(std::span<const std::byte> bytes) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     if (!text.starts_with("glTF")) return text;
     if (bytes.size() < 20) refuse("the file is truncated");
@@ -294,7 +294,6 @@ class Checker {
     }
   }
 
-  const std::string& path_;
   json document_;
   std::vector<std::size_t> mesh_triangles_;  // Draco-compressed ones not counted
   GltfFacts facts_;
@@ -302,8 +301,6 @@ class Checker {
 
 }  // namespace
 
-GltfFacts check_gltf(std::span<const std::byte> file_bytes, const std::string& path) {
-  return Checker(file_bytes, path).check();
-}
+GltfFacts check_gltf(std::span<const std::byte> file_bytes) { return Checker(file_bytes).check(); }
 
 }  // namespace render

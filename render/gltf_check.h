@@ -16,10 +16,10 @@ struct GltfFacts {
 };
 
 // Checks the JSON of a .gltf, or of a .glb's first chunk (told apart by their first bytes): sizes
-// and indices against each other, nodes form trees, required extensions are understood. `path` is
-// for messages. Throws std::runtime_error naming path, place in the file and reason.
+// and indices against each other, nodes form trees, required extensions are understood. Throws
+// std::runtime_error naming place in the file and reason.
 //
 // glTF 2.0 specification (Khronos Group, ISO/IEC 12113), sections 3.5, 3.6 and 4.4.
-GltfFacts check_gltf(std::span<const std::byte> file_bytes, const std::string& path);
+GltfFacts check_gltf(std::span<const std::byte> file_bytes);
 
 }  // namespace render

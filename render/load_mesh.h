@@ -40,16 +40,25 @@ struct LoadedModel {
 // in `set_from_object`: the model's origin stays the set's, y-up files are turned, (x, y, z) to (x,
 // -z, y). Hidden parts are not even decoded. Tangents are computed where a normal map needs them.
 //
+// The file is read by a helper program under limits (models.md), since what is damaged may crash or
+// hang what reads it: that is an error here and nothing more.
+//
 // glTF materials: base colour, metallic-roughness, normal, clear coat, transmission (as a thin
 // wall; a volume of it as solid glass, glass.h, if it is hardly rough), emission, alpha cut-outs
 // (blended alpha is cut at a half). Not handled, and noted in the report: occlusion maps (the light
 // is traced), sheen, volumes that are not clear, coat and transmission roughness maps, vertex
 // colours, animation, skins. Materials of other formats: colour, opacity, shininess, emission.
 //
+// A texture that is not there or cannot be decoded is told in the notes and replaced: base colour
+// by magenta, linear (1, 0, 1), emission and transmission by 0; other maps are left out. Normals
+// and texture coordinates that are not finite are mended, triangles with such positions are left
+// out.
+//
 // Throws std::invalid_argument if scale is not > 0 and finite, or `hide` names a node that is not
 // there (the nodes are listed). Throws std::runtime_error naming file and reason if the file cannot
-// be read, is damaged, holds no triangles, is too large (64 M triangles, 4 GB of texels), or refers
-// to anything outside its own folder.
+// be read, is damaged, holds no triangles, is too large (64 M triangles, 4 GB of texels),
+// takes its reader more memory or time than a file of its size may, or refers to anything outside
+// its own folder.
 LoadedModel load_model(const std::string& path, const LoadOptions& options = {});
 
 }  // namespace render

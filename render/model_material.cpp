@@ -4,20 +4,13 @@
 #include <assimp/GltfMaterial.h>
 #include <assimp/material.h>
 #include <assimp/scene.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <stdexcept>
 
-#include "capture/still.h"
-#include "render/texture.h"
-
 namespace render {
 namespace {
-
-constexpr std::size_t max_texel_bytes = std::size_t{4} << 30;
 
 float number(
     const aiMaterial& material, const char* key, unsigned type, unsigned slot, float otherwise) {
@@ -94,15 +87,18 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
     note("material '" + name_of(material) +
          "': its textures have coordinates of their own; all take those of the first");
   }
-  std::string name = path.C_Str();
-  if (const auto [embedded, index] = scene_.GetEmbeddedTextureAndIndex(name.c_str());
-      embedded != nullptr)
-    name = std::string(1, '*').append(std::to_string(index));
-  else
-    name = folder_.resolve(name).string();
+  RawTexture source{path.C_Str(), srgb, false, {}, 0, 0};
+  const auto [embedded, index] = scene_.GetEmbeddedTextureAndIndex(path.C_Str());
+  if (embedded != nullptr) {
+    source.name = "its embedded texture " + std::to_string(index);
+    source.embedded = true;
+  }
   const auto [found, added] =
-      indices_.emplace(Source{name, srgb}, static_cast<std::int32_t>(sources_.size()));
-  if (added) sources_.push_back(found->first);
+      indices_.emplace(std::pair(source.name, srgb), static_cast<std::int32_t>(textures_.size()));
+  if (added) {
+    textures_.push_back(std::move(source));
+    embedded_.push_back(embedded);
+  }
   return found->second;
 }
 
@@ -191,40 +187,28 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   return result;
 }
 
-Texture MaterialImport::decode(const Source& source) const {
-  if (source.name.starts_with('*')) {
-    const aiTexture& embedded = *scene_.mTextures[std::stoul(source.name.substr(1))];
-    const std::string name =
-        folder_.model().string() + " (its embedded texture " + source.name.substr(1) + ")";
-    if (embedded.mHeight != 0) {
-      std::vector<std::uint8_t> texels;
-      const std::size_t count =
-          static_cast<std::size_t>(embedded.mWidth) * static_cast<std::size_t>(embedded.mHeight);
-      for (std::size_t i = 0; i < count; ++i) {
-        const aiTexel& t = embedded.pcData[i];
-        texels.insert(texels.end(), {t.r, t.g, t.b, t.a});
-      }
-      return make_texture(static_cast<int>(embedded.mWidth), static_cast<int>(embedded.mHeight), 4,
-                          source.srgb, texels);
+std::vector<RawTexture> MaterialImport::take_textures() {
+  for (std::size_t k = 0; k < textures_.size(); ++k) {
+    if (embedded_[k] == nullptr) continue;
+    RawTexture& texture = textures_[k];
+    const aiTexture& source = *embedded_[k];
+    const auto* bytes = reinterpret_cast<const std::byte*>(source.pcData);
+    if (source.mHeight == 0) {  // a file
+      texture.bytes.assign(bytes, bytes + source.mWidth);
+      continue;
     }
-    const auto* bytes = reinterpret_cast<const std::byte*>(embedded.pcData);
-    const capture::Still8 still = capture::decode_still8({bytes, embedded.mWidth}, name);
-    return make_texture(still.width, still.height, still.channels, source.srgb, still.texels);
+    texture.width = static_cast<std::int32_t>(source.mWidth);
+    texture.height = static_cast<std::int32_t>(source.mHeight);
+    const std::size_t count = std::size_t{source.mWidth} * source.mHeight;
+    texture.bytes.reserve(4 * count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const aiTexel& t = source.pcData[i];
+      for (const unsigned char value : {t.r, t.g, t.b, t.a}) {
+        texture.bytes.push_back(static_cast<std::byte>(value));
+      }
+    }
   }
-  const capture::Still8 still = capture::decode_still8(folder_.read(source.name), source.name);
-  return make_texture(still.width, still.height, still.channels, source.srgb, still.texels);
-}
-
-std::vector<std::shared_ptr<const Texture>> MaterialImport::decode() const {
-  std::vector<std::shared_ptr<const Texture>> textures(sources_.size());
-  std::atomic<std::size_t> bytes{0};
-  tbb::parallel_for(std::size_t{0}, sources_.size(), [&](std::size_t i) {
-    textures[i] = std::make_shared<const Texture>(decode(sources_[i]));
-    bytes += textures[i]->texels.size();
-    if (bytes > max_texel_bytes)
-      throw std::runtime_error(folder_.model().string() + ": its textures take more than 4 GB");
-  });
-  return textures;
+  return std::move(textures_);
 }
 
 }  // namespace render

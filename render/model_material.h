@@ -4,19 +4,18 @@
 #include <array>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "render/glass.h"
-#include "render/mesh.h"
-#include "render/model_folder.h"
+#include "render/raw_model.h"
 #include "render/standard.h"
 
 struct aiMaterial;
 struct aiScene;
+struct aiTexture;
 
 namespace render {
 
@@ -34,26 +33,19 @@ struct ImportedMaterial {
   UvTransform uv;
 };
 
-// Collects the textures that materials ask for, and decodes them in one go.
+// Takes materials, and collects the textures that they ask for.
 class MaterialImport {
  public:
-  // All must outlive this. `notes` receives what is not understood.
-  MaterialImport(const aiScene& scene, const ModelFolder& folder, std::vector<std::string>& notes)
-      : scene_(scene), folder_(folder), notes_(notes) {}
+  // Both must outlive this. `notes` receives what is not understood.
+  MaterialImport(const aiScene& scene, std::vector<std::string>& notes)
+      : scene_(scene), notes_(notes) {}
 
-  // Throws std::runtime_error if the material refers to a texture outside the model's folder.
   ImportedMaterial import(const aiMaterial& material);
 
-  // Every texture asked for so far, in the order of their indices, decoded in parallel. Throws
-  // std::runtime_error naming the file and reason.
-  std::vector<std::shared_ptr<const Texture>> decode() const;
+  // Every texture asked for so far, in the order of their indices.
+  std::vector<RawTexture> take_textures();
 
  private:
-  struct Source {
-    std::string name;  // path, or "*n" for the n-th embedded one
-    bool srgb = false;
-    friend auto operator<=>(const Source&, const Source&) = default;
-  };
   std::int32_t texture(const aiMaterial& material,
                        unsigned type,
                        unsigned slot,
@@ -62,13 +54,12 @@ class MaterialImport {
                        bool& uv_known);
   void note_unhandled(const aiMaterial& material, const std::string& name);
   void note(const std::string& text);
-  Texture decode(const Source& source) const;
 
   const aiScene& scene_;
-  const ModelFolder& folder_;
   std::vector<std::string>& notes_;
-  std::map<Source, std::int32_t> indices_;
-  std::vector<Source> sources_;
+  std::map<std::pair<std::string, bool>, std::int32_t> indices_;
+  std::vector<RawTexture> textures_;
+  std::vector<const aiTexture*> embedded_;  // of each, or null
 };
 
 }  // namespace render

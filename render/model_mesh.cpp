@@ -9,11 +9,17 @@
 #include <string>
 #include <vector>
 
+#include "render/join_vertices.h"
+
 namespace render {
 namespace {
 
 bool finite(const aiVector3D& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+bool is_sound(const aiVector3D& v) {
+  constexpr float far = farthest_position;
+  return std::abs(v.x) <= far && std::abs(v.y) <= far && std::abs(v.z) <= far;
 }
 Vec3f vec(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
@@ -89,11 +95,14 @@ void copy_tangents(const aiMesh& source, Mesh& mesh) {
 
 }  // namespace
 
-Mesh convert_mesh(const aiMesh& source, const ImportedMaterial& material, std::size_t& left_out) {
+Mesh convert_mesh(const aiMesh& source,
+                  const ImportedMaterial& material,
+                  bool join,
+                  std::size_t& left_out) {
   Mesh mesh;
   mesh.positions.reserve(source.mNumVertices);
   for (unsigned i = 0; i < source.mNumVertices; ++i)
-    mesh.positions.push_back(vec(source.mVertices[i]));
+    mesh.positions.push_back(is_sound(source.mVertices[i]) ? vec(source.mVertices[i]) : Vec3f{});
   mesh.triangles.reserve(source.mNumFaces);
   for (unsigned i = 0; i < source.mNumFaces; ++i) {
     const aiFace& face = source.mFaces[i];
@@ -105,15 +114,13 @@ Mesh convert_mesh(const aiMesh& source, const ImportedMaterial& material, std::s
       if (corner >= source.mNumVertices)
         throw std::runtime_error("a triangle names vertex " + std::to_string(corner) + " of " +
                                  std::to_string(source.mNumVertices));
-      whole = whole && finite(source.mVertices[corner]);
+      whole = whole && is_sound(source.mVertices[corner]);
     }
     if (whole)
       mesh.triangles.push_back(triangle);
     else
       ++left_out;
   }
-  for (Vec3f& p : mesh.positions)
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) p = {};
   if (source.HasNormals()) copy_normals(source, mesh);
   const unsigned channel = material.uv.channel < AI_MAX_NUMBER_OF_TEXTURECOORDS &&
                                    source.HasTextureCoords(material.uv.channel)
@@ -124,13 +131,16 @@ Mesh convert_mesh(const aiMesh& source, const ImportedMaterial& material, std::s
     mesh.uvs.reserve(source.mNumVertices);
     for (unsigned i = 0; i < source.mNumVertices; ++i) {
       const aiVector3D& t = source.mTextureCoords[channel][i];
-      mesh.uvs.push_back(finite(t) ? std::array<float, 2>{uv.scale[0] * t.x + uv.offset[0],
-                                                          uv.scale[1] * (1 - t.y) + uv.offset[1]}
-                                   : std::array<float, 2>{});
+      const float u = uv.scale[0] * t.x + uv.offset[0];
+      const float v = uv.scale[1] * (1 - t.y) + uv.offset[1];
+      constexpr float most = 1e6F;
+      const bool sound = std::abs(u) <= most && std::abs(v) <= most;
+      mesh.uvs.push_back(sound ? std::array<float, 2>{u, v} : std::array<float, 2>{});
     }
   }
+  if (join) join_vertices(mesh);
   if (material.parameters.normal_texture >= 0 && !mesh.normals.empty()) {
-    if (source.HasTangentsAndBitangents())
+    if (source.HasTangentsAndBitangents() && !join)
       copy_tangents(source, mesh);
     else if (!mesh.uvs.empty())
       compute_tangents(mesh);

@@ -11,8 +11,16 @@ struct aiMesh;
 namespace render {
 
 // A mesh with the texture coordinates that its material wants and, where that has a normal map,
-// tangents. Triangles with positions that are not finite are left out and counted in `left_out`.
-// Throws std::runtime_error if a triangle names a vertex that is not there.
-Mesh convert_mesh(const aiMesh& source, const ImportedMaterial& material, std::size_t& left_out);
+// tangents. With `join`, equal vertices become one, and missing normals are made (join_vertices.h);
+// without, a mesh without normals stays flat. Triangles whose positions are not finite, or beyond
+// `farthest_position`, are left out and counted in `left_out`; texture coordinates that are not
+// finite, or beyond a million, become 0. Throws std::runtime_error if a triangle names a vertex
+// that is not there.
+Mesh convert_mesh(const aiMesh& source,
+                  const ImportedMaterial& material,
+                  bool join,
+                  std::size_t& left_out);
+
+inline constexpr float farthest_position = 1e12F;
 
 }  // namespace render

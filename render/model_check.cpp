@@ -1,0 +1,194 @@
+// PLY and STL files, checked.
+#include "render/model_check.h"
+
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace render {
+namespace {
+
+constexpr std::string_view blanks = " \t\r\n\v\f";
+
+[[noreturn]] void refuse(const std::string& why) { throw std::runtime_error(why); }
+
+// Takes a word off the front of `text`; empty at its end.
+std::string_view take_word(std::string_view& text) {
+  const std::size_t begin = text.find_first_not_of(blanks);
+  if (begin == std::string_view::npos) return text = {};
+  const std::size_t end = std::min(text.find_first_of(blanks, begin), text.size());
+  const std::string_view word = text.substr(begin, end - begin);
+  text.remove_prefix(end);
+  return word;
+}
+
+std::uint64_t count_of(std::string_view word, const std::string& of) {
+  std::uint64_t count = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
+  if (error != std::errc{} || end != word.data() + word.size()) {
+    refuse("the number of " + of + " is no whole number");
+  }
+  return count;
+}
+
+struct Property {
+  std::size_t bytes = 0;  // of a value
+  std::size_t list = 0;   // of its count, if it is a list
+};
+
+struct Element {
+  std::string name;
+  std::uint64_t rows = 0;
+  std::vector<Property> properties;
+};
+
+struct PlyHead {
+  enum class Format { none, ascii, little, big } format = Format::none;
+  std::vector<Element> elements;
+  std::string_view body;
+};
+
+std::size_t bytes_of(std::string_view type) {
+  static constexpr std::array<std::pair<std::string_view, std::size_t>, 16> types{{{"char", 1},
+                                                                                   {"uchar", 1},
+                                                                                   {"int8", 1},
+                                                                                   {"uint8", 1},
+                                                                                   {"short", 2},
+                                                                                   {"ushort", 2},
+                                                                                   {"int16", 2},
+                                                                                   {"uint16", 2},
+                                                                                   {"int", 4},
+                                                                                   {"uint", 4},
+                                                                                   {"int32", 4},
+                                                                                   {"uint32", 4},
+                                                                                   {"float", 4},
+                                                                                   {"float32", 4},
+                                                                                   {"double", 8},
+                                                                                   {"float64", 8}}};
+  for (const auto& [name, bytes] : types) {
+    if (type == name) return bytes;
+  }
+  refuse("its header has a property of the unknown type '" + std::string(type.substr(0, 40)) + "'");
+}
+
+Property take_property(std::string_view& line) {
+  const std::string_view type = take_word(line);
+  if (type != "list") return {bytes_of(type), 0};
+  const std::size_t list = bytes_of(take_word(line));
+  if (list > 4) refuse("its header counts a list in fractions");
+  return {bytes_of(take_word(line)), list};
+}
+
+PlyHead parse_head(std::string_view text) {
+  if (!text.starts_with("ply") && !text.starts_with("PLY")) refuse("it is no PLY file");
+  PlyHead head;
+  constexpr std::size_t most_lines = 10000;
+  for (std::size_t i = 0; i < most_lines; ++i) {
+    const std::size_t end = text.find('\n');
+    if (end == std::string_view::npos) refuse("its header does not end");
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(end + 1);
+    const std::string_view word = take_word(line);
+    if (word == "end_header") {
+      if (head.format == PlyHead::Format::none) refuse("its header names no format");
+      head.body = text;
+      return head;
+    }
+    if (word == "format") {
+      const std::string_view format = take_word(line);
+      head.format = format == "ascii"                  ? PlyHead::Format::ascii
+                    : format == "binary_little_endian" ? PlyHead::Format::little
+                    : format == "binary_big_endian"    ? PlyHead::Format::big
+                                                       : PlyHead::Format::none;
+    } else if (word == "element") {
+      Element& element = head.elements.emplace_back();
+      element.name = std::string(take_word(line).substr(0, 40));
+      element.rows = count_of(take_word(line), element.name + " rows");
+    } else if (word == "property") {
+      if (head.elements.empty()) refuse("its header has a property of nothing");
+      head.elements.back().properties.push_back(take_property(line));
+    }
+  }
+  refuse("its header does not end");
+}
+
+[[noreturn]] void refuse_short(const Element& element, std::uint64_t row) {
+  refuse("it is cut short: it ends at row " + std::to_string(row) + " of the " +
+         std::to_string(element.rows) + " of its element '" + element.name + "'");
+}
+
+// What a list's count says, or nothing where the file ends.
+std::uint64_t list_count(std::string_view bytes, bool big) {
+  std::uint64_t count = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const std::size_t at = big ? i : bytes.size() - 1 - i;
+    count = count << 8U | static_cast<unsigned char>(bytes[at]);
+  }
+  return count;
+}
+
+// Walks a row of a binary file; false if the file ends in it.
+bool skip_row(const Element& element, bool big, std::string_view& body) {
+  for (const Property& property : element.properties) {
+    std::uint64_t bytes = property.bytes;
+    if (property.list > 0) {
+      if (body.size() < property.list) return false;
+      bytes *= list_count(body.substr(0, property.list), big);
+      body.remove_prefix(property.list);
+    }
+    if (body.size() < bytes) return false;
+    body.remove_prefix(static_cast<std::size_t>(bytes));
+  }
+  return true;
+}
+
+bool skip_words(const Element& element, std::string_view& body) {
+  for (const Property& property : element.properties) {
+    std::string_view word = take_word(body);
+    if (word.empty()) return false;
+    if (property.list == 0) continue;
+    for (std::uint64_t left = count_of(word, "a list's values"); left > 0; --left) {
+      if (take_word(body).empty()) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+void check_ply(std::span<const std::byte> file_bytes) {
+  PlyHead head = parse_head({reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size()});
+  const bool ascii = head.format == PlyHead::Format::ascii;
+  const bool big = head.format == PlyHead::Format::big;
+  for (const Element& element : head.elements) {
+    if (element.properties.empty() && element.rows > 0) {
+      refuse("its element '" + element.name + "' has no properties");
+    }
+    for (std::uint64_t row = 0; row < element.rows; ++row) {
+      if (!(ascii ? skip_words(element, head.body) : skip_row(element, big, head.body))) {
+        refuse_short(element, row);
+      }
+    }
+  }
+}
+
+void check_stl(std::span<const std::byte> file_bytes) {
+  constexpr std::size_t header = 80, triangle = 50;
+  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
+  if (text.starts_with("solid")) return;  // the words of an ascii file, or told apart by assimp
+  if (text.size() < header + 4) refuse("it is cut short: it ends in its header");
+  const std::uint64_t count = list_count(text.substr(header, 4), false);
+  if (count * triangle > text.size() - header - 4) {
+    refuse("it is cut short: its header says " + std::to_string(count) +
+           " triangles, but there are " + std::to_string((text.size() - header - 4) / triangle));
+  }
+}
+
+}  // namespace render

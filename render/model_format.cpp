@@ -1,0 +1,22 @@
+// The formats of models.
+#include "render/model_format.h"
+
+#include <algorithm>
+#include <filesystem>
+
+namespace render {
+
+std::optional<ModelFormat> model_format(const std::string& file) {
+  std::string extension = std::filesystem::path(file).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  if (extension == ".gltf" || extension == ".glb")
+    return ModelFormat{.gltf = true, .smooth_normals = false};
+  if (extension == ".obj" || extension == ".fbx" || extension == ".x3d") return ModelFormat{};
+  if (extension == ".ply") return ModelFormat{.ply = true, .y_up = false};
+  if (extension == ".stl") return ModelFormat{.stl = true, .y_up = false};
+  return std::nullopt;
+}
+
+}  // namespace render

@@ -1,0 +1,313 @@
+// Models through assimp.
+#include "render/model_import.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <array>
+#include <assimp/IOStream.hpp>
+#include <assimp/IOSystem.hpp>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <cstring>
+#include <exception>
+#include <limits>
+#include <new>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+#include "render/gltf_check.h"
+#include "render/model_check.h"
+#include "render/model_format.h"
+#include "render/model_material.h"
+#include "render/model_mesh.h"
+
+namespace render {
+namespace {
+
+constexpr int max_node_depth = 256;
+// Metres from the origin: farther out, floats and Embree overflow.
+constexpr float farthest = 1e9F;
+
+// A file in memory, for assimp.
+class MemoryStream : public Assimp::IOStream {
+ public:
+  explicit MemoryStream(std::vector<std::byte> bytes) : bytes_(std::move(bytes)) {}
+  std::size_t Read(void* target, std::size_t size, std::size_t count) override {
+    if (size == 0) return 0;
+    count = std::min(count, (bytes_.size() - at_) / size);
+    if (count > 0) std::memcpy(target, bytes_.data() + at_, size * count);
+    at_ += size * count;
+    return count;
+  }
+  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
+  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
+    const std::size_t base = origin == aiOrigin_SET   ? 0
+                             : origin == aiOrigin_CUR ? at_
+                                                      : bytes_.size();
+    const std::size_t target = origin == aiOrigin_END ? base - offset : base + offset;
+    if (target > bytes_.size()) return aiReturn_FAILURE;
+    at_ = target;
+    return aiReturn_SUCCESS;
+  }
+  std::size_t Tell() const override { return at_; }
+  std::size_t FileSize() const override { return bytes_.size(); }
+  void Flush() override {}
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::size_t at_ = 0;
+};
+
+// Lets assimp see nothing but what it is given.
+class GivenFiles : public Assimp::IOSystem {
+ public:
+  GivenFiles(ModelFiles& files, std::vector<std::string>& missing)
+      : files_(files), missing_(missing) {}
+  bool Exists(const char* file) const override { return files_.exists(file); }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* file, const char* mode) override {
+    if (std::strchr(mode, 'w') != nullptr || std::strchr(mode, 'a') != nullptr) return nullptr;
+    if (auto bytes = files_.read(file)) return new MemoryStream(std::move(*bytes));
+    missing_.emplace_back(file);
+    return nullptr;
+  }
+  void Close(Assimp::IOStream* stream) override { delete stream; }
+
+ private:
+  ModelFiles& files_;
+  std::vector<std::string>& missing_;
+};
+
+// Metres per unit and the up axis that an FBX file states.
+double unit_of(const aiScene& scene, ModelFormat& format) {
+  double centimetres = 100;
+  if (scene.mMetaData == nullptr) return 1;
+  std::int32_t up = 1;
+  if (scene.mMetaData->Get("UpAxis", up)) format.y_up = up != 2;
+  float single = 0;
+  if (!scene.mMetaData->Get("UnitScaleFactor", centimetres) &&
+      scene.mMetaData->Get("UnitScaleFactor", single))
+    centimetres = single;
+  return std::isfinite(centimetres) && centimetres > 0 ? centimetres / 100 : 1;
+}
+
+// Walks the nodes and gathers what is shown.
+class ModelBuilder {
+ public:
+  ModelBuilder(const aiScene& source, const LoadOptions& options, bool smooth_normals)
+      : source_(source),
+        options_(options),
+        smooth_normals_(smooth_normals),
+        materials_(source, model_.report.notes),
+        meshes_(source.mNumMeshes, -1),
+        material_of_(source.mNumMaterials, -1),
+        imported_(source.mNumMaterials) {}
+
+  RawModel build(const aiMatrix4x4& set_from_root) {
+    std::vector<bool> found(options_.hide.size());
+    visit(*source_.mRootNode, set_from_root, false, 0, found);
+    for (std::size_t i = 0; i < found.size(); ++i)
+      if (!found[i]) refuse_hide(options_.hide[i]);
+    LoadReport& report = model_.report;
+    if (report.triangles == 0) throw std::runtime_error("it shows no triangles");
+    if (left_out_ > 0)
+      report.notes.push_back(
+          std::to_string(left_out_) +
+          " triangles with positions that are not finite, or farther away than a "
+          "million kilometres, are left out");
+    model_.textures = materials_.take_textures();
+    report.materials = model_.materials.size();
+    return std::move(model_);
+  }
+
+ private:
+  void visit(const aiNode& node,
+             const aiMatrix4x4& set_from_parent,
+             bool hidden,
+             int depth,
+             std::vector<bool>& found) {
+    if (depth > max_node_depth) throw std::runtime_error("its nodes are nested too deeply");
+    const std::string name = node.mName.C_Str();
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      if (options_.hide[i] != name) continue;
+      found[i] = true;
+      hidden = true;
+    }
+    const aiMatrix4x4 set_from_node = set_from_parent * node.mTransformation;
+    if (node.mNumMeshes > 0) model_.report.nodes.push_back(name);
+    for (unsigned i = 0; i < node.mNumMeshes && !hidden; ++i) {
+      if (node.mMeshes[i] >= source_.mNumMeshes)
+        throw std::runtime_error("node '" + name + "' names a mesh that is not there");
+      place(node.mMeshes[i], name, set_from_node);
+    }
+    for (unsigned i = 0; i < node.mNumChildren; ++i)
+      visit(*node.mChildren[i], set_from_node, hidden, depth + 1, found);
+  }
+
+  void place(unsigned mesh_index, const std::string& name, const aiMatrix4x4& m) {
+    for (unsigned r = 0; r < 4; ++r)
+      for (unsigned c = 0; c < 4; ++c)
+        if (!std::isfinite(m[r][c]))
+          throw std::runtime_error("node '" + name + "' has a transform that is not finite");
+    const std::int64_t mesh = mesh_of(mesh_index);
+    if (mesh < 0) return;
+    Instance instance;
+    instance.name = name;
+    instance.mesh = static_cast<std::uint32_t>(mesh);
+    instance.set_from_object = {m.a1, m.a2, m.a3, m.a4, m.b1, m.b2,
+                                m.b3, m.b4, m.c1, m.c2, m.c3, m.c4};
+    const Mesh& shown = model_.meshes[instance.mesh];
+    LoadReport& report = model_.report;
+    if (report.triangles == 0) {
+      constexpr float far = std::numeric_limits<float>::max();
+      report.lower = {far, far, far};
+      report.upper = {-far, -far, -far};
+    }
+    report.triangles += shown.triangles.size();
+    if (report.triangles > max_model_triangles)
+      throw std::runtime_error("it has over 64 M triangles");
+    for (const auto& triangle : shown.triangles) {
+      for (const std::uint32_t corner : triangle) {
+        const Vec3f p = shown.positions[corner];
+        const aiVector3D q = m * aiVector3D(p.x, p.y, p.z);
+        report.lower = {std::min(report.lower.x, q.x), std::min(report.lower.y, q.y),
+                        std::min(report.lower.z, q.z)};
+        report.upper = {std::max(report.upper.x, q.x), std::max(report.upper.y, q.y),
+                        std::max(report.upper.z, q.z)};
+      }
+    }
+    for (const Vec3f corner : {report.lower, report.upper})
+      for (const float x : {corner.x, corner.y, corner.z})
+        if (!(std::abs(x) <= farthest))
+          throw std::runtime_error("node '" + name +
+                                   "' lies farther away than a million kilometres");
+    model_.instances.push_back(std::move(instance));
+  }
+
+  // The mesh's index in the scene, -1 if it has no triangles.
+  std::int64_t mesh_of(unsigned index) {
+    if (meshes_[index] >= 0) return meshes_[index];
+    const aiMesh& source = *source_.mMeshes[index];
+    if ((source.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) return -1;
+    const std::uint32_t material = material_for(source.mMaterialIndex);
+    if (source.HasVertexColors(0)) add_note("vertex colours are left out");
+    if (source.HasBones()) add_note("skins are left out: the model stands in its bind pose");
+    Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], smooth_normals_, left_out_);
+    if (mesh.triangles.empty()) return -1;
+    mesh.materials = {material};
+    model_.report.vertices += mesh.positions.size();
+    model_.meshes.push_back(std::move(mesh));
+    meshes_[index] = static_cast<std::int64_t>(model_.meshes.size()) - 1;
+    return meshes_[index];
+  }
+
+  std::uint32_t material_for(unsigned index) {
+    if (index >= source_.mNumMaterials) throw std::runtime_error("a mesh has no material");
+    if (material_of_[index] < 0) {
+      const aiMaterial& source = *source_.mMaterials[index];
+      imported_[index] = materials_.import(source);
+      imported_[index].parameters.emission_gain *= options_.emission_gain;
+      aiString name;
+      source.Get(AI_MATKEY_NAME, name);
+      material_of_[index] = static_cast<std::int64_t>(model_.materials.size());
+      model_.materials.push_back(
+          {name.C_Str(), imported_[index].parameters, imported_[index].glass});
+    }
+    return static_cast<std::uint32_t>(material_of_[index]);
+  }
+
+  void add_note(const std::string& text) {
+    auto& notes = model_.report.notes;
+    if (std::find(notes.begin(), notes.end(), text) == notes.end()) notes.push_back(text);
+  }
+
+  [[noreturn]] void refuse_hide(const std::string& name) const {
+    std::string list;
+    for (const std::string& node : model_.report.nodes) list += (list.empty() ? "" : ", ") + node;
+    throw std::invalid_argument("cannot hide '" + name + "': the nodes with a mesh are " + list);
+  }
+
+  const aiScene& source_;
+  const LoadOptions& options_;
+  bool smooth_normals_;
+  RawModel model_;
+  MaterialImport materials_;
+  std::vector<std::int64_t> meshes_;
+  std::vector<std::int64_t> material_of_;
+  std::vector<ImportedMaterial> imported_;
+  std::size_t left_out_ = 0;
+};
+
+// assimp drops faces that name vertices which are not there: then the file is damaged.
+void check_faces(const aiScene& scene, const GltfFacts& facts) {
+  std::size_t read = 0;
+  for (unsigned i = 0; i < scene.mNumMeshes; ++i)
+    if ((scene.mMeshes[i]->mPrimitiveTypes & aiPrimitiveType_TRIANGLE) != 0)
+      read += scene.mMeshes[i]->mNumFaces;
+  if (read < facts.plain_triangles)
+    throw std::runtime_error(std::to_string(facts.plain_triangles - read) + " of its " +
+                             std::to_string(facts.plain_triangles) +
+                             " triangles name vertices that are not there");
+}
+
+// What can be told before assimp sees the file. It never ends on a PLY file that ends too soon.
+GltfFacts check_first(std::span<const std::byte> bytes, const ModelFormat& format) {
+  if (bytes.empty()) throw std::runtime_error("the file is empty");
+  if (format.gltf) return check_gltf(bytes);
+  if (format.ply) check_ply(bytes);
+  if (format.stl) check_stl(bytes);
+  return {};
+}
+
+// What assimp caught: sizes that no memory holds are the file's fault.
+void translate(const std::exception_ptr& error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const std::length_error&) {
+    throw std::runtime_error("it is damaged: it claims more elements than there can be");
+  } catch (const std::exception&) {  // told by its text
+  }
+}
+
+}  // namespace
+
+RawModel import_model(ModelFiles& files, const std::string& file, const LoadOptions& options) {
+  ModelFormat format = model_format(file).value();
+  const GltfFacts facts = check_first(files.read(file).value_or(std::vector<std::byte>{}), format);
+  std::vector<std::string> missing;
+  Assimp::Importer importer;
+  importer.SetIOHandler(new GivenFiles(files, missing));  // the importer deletes it
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
+                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  const aiScene* scene = importer.ReadFile(
+      file, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
+  if (scene == nullptr) {
+    if (const std::exception_ptr error = importer.GetException()) translate(error);
+    std::string why = importer.GetErrorString();
+    if (why.find("mNumMeshes is 0") != std::string::npos) why = "it holds no meshes";
+    for (const std::string& name : missing) why += "; '" + name + "' is not there";
+    throw std::runtime_error(why);
+  }
+  if (scene->mRootNode == nullptr) throw std::runtime_error("it has no nodes");
+
+  const double unit = unit_of(*scene, format);
+  const bool y_up = options.up == UpAxis::by_format ? format.y_up : options.up == UpAxis::y;
+  const auto s = static_cast<float>(options.scale * unit);
+  const aiMatrix4x4 set_from_root =
+      y_up ? aiMatrix4x4(s, 0, 0, 0, 0, 0, -s, 0, 0, s, 0, 0, 0, 0, 0, 1)
+           : aiMatrix4x4(s, 0, 0, 0, 0, s, 0, 0, 0, 0, s, 0, 0, 0, 0, 1);
+  if (format.gltf) check_faces(*scene, facts);
+  RawModel model = ModelBuilder(*scene, options, format.smooth_normals).build(set_from_root);
+  model.report.notes.insert(model.report.notes.end(), facts.notes.begin(), facts.notes.end());
+  for (const std::string& name : missing)
+    model.report.notes.push_back("'" + name + "' is not there");
+  return model;
+}
+
+}  // namespace render
