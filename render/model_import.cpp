@@ -24,6 +24,7 @@
 #include "render/model_format.h"
 #include "render/model_material.h"
 #include "render/model_mesh.h"
+#include "render/x3d_mend.h"
 
 namespace render {
 namespace {
@@ -65,13 +66,14 @@ class MemoryStream : public Assimp::IOStream {
 // Lets assimp see nothing but what it is given.
 class GivenFiles : public Assimp::IOSystem {
  public:
-  GivenFiles(ModelFiles& files, std::vector<std::string>& missing)
-      : files_(files), missing_(missing) {}
+  GivenFiles(ModelFiles& files, bool x3d, std::vector<std::string>& missing)
+      : files_(files), x3d_(x3d), missing_(missing) {}
   bool Exists(const char* file) const override { return files_.exists(file); }
   char getOsSeparator() const override { return '/'; }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
     if (std::strchr(mode, 'w') != nullptr || std::strchr(mode, 'a') != nullptr) return nullptr;
-    if (auto bytes = files_.read(file)) return new MemoryStream(std::move(*bytes));
+    if (auto bytes = files_.read(file))
+      return new MemoryStream(x3d_ ? mend_x3d(*bytes) : std::move(*bytes));
     missing_.emplace_back(file);
     return nullptr;
   }
@@ -79,6 +81,7 @@ class GivenFiles : public Assimp::IOSystem {
 
  private:
   ModelFiles& files_;
+  bool x3d_;
   std::vector<std::string>& missing_;
 };
 
@@ -282,7 +285,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
   const GltfFacts facts = check_first(files.read(file).value_or(std::vector<std::byte>{}), format);
   std::vector<std::string> missing;
   Assimp::Importer importer;
-  importer.SetIOHandler(new GivenFiles(files, missing));  // the importer deletes it
+  importer.SetIOHandler(new GivenFiles(files, format.x3d, missing));  // the importer deletes it
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(

@@ -71,6 +71,7 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
   aiString path;
   unsigned channel = 0;
   if (material.GetTexture(ai_type, slot, &path, nullptr, &channel) != aiReturn_SUCCESS) return -1;
+  if (path.length == 0) return -1;
   UvTransform uv{.channel = channel};
   aiUVTransform transform;
   if (material.Get(AI_MATKEY_UVTRANSFORM(ai_type, slot), transform) == aiReturn_SUCCESS) {

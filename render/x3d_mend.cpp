@@ -1,0 +1,62 @@
+// X3D files, mended.
+#include "render/x3d_mend.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <string_view>
+
+namespace render {
+namespace {
+
+// The first name of a list in quotes; without quotes, all of it.
+std::string_view first_name(std::string_view list) {
+  for (const std::string_view quote : {std::string_view("\""), std::string_view("&quot;")}) {
+    const std::size_t begin = list.find(quote);
+    if (begin == std::string_view::npos) continue;
+    const std::string_view rest = list.substr(begin + quote.size());
+    return rest.substr(0, rest.find(quote));
+  }
+  return list;
+}
+
+// Where the value of a tag's attribute `url` is; empty if it has none.
+std::string_view url_of(std::string_view tag) {
+  constexpr std::string_view blanks = " \t\r\n";
+  for (std::size_t at = tag.find("url"); at != std::string_view::npos;
+       at = tag.find("url", at + 1)) {
+    if (blanks.find(tag[at - 1]) == std::string_view::npos) continue;
+    const std::size_t equals = tag.find_first_not_of(blanks, at + 3);
+    if (equals == std::string_view::npos || tag[equals] != '=') continue;
+    const std::size_t begin = tag.find_first_not_of(blanks, equals + 1);
+    if (begin == std::string_view::npos || (tag[begin] != '\'' && tag[begin] != '"')) continue;
+    const std::size_t end = tag.find(tag[begin], begin + 1);
+    if (end != std::string_view::npos) return tag.substr(begin + 1, end - begin - 1);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::byte> mend_x3d(std::span<const std::byte> file_bytes) {
+  constexpr std::string_view opening = "<ImageTexture";
+  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
+  std::string mended;
+  mended.reserve(text.size());
+  std::size_t copied = 0;
+  for (std::size_t at = text.find(opening); at != std::string_view::npos;
+       at = text.find(opening, at + 1)) {
+    const std::string_view url = url_of(text.substr(at, text.find('>', at) - at));
+    if (url.empty()) continue;
+    const auto begin = static_cast<std::size_t>(url.data() - text.data());
+    mended.append(text.substr(copied, begin - copied)).append(first_name(url));
+    copied = begin + url.size();
+  }
+  mended.append(text.substr(copied));
+  std::vector<std::byte> bytes(mended.size());
+  std::transform(mended.begin(), mended.end(), bytes.begin(),
+                 [](char c) { return static_cast<std::byte>(c); });
+  return bytes;
+}
+
+}  // namespace render

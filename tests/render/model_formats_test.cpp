@@ -1,0 +1,264 @@
+// One model in every format: the same triangles, places, materials.
+#include <assimp/material.h>
+#include <assimp/mesh.h>
+#include <assimp/scene.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <assimp/Exporter.hpp>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/load_mesh.h"
+#include "render/made_headlight.h"
+#include "render/made_model_file.h"
+#include "render/made_shapes.h"
+#include "render/standard.h"
+#include "tests/made_files.h"
+
+namespace render {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Contains, testing::HasSubstr;
+
+// A box from (0, 0, 0) to (1, 2, 3), painted with a picture, and a green wedge before its face of
+// low x: no two axes can be taken for one another.
+constexpr std::array<float, 3> box_size{1, 2, 3};
+
+void add_quad(Mesh& mesh, Vec3f corner, Vec3f along, Vec3f up) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  const Vec3f normal = normalize(cross(along, up));
+  for (const auto& [u, v] : {std::array{0.F, 0.F}, {1.F, 0.F}, {1.F, 1.F}, {0.F, 1.F}}) {
+    mesh.positions.push_back(corner + along * u + up * v);
+    mesh.normals.push_back(normal);
+    mesh.uvs.push_back({u, 1 - v});
+  }
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  mesh.triangles.push_back({first, first + 2, first + 3});
+}
+
+Mesh made_box() {
+  const Vec3f x{box_size[0], 0, 0}, y{0, box_size[1], 0}, z{0, 0, box_size[2]};
+  Mesh box;
+  add_quad(box, {}, y, x), add_quad(box, z, x, y);
+  add_quad(box, {}, x, z), add_quad(box, y, z, x);
+  add_quad(box, {}, z, y), add_quad(box, x, y, z);
+  box.materials = {0};
+  return box;
+}
+
+Mesh made_wedge() {
+  Mesh wedge;
+  add_quad(wedge, {-0.5F, 0.5F, 0.25F}, {0, 1, 0}, {0.25F, 0, 1});
+  wedge.materials = {1};
+  return wedge;
+}
+
+aiMesh* library_mesh(const Mesh& mesh, const std::string& name) {
+  auto result = std::make_unique<aiMesh>();
+  result->mName = name;
+  result->mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
+  result->mMaterialIndex = mesh.materials[0];
+  result->mNumVertices = static_cast<unsigned>(mesh.positions.size());
+  result->mVertices = new aiVector3D[mesh.positions.size()];
+  result->mNormals = new aiVector3D[mesh.positions.size()];
+  result->mTextureCoords[0] = new aiVector3D[mesh.positions.size()];
+  result->mNumUVComponents[0] = 2;
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3f p = mesh.positions[i], n = mesh.normals[i];
+    result->mVertices[i] = {p.x, p.y, p.z};
+    result->mNormals[i] = {n.x, n.y, n.z};
+    result->mTextureCoords[0][i] = {mesh.uvs[i][0], 1 - mesh.uvs[i][1], 0};
+  }
+  result->mNumFaces = static_cast<unsigned>(mesh.triangles.size());
+  result->mFaces = new aiFace[mesh.triangles.size()];
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    result->mFaces[t].mNumIndices = 3;
+    result->mFaces[t].mIndices =
+        new unsigned[3]{mesh.triangles[t][0], mesh.triangles[t][1], mesh.triangles[t][2]};
+  }
+  return result.release();
+}
+
+aiMaterial* library_material(const char* name, aiColor3D colour, const char* picture) {
+  auto material = std::make_unique<aiMaterial>();
+  const aiString text(name);
+  material->AddProperty(&text, AI_MATKEY_NAME);
+  material->AddProperty(&colour, 1, AI_MATKEY_COLOR_DIFFUSE);
+  const aiColor4D with_alpha(colour.r, colour.g, colour.b, 1);
+  material->AddProperty(&with_alpha, 1, AI_MATKEY_BASE_COLOR);
+  if (picture != nullptr) {
+    const aiString file(picture);
+    material->AddProperty(&file, AI_MATKEY_TEXTURE_DIFFUSE(0));
+    material->AddProperty(&file, AI_MATKEY_TEXTURE(aiTextureType_BASE_COLOR, 0));
+  }
+  return material.release();
+}
+
+// The scene as the library has it, in a file of its format `id`.
+std::string export_scene(const fs::path& folder, const char* id, const std::string& name) {
+  aiScene scene;
+  scene.mNumMeshes = 2;
+  scene.mMeshes =
+      new aiMesh* [2] { library_mesh(made_box(), "box"), library_mesh(made_wedge(), "wedge") };
+  scene.mNumMaterials = 2;
+  scene.mMaterials = new aiMaterial* [2] {
+    library_material("paint", {1, 1, 1}, "paint.png"),
+        library_material("leaf", {0.25F, 0.75F, 0.5F}, nullptr)
+  };
+  scene.mRootNode = new aiNode("root");
+  for (unsigned i = 0; i < 2; ++i) {
+    auto* node = new aiNode(i == 0 ? "box" : "wedge");
+    node->mNumMeshes = 1;
+    node->mMeshes = new unsigned[1]{i};
+    scene.mRootNode->addChildren(1, &node);
+  }
+  fs::copy_file(made::bad_files().parent_path() / "one_texel.png", folder / "paint.png",
+                fs::copy_options::overwrite_existing);
+  Assimp::Exporter exporter;
+  const std::string path = folder / name;
+  EXPECT_EQ(exporter.Export(&scene, id, path), aiReturn_SUCCESS) << exporter.GetErrorString();
+  return path;
+}
+
+struct FormatCase {
+  const char* id;  // the exporter's
+  const char* file;
+  bool y_up;
+  bool materials;  // it carries them
+  bool textures;
+  float scale = 1;  // metres per unit
+};
+
+constexpr FormatCase formats[] = {
+    {"gltf2", "a.gltf", true, true, true},  {"glb2", "a.glb", true, true, true},
+    {"obj", "a.obj", true, true, true},     {"fbxa", "b.fbx", true, true, true, 0.01F},
+    {"x3d", "a.x3d", true, true, true},     {"ply", "a.ply", false, false, false},
+    {"plyb", "b.ply", false, false, false}, {"stl", "a.stl", false, false, false},
+    {"stlb", "b.stl", false, false, false},
+};
+
+class EveryFormat : public testing::TestWithParam<FormatCase> {};
+
+Vec3f placed(const Instance& instance, Vec3f p) {
+  const auto& m = instance.set_from_object;
+  return {m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3], m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
+          m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]};
+}
+
+TEST_P(EveryFormat, KeepsTrianglesBoundsAxesAndMaterials) {
+  const FormatCase format = GetParam();
+  const std::string path = export_scene(made::make_temporary_directory(), format.id, format.file);
+  const LoadedModel model = load_model(path);
+  const LoadReport& report = model.report;
+  std::string notes;
+  for (const auto& note : report.notes) notes += note + "\n";
+  SCOPED_TRACE(notes);
+  EXPECT_EQ(report.triangles, 14U);
+  EXPECT_EQ(report.vertices, 28U);
+  const float s = format.scale;
+  // From -.5, 0, 0 to 1, 2, 3 in the file's axes.
+  const Vec3f lower = format.y_up ? Vec3f{-0.5F, -3, 0} : Vec3f{-0.5F, 0, 0};
+  const Vec3f upper = format.y_up ? Vec3f{1, 0, 2} : Vec3f{1, 2, 3};
+  EXPECT_LT(length(report.lower - lower * s), 1e-5F) << report.lower.y;
+  EXPECT_LT(length(report.upper - upper * s), 1e-5F) << report.upper.y;
+
+  // Every side of the box looks away from its middle.
+  const Vec3f middle = format.y_up ? Vec3f{0.5F, -1.5F, 1} * s : Vec3f{0.5F, 1, 1.5F} * s;
+  int sides = 0;
+  for (const Instance& instance : model.scene.instances) {
+    const Mesh& mesh = *model.scene.meshes[instance.mesh];
+    ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+    for (const auto& triangle : mesh.triangles) {
+      std::array<Vec3f, 3> p;
+      for (std::size_t k = 0; k < 3; ++k) p[k] = placed(instance, mesh.positions[triangle[k]]);
+      const Vec3f face = cross(p[1] - p[0], p[2] - p[0]);
+      const Vec3f out = (p[0] + p[1] + p[2]) * (1.0F / 3) - middle;
+      if (p[0].x < 0 || p[1].x < 0 || p[2].x < 0) continue;  // the wedge
+      ++sides;
+      EXPECT_GT(dot(face, out), 0);
+      const Vec3f tip = placed(instance, mesh.positions[triangle[0]] + mesh.normals[triangle[0]]);
+      EXPECT_GT(dot(tip - p[0], face), 0);
+    }
+  }
+  EXPECT_EQ(sides, 12);
+
+  if (!format.materials) return;
+  EXPECT_EQ(report.materials, 2U);
+  EXPECT_EQ(report.textures, format.textures ? 1U : 0U);
+  int painted = 0, green = 0;
+  for (const Material& material : model.scene.materials) {
+    const StandardParameters p = standard_parameters(material, report.textures);
+    if (p.base_color_texture >= 0) ++painted;
+    const float* c = p.base_color;
+    if (std::abs(c[0] - 0.25F) < 1e-3F && std::abs(c[1] - 0.75F) < 1e-3F &&
+        std::abs(c[2] - 0.5F) < 1e-3F) {
+      ++green;
+    }
+  }
+  EXPECT_EQ(painted, format.textures ? 1 : 0);
+  EXPECT_EQ(green, 1);
+  // The picture stands upright: where the file's box has u, v so has ours, v counted down.
+  for (const Instance& instance : model.scene.instances) {
+    const Mesh& mesh = *model.scene.meshes[instance.mesh];
+    const auto p = standard_parameters(model.scene.materials[mesh.materials[0]], report.textures);
+    if (p.base_color_texture < 0) continue;
+    const Mesh box = made_box();
+    ASSERT_EQ(mesh.uvs.size(), mesh.positions.size());
+    std::size_t met = 0;
+    for (std::size_t i = 0; i < box.positions.size(); ++i) {
+      const Vec3f b = box.positions[i];
+      const Vec3f expected = Vec3f{b.x, -b.z, b.y} * s;
+      for (std::size_t k = 0; k < mesh.positions.size(); ++k) {
+        const Vec3f q = placed(instance, mesh.positions[k]);
+        met += length(q - expected) < 1e-4F * s &&
+                       std::abs(mesh.uvs[k][0] - box.uvs[i][0]) < 1e-4F &&
+                       std::abs(mesh.uvs[k][1] - box.uvs[i][1]) < 1e-4F
+                   ? 1
+                   : 0;
+      }
+    }
+    EXPECT_GE(met, 24U);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(LoadModel,
+                         EveryFormat,
+                         testing::ValuesIn(formats),
+                         [](const auto& format) { return std::string(format.param.id); });
+
+TEST(LoadModel, ReadsTheMadeHeadlightBackFromGlb) {
+  const SceneDescription headlight = make_headlight();
+  const std::string path = made::make_temporary_directory() / "headlight.glb";
+  write_glb(path, headlight);
+  const LoadedModel model = load_model(path);
+  EXPECT_EQ(model.report.triangles, triangle_count(headlight));
+  ASSERT_EQ(model.scene.instances.size(), headlight.instances.size());
+  for (std::size_t i = 0; i < headlight.instances.size(); ++i) {
+    const Instance &before = headlight.instances[i], &after = model.scene.instances[i];
+    EXPECT_EQ(after.name, before.name);
+    const Mesh &a = *headlight.meshes[before.mesh], &b = *model.scene.meshes[after.mesh];
+    ASSERT_EQ(a.triangles, b.triangles);
+    for (std::size_t k = 0; k < a.positions.size(); k += 97) {
+      EXPECT_LT(length(placed(before, a.positions[k]) - placed(after, b.positions[k])), 1e-6F);
+    }
+    EXPECT_EQ(headlight.materials[a.materials[0]].shader,
+              model.scene.materials[b.materials[0]].shader);
+  }
+}
+
+TEST(LoadModel, ReadsTheMadeHeadlightBackFromPly) {
+  const SceneDescription headlight = make_headlight();
+  const std::string path = made::make_temporary_directory() / "headlight.ply";
+  write_ply(path, headlight);
+  const LoadReport report = load_model(path).report;
+  EXPECT_EQ(report.triangles, triangle_count(headlight));
+}
+
+}  // namespace
+}  // namespace render
