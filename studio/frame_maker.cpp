@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <future>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -217,6 +218,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.sound = plate_->take_sound();
     videos = videos_->at(time);
     prepared.notes = videos_->take_notes();
+    std::ranges::move(std::exchange(set_scene_.notes, {}), std::back_inserter(prepared.notes));
   }
 
   render::FrameJob& job = prepared.job;

@@ -36,7 +36,22 @@ std::vector<Instance> add_model(SceneDescription& scene, const SceneDescription&
   return parts;
 }
 
-SceneDescription load_object(const ObjectSettings& object) {
+render::LoadOptions load_options(const ObjectSettings& object) {
+  render::LoadOptions options;
+  options.hide = object.hide;
+  options.emission_gain = static_cast<float>(object.emission_gain);
+  return options;
+}
+
+SceneDescription load_file(const std::string& file,
+                           const render::LoadOptions& options,
+                           std::vector<std::string>& notes) {
+  render::LoadedModel model = render::load_model(file, options);
+  for (const std::string& note : model.report.notes) notes.push_back(file + ": " + note);
+  return std::move(model.scene);
+}
+
+SceneDescription load_object(const ObjectSettings& object, std::vector<std::string>& notes) {
   if (object.made == "car") {
     render::MadeCarSettings car;
     car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
@@ -53,10 +68,15 @@ SceneDescription load_object(const ObjectSettings& object) {
     return headlight;
   }
   if (object.made == "lamp") return render::made_lamp(static_cast<float>(object.emission_gain));
-  render::LoadOptions options;
-  options.hide = object.hide;
-  options.emission_gain = static_cast<float>(object.emission_gain);
-  return render::load_model(object.mesh, options).scene;
+  return load_file(object.mesh, load_options(object), notes);
+}
+
+// What people call it, or else its kind and number.
+std::string name_of(const ObjectSettings& object, std::size_t number) {
+  return object.name.empty() ? fmt::format("object {}", number) : object.name;
+}
+std::string name_of(const StandInSettings& stand_in, std::size_t number) {
+  return stand_in.name.empty() ? fmt::format("stand-in {}", number) : stand_in.name;
 }
 
 Mesh plane_mesh(double width_m, double depth_m, std::uint32_t material) {
@@ -93,14 +113,16 @@ render::Material stand_in_material(const StandInSettings& stand_in, const std::s
   return compositing::make_stand_in_material(name, p);
 }
 
-void add_stand_in(SceneDescription& scene, const StandInSettings& stand_in, std::size_t number) {
-  const std::string name =
-      stand_in.name.empty() ? fmt::format("stand-in {}", number) : stand_in.name;
+void add_stand_in(SceneDescription& scene,
+                  const StandInSettings& stand_in,
+                  std::size_t number,
+                  std::vector<std::string>& notes) {
+  const std::string name = name_of(stand_in, number);
   const auto material = static_cast<std::uint32_t>(scene.materials.size());
   std::vector<Instance> parts;
   if (stand_in.shape == StandInSettings::Shape::mesh) {
     // Its own materials do not matter: the plate shows what it looks like.
-    SceneDescription model = render::load_model(stand_in.mesh).scene;
+    SceneDescription model = load_file(stand_in.mesh, {}, notes);
     for (const auto& mesh : model.meshes) {
       Mesh bare = *mesh;
       bare.materials = {material};
@@ -188,12 +210,12 @@ SetScene describe_scene(const Set& set) {
       loaded;
   for (std::size_t i = 0; i < set.objects.size(); ++i) {
     const ObjectSettings& object = set.objects[i];
-    const std::string name = object.name.empty() ? fmt::format("object {}", i + 1) : object.name;
+    const std::string name = name_of(object, i + 1);
     try {
       const auto key = std::tuple(object.mesh, object.made, object.hide, object.emission_gain);
       auto found = loaded.find(key);
       if (found == loaded.end()) {
-        found = loaded.emplace(key, add_model(scene, load_object(object))).first;
+        found = loaded.emplace(key, add_model(scene, load_object(object, result.notes))).first;
       }
       place_copies(result, object, i, name, found->second);
     } catch (const std::runtime_error& error) {
@@ -204,7 +226,7 @@ SetScene describe_scene(const Set& set) {
   }
   for (std::size_t i = 0; i < set.stand_ins.size(); ++i) {
     try {
-      add_stand_in(scene, set.stand_ins[i], i + 1);
+      add_stand_in(scene, set.stand_ins[i], i + 1, result.notes);
     } catch (const std::runtime_error& error) {
       faults.add(set.stand_ins[i].place, error.what());
     }
@@ -218,6 +240,32 @@ SetScene describe_scene(const Set& set) {
     throw SetError(faults.sorted());
   }
   return result;
+}
+
+std::vector<ModelReport> check_models(const Set& set) {
+  std::vector<ModelReport> reports;
+  Faults faults(set.path);
+  const auto check = [&](const std::string& name, const std::string& file, Place place,
+                         const render::LoadOptions& options) {
+    if (file.empty()) return;
+    try {
+      reports.push_back({name, file, render::load_model(file, options).report});
+    } catch (const std::runtime_error& error) {
+      faults.add(place, error.what());
+    } catch (const std::invalid_argument& error) {
+      faults.add(place, error.what());
+    }
+  };
+  for (std::size_t i = 0; i < set.objects.size(); ++i) {
+    const ObjectSettings& object = set.objects[i];
+    check(name_of(object, i + 1), object.mesh, object.place, load_options(object));
+  }
+  for (std::size_t i = 0; i < set.stand_ins.size(); ++i) {
+    const StandInSettings& stand_in = set.stand_ins[i];
+    check(name_of(stand_in, i + 1), stand_in.mesh, stand_in.place, {});
+  }
+  if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+  return reports;
 }
 
 void place_object(const Set& set, std::size_t object, SetScene& scene) {

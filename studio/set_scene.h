@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render/area_light.h"
+#include "render/load_mesh.h"
 #include "render/scene.h"
 #include "studio/set.h"
 
@@ -24,13 +25,25 @@ struct ObjectPart {
 // A set's scene, and what it takes to move things in it.
 struct SetScene {
   render::SceneDescription description;
-  std::vector<ObjectPart> parts;  // its first instances, in order
+  std::vector<ObjectPart> parts;   // its first instances, in order
+  std::vector<std::string> notes;  // what was not understood of its models, with their files
 };
 
 // The scene of a set: first all objects, each part of each copy an instance named "OBJECT/PART",
 // then the stand-ins. Camera rays that meet nothing see the plate. Throws SetError naming every
 // mesh that cannot be loaded, with its place in the set file.
 SetScene describe_scene(const Set& set);
+
+// What was found in a model's file that the set names: by an object or a stand-in.
+struct ModelReport {
+  std::string name;  // of the object or stand-in
+  std::string file;
+  render::LoadReport report;
+};
+
+// Loads every model file of the set, one after the other, and keeps none. Throws SetError naming
+// every one that cannot be loaded, with its place in the set file.
+std::vector<ModelReport> check_models(const Set& set);
 
 // Puts an object's parts to where the set says that the object is, and tells that they move. Loads
 // nothing.

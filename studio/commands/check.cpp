@@ -7,6 +7,7 @@
 
 #include "studio/commands/commands.h"
 #include "studio/set.h"
+#include "studio/set_scene.h"
 
 namespace studio {
 namespace {
@@ -20,10 +21,51 @@ nlohmann::ordered_json to_json(const std::vector<Diagnostic>& diagnostics) {
   return list;
 }
 
+nlohmann::ordered_json to_json(const std::vector<ModelReport>& models) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& [name, file, report] : models) {
+    const auto [lower, upper] = std::pair(report.lower, report.upper);
+    list.push_back({{"name", name},
+                    {"file", file},
+                    {"triangles", report.triangles},
+                    {"vertices", report.vertices},
+                    {"materials", report.materials},
+                    {"textures", report.textures},
+                    {"texture_bytes", report.texture_bytes},
+                    {"lower", {lower.x, lower.y, lower.z}},
+                    {"upper", {upper.x, upper.y, upper.z}},
+                    {"nodes", report.nodes},
+                    {"notes", report.notes}});
+  }
+  return list;
+}
+
+void say(const ModelReport& model, Console& console) {
+  const render::LoadReport& r = model.report;
+  console.say(fmt::format("{}: {}", model.name, model.file));
+  console.say(fmt::format("  {} triangles, {} vertices, {} materials, {} textures ({:.1f} MB)",
+                          r.triangles, r.vertices, r.materials, r.textures,
+                          static_cast<double>(r.texture_bytes) * 1e-6));
+  console.say(fmt::format("  x {:.4g} to {:.4g}, y {:.4g} to {:.4g}, z {:.4g} to {:.4g} m",
+                          r.lower.x, r.upper.x, r.lower.y, r.upper.y, r.lower.z, r.upper.z));
+  std::string parts;
+  constexpr std::size_t enough = 12;
+  for (std::size_t i = 0; i < r.nodes.size() && i < enough; ++i) {
+    parts += (i > 0 ? ", " : "") + r.nodes[i];
+  }
+  if (r.nodes.size() > enough) parts += fmt::format(", and {} more", r.nodes.size() - enough);
+  console.say(fmt::format("  parts: {}", parts));
+  for (const std::string& note : r.notes) console.say("  note: " + note);
+}
+
 void check(const std::string& path, Console& console) {
   try {
     const Set set = read_set(path);
-    console.figures(nlohmann::ordered_json{{"diagnostics", nlohmann::json::array()}}.dump(2));
+    const std::vector<ModelReport> models = check_models(set);
+    console.figures(nlohmann::ordered_json{{"diagnostics", nlohmann::json::array()},
+                                           {"models", to_json(models)}}
+                        .dump(2));
+    for (const ModelReport& model : models) say(model, console);
     console.say(fmt::format("{}: good ({} objects, {} stand-ins)", path, set.objects.size(),
                             set.stand_ins.size()));
   } catch (const SetError& error) {
@@ -35,7 +77,7 @@ void check(const std::string& path, Console& console) {
 }  // namespace
 
 Command check_command() {
-  return {"check", "Check a set file and name all its faults",
+  return {"check", "Check a set file and its models, and name all their faults",
           "platelight check studio/sets/desk_car.toml",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto path = std::make_shared<std::string>();

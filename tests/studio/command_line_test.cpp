@@ -135,6 +135,28 @@ TEST_F(CommandLine, NamesAllFaultsOfASetAndWritesThemAsFigures) {
   EXPECT_THAT(content_of(json), HasSubstr("\"column\": 10"));
 }
 
+TEST_F(CommandLine, ChecksTheModelsOfASet) {
+  const std::string set = good_set + std::string(
+                                         "lens = { model = \"pinhole\", focal_px = 60 }\n"
+                                         "pose = { position = [0, -6, 1], look_at = [0, 0, 0] }\n"
+                                         "[[object]]\nname = \"sign\"\nmesh = \"sign.obj\"\n");
+  write("sign.obj", "mtllib lost.mtl\no board\nv 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n");
+  const std::string json = (dir_ / "figures.json").string();
+  const Outcome good = run("check " + write("a.toml", set) + " --json " + json);
+  EXPECT_EQ(good.status, 0) << good.err;
+  EXPECT_THAT(good.out, HasSubstr("sign: " + (dir_ / "sign.obj").string()));
+  EXPECT_THAT(good.out, HasSubstr("1 triangles, 3 vertices"));
+  EXPECT_THAT(good.out, HasSubstr("z 0 to 2 m"));
+  EXPECT_THAT(good.out, HasSubstr("parts: board"));
+  EXPECT_THAT(good.out, HasSubstr("note: 'lost.mtl' is not there"));
+  const auto figures = nlohmann::json::parse(content_of(json));
+  EXPECT_EQ(figures["models"][0]["triangles"], 1);
+  write("sign.obj", "v 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 33\n");
+  const Outcome bad = run("check " + (dir_ / "a.toml").string());
+  EXPECT_EQ(bad.status, 1);
+  EXPECT_THAT(bad.err, HasSubstr("a.toml:10:8: " + (dir_ / "sign.obj").string()));
+}
+
 // Runs of real files: a sequence of stills, an object, a sky.
 class Runs : public CommandLine {
  protected:

@@ -267,6 +267,37 @@ TEST_F(ShowTest, TakesAChangedSetOver) {
   for (std::size_t i = 0; i < empty.size(); ++i) ASSERT_EQ(empty[i], i % 4 == 3 ? 0 : grey) << i;
 }
 
+TEST_F(ShowTest, GoesOnWhenAModelCrashesItsReader) {
+  // A group that holds itself, and a picture that is not there.
+  const auto model = [&](const char* name, const std::string& scene) {
+    const std::string path = (dir_ / name).string();
+    std::ofstream(path) << "<?xml version=\"1.0\"?><X3D version=\"3.0\"><Scene>" << scene
+                        << "</Scene></X3D>";
+    return path;
+  };
+  const std::string crashing = model("crashing.x3d", "<Group DEF='a'><Group USE='a'/></Group>");
+  const std::string bare = model(
+      "bare.x3d",
+      "<Shape><Appearance><ImageTexture url='lost.png'/></Appearance><IndexedFaceSet "
+      "coordIndex='0 1 2 -1'><Coordinate point='0 0 0 1 0 0 0 1 0'/></IndexedFaceSet></Shape>");
+  ShowOptions options;
+  options.frames = 8;
+  const Set set = made_set("grey:1,25,0");
+  Show show(set, options);
+  std::int64_t frames = 0;
+  show.run([&](const ShownFrame&) {
+    Set changed = set;
+    changed.objects.resize(1);
+    changed.objects[0].made.clear();
+    changed.objects[0].mesh = frames == 0 ? crashing : bare;
+    if (frames++ < 2) show.post(ChangeSet{changed});
+  });
+  EXPECT_EQ(show.status()->frames, 8);
+  EXPECT_THAT(show.status()->notes,
+              Contains(AllOf(HasSubstr("crashing.x3d"), HasSubstr("damaged"))));
+  EXPECT_THAT(show.status()->notes, Contains(AllOf(HasSubstr("lost.png"), HasSubstr("magenta"))));
+}
+
 TEST_F(ShowTest, RecordsFromOneFrameToAnother) {
   ShowOptions options;
   options.frames = 12;
