@@ -35,6 +35,10 @@ void join(SceneDescription& whole, const SceneDescription& part, const Placement
   const auto first_video = static_cast<std::int32_t>(whole.videos.size());
   const auto first_material = static_cast<std::uint32_t>(whole.materials.size());
   for (const auto& mesh : part.meshes) {
+    if (first_material == 0) {  // nothing moves up: shared, since meshes may be large
+      whole.meshes.push_back(mesh);
+      continue;
+    }
     Mesh moved = *mesh;
     for (std::uint32_t& material : moved.materials) material += first_material;
     whole.meshes.push_back(std::make_shared<const Mesh>(std::move(moved)));

@@ -46,6 +46,7 @@ bool is_built(RTCDevice device) {
 }  // namespace
 
 void Scene::Compiled::build(const SceneDescription& description) {
+  kept_meshes = description.meshes;
   for (const Material& material : description.materials) {
     const std::shared_ptr<const Shader>& shader =
         shaders.emplace_back(find_shader(material.shader));
@@ -163,6 +164,7 @@ void Scene::Compiled::add_parts(const SceneDescription& description,
                                 RTCScene target) {
   const Mesh& mesh = *description.meshes[mesh_index];
   std::vector<std::uint32_t> opaque, with_filter;
+  opaque.reserve(mesh.triangles.size());
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [a, b, c] = mesh.triangles[t];
     if (!is_finite(mesh.positions[a]) || !is_finite(mesh.positions[b]) ||
@@ -199,11 +201,19 @@ void Scene::Compiled::add_part(const SceneDescription& description,
   auto* positions = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
                                                                 RTC_FORMAT_FLOAT3, sizeof(Vec3f),
                                                                 mesh.positions.size()));
-  auto* indices = static_cast<std::array<std::uint32_t, 3>*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                              sizeof(std::array<std::uint32_t, 3>), triangles.size()));
-  if (!positions || !indices) throw std::runtime_error("not enough memory for a mesh");
-  for (std::size_t i = 0; i < triangles.size(); ++i) indices[i] = mesh.triangles[triangles[i]];
+  using Triangle = std::array<std::uint32_t, 3>;
+  Triangle* indices = nullptr;
+  if (all) {
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                               mesh.triangles.data(), 0, sizeof(Triangle), mesh.triangles.size());
+  } else {
+    indices = static_cast<Triangle*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Triangle), triangles.size()));
+  }
+  if (!positions || (!indices && !all)) throw std::runtime_error("not enough memory for a mesh");
+  if (!all) {
+    for (std::size_t i = 0; i < triangles.size(); ++i) indices[i] = mesh.triangles[triangles[i]];
+  }
   if (instance == Part::none) {
     std::copy(mesh.positions.begin(), mesh.positions.end(), positions);
   } else {

@@ -31,8 +31,9 @@ struct Scene::Part {
 
 // All of a scene but where its moving instances stand.
 struct Scene::Compiled {
-  std::uint64_t id = 0;                                // of this process
-  std::vector<std::shared_ptr<const Shader>> shaders;  // per material
+  std::uint64_t id = 0;                                  // of this process
+  std::vector<std::shared_ptr<const Mesh>> kept_meshes;  // Embree reads their triangles
+  std::vector<std::shared_ptr<const Shader>> shaders;    // per material
   std::shared_ptr<const BackgroundShader> background;
   std::vector<std::optional<Glass>> glass;   // per material
   std::vector<std::uint8_t> filtered;        // per material

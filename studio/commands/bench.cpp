@@ -68,6 +68,7 @@ struct BenchOptions {
   std::string what;
   std::string set;
   std::string pictures, scene;
+  std::vector<std::string> files;
   std::optional<std::int64_t> runs = 5;
   std::optional<std::int64_t> check = 64;
 };
@@ -77,15 +78,16 @@ struct BenchOptions {
 Command bench_command() {
   return {
       "bench",
-      "Measure the kernel against bare Embree over the same rays, or what inputs and live "
-      "light cost",
+      "Measure the kernel against bare Embree over the same rays, or what inputs, live "
+      "light and models cost",
       "platelight bench kernel --json kernel.json",
       [](Arguments& arguments) -> std::function<void(Console&)> {
         auto o = std::make_shared<BenchOptions>();
         arguments.positional("WHAT", o->what,
                              "kernel, papers (both papers' scenes), drag (a part of them that "
-                             "moves), inputs (plate, "
-                             "probe, light table), or hdr (a live probe's frames)");
+                             "moves), inputs (plate, probe, light table), hdr (a live probe's "
+                             "frames), or load (models)");
+        arguments.repeated("--model", o->files, "load: a model's file; without one, a made one");
         arguments.option("--set", o->set, "the set file whose inputs are measured");
         arguments.option(
             "--pictures", o->pictures,
@@ -103,9 +105,11 @@ Command bench_command() {
             return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene},
                                 console);
           }
+          if (o->what == "load") return bench_load(o->files, runs, console);
           if (o->what != "inputs") {
             throw UsageError(fmt::format(
-                "there is no benchmark of \"{}\": there are kernel, papers, drag, inputs and hdr",
+                "there is no benchmark of \"{}\": there are kernel, papers, drag, inputs, hdr "
+                "and load",
                 o->what));
           }
           if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");

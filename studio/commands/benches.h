@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "studio/console.h"
 
@@ -30,5 +31,10 @@ void bench_inputs(const std::string& set_path, int runs, Console& console);
 // CPU time of a live lightprobe's HDR frame of 1024x1024 pixels, a bracket of five, by the camera's
 // format: from its bytes to light, labelled, and merged; the best of `runs` passes.
 void bench_hdr(int runs, Console& console);
+
+// From a model's file to its first picture at 640x480, one ray a pixel, nothing kept: time and peak
+// memory of each stage, the best of `runs`; each file in turn, or the made headlight as GLB if
+// there is none. Throws as render::load_model.
+void bench_load(std::vector<std::string> files, int runs, Console& console);
 
 }  // namespace studio

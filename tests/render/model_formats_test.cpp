@@ -9,6 +9,7 @@
 #include <assimp/Exporter.hpp>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "render/made_model_file.h"
 #include "render/made_shapes.h"
 #include "render/standard.h"
+#include "tests/made_fbx.h"
 #include "tests/made_files.h"
 
 namespace render {
@@ -100,8 +102,17 @@ aiMaterial* library_material(const char* name, aiColor3D colour, const char* pic
   return material.release();
 }
 
-// The scene as the library has it, in a file of its format `id`.
-std::string export_scene(const fs::path& folder, const char* id, const std::string& name) {
+// The scene in a file of the library's format `id`, or of ours.
+std::string export_scene(const fs::path& folder, const std::string& id, const std::string& name) {
+  fs::copy_file(made::bad_files().parent_path() / "one_texel.png", folder / "paint.png",
+                fs::copy_options::overwrite_existing);
+  const std::string path = folder / name;
+  if (id == "made_fbx") {
+    std::ofstream(path, std::ios::binary)
+        << made::made_fbx({{"box", made_box(), {1, 1, 1}, "paint.png"},
+                           {"wedge", made_wedge(), {0.25, 0.75, 0.5}, ""}});
+    return path;
+  }
   aiScene scene;
   scene.mNumMeshes = 2;
   scene.mMeshes =
@@ -118,10 +129,7 @@ std::string export_scene(const fs::path& folder, const char* id, const std::stri
     node->mMeshes = new unsigned[1]{i};
     scene.mRootNode->addChildren(1, &node);
   }
-  fs::copy_file(made::bad_files().parent_path() / "one_texel.png", folder / "paint.png",
-                fs::copy_options::overwrite_existing);
   Assimp::Exporter exporter;
-  const std::string path = folder / name;
   EXPECT_EQ(exporter.Export(&scene, id, path), aiReturn_SUCCESS) << exporter.GetErrorString();
   return path;
 }
@@ -136,11 +144,11 @@ struct FormatCase {
 };
 
 constexpr FormatCase formats[] = {
-    {"gltf2", "a.gltf", true, true, true},  {"glb2", "a.glb", true, true, true},
-    {"obj", "a.obj", true, true, true},     {"fbxa", "b.fbx", true, true, true, 0.01F},
-    {"x3d", "a.x3d", true, true, true},     {"ply", "a.ply", false, false, false},
-    {"plyb", "b.ply", false, false, false}, {"stl", "a.stl", false, false, false},
-    {"stlb", "b.stl", false, false, false},
+    {"gltf2", "a.gltf", true, true, true},      {"glb2", "a.glb", true, true, true},
+    {"obj", "a.obj", true, true, true},         {"made_fbx", "a.fbx", true, true, true, 0.01F},
+    {"fbxa", "b.fbx", true, true, true, 0.01F}, {"x3d", "a.x3d", true, true, true},
+    {"ply", "a.ply", false, false, false},      {"plyb", "b.ply", false, false, false},
+    {"stl", "a.stl", false, false, false},      {"stlb", "b.stl", false, false, false},
 };
 
 class EveryFormat : public testing::TestWithParam<FormatCase> {};
