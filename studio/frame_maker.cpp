@@ -38,6 +38,15 @@ class StageTimer {
   throw SetError({{set.path, place.line, place.column, message}});
 }
 
+std::shared_ptr<render::Scene> compile(const Set& set, SetScene& described, std::uint64_t version) {
+  described.description.version = version;
+  try {
+    return std::make_shared<render::Scene>(described.description);
+  } catch (const std::invalid_argument& error) {
+    fail(set, {}, error.what());
+  }
+}
+
 std::unique_ptr<Source> open_plate(const Set& set) {
   const CameraSettings& camera = set.camera;
   capture::CameraOptions options;
@@ -137,21 +146,11 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
     rate_ = plate_rate;
   }
   videos_ = std::make_unique<VideoFeed>(set_, plate_->first().time, plate_->is_live());
-  build_scene();
-  light_ = light.get();
-}
-
-void FrameMaker::build_scene() {
-  SetScene described = describe_scene(set_);
-  described.description.version = ++scene_version_;
-  try {
-    scene_ = std::make_shared<render::Scene>(described.description);
-    videos_->place(set_, described);
-    set_scene_ = std::move(described);
-  } catch (const std::invalid_argument& error) {
-    fail(set_, {}, error.what());
-  }
+  set_scene_ = describe_scene(set_);
+  scene_ = compile(set_, set_scene_, ++scene_version_);
+  videos_->place(set_, set_scene_);
   lamps_ = describe_lamps(set_);
+  light_ = light.get();
 }
 
 bool FrameMaker::is_endless() const { return plate_->is_still() || set_.camera.loop; }
@@ -201,6 +200,9 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   const auto [number, time] = due;
   PreparedFrame prepared;
   prepared.arrived = Clock::now();
+  if (change_.valid() && change_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    finish_change();
+  }
 
   std::optional<capture::Frame> frame;
   std::vector<VideoFrame> videos;
@@ -218,7 +220,9 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.sound = plate_->take_sound();
     videos = videos_->at(time);
     prepared.notes = videos_->take_notes();
-    std::ranges::move(std::exchange(set_scene_.notes, {}), std::back_inserter(prepared.notes));
+    for (auto* notes : {&notes_, &set_scene_.notes}) {
+      std::ranges::move(std::exchange(*notes, {}), std::back_inserter(prepared.notes));
+    }
   }
 
   render::FrameJob& job = prepared.job;
@@ -260,6 +264,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
 }
 
 void FrameMaker::move_object(const std::string& name, const PlacementSettings& pose) {
+  finish_change();
   const auto index_of = [&](std::string_view wanted) {
     const auto found = std::ranges::find(set_.objects, wanted, &ObjectSettings::name);
     return static_cast<std::size_t>(found - set_.objects.begin());
@@ -280,12 +285,25 @@ void FrameMaker::move_object(const std::string& name, const PlacementSettings& p
 }
 
 void FrameMaker::change_video(const std::string& name, const std::string& uri) {
+  finish_change();
   videos_->change_source(name, uri);
   const auto video = std::ranges::find(set_.videos, name, &VideoSettings::name);
   if (video != set_.videos.end()) video->source = uri;
 }
 
-void FrameMaker::change_set(Set set) {
+FrameMaker::Change FrameMaker::prepare(Set set, std::uint64_t scene_version) {
+  Change change;
+  change.light = std::make_unique<LightFeed>(set);
+  change.track = track_of(set);
+  change.directions = directions_of(set);
+  change.lens = std::make_shared<calibrate::Lens>(lens_of(set));
+  change.set_scene = describe_scene(set);
+  change.scene = compile(set, change.set_scene, scene_version);
+  change.set = std::move(set);
+  return change;
+}
+
+void FrameMaker::check_change(const Set& set) const {
   const bool same_picture = set.show.width == set_.show.width &&
                             set.show.height == set_.show.height && set.show.fps == set_.show.fps;
   if (!same_picture) {
@@ -294,25 +312,50 @@ void FrameMaker::change_set(Set set) {
   if (!same_plate(set, set_)) {
     throw std::invalid_argument("the plate's source cannot change on air: start anew");
   }
+}
+
+void FrameMaker::take_over(Change change) {
   // All that may fail comes before anything is taken over.
-  auto light = std::make_unique<LightFeed>(set);
-  auto videos = std::make_unique<VideoFeed>(set, std::nullopt, plate_->is_live(), videos_.get());
-  auto track = track_of(set);
-  auto directions = directions_of(set);
-  auto lens = std::make_shared<calibrate::Lens>(lens_of(set));
-  Set before = std::exchange(set_, std::move(set));
-  std::swap(videos_, videos);
+  auto videos =
+      std::make_unique<VideoFeed>(change.set, std::nullopt, plate_->is_live(), videos_.get());
   try {
-    build_scene();
-  } catch (const SetError&) {
-    set_ = std::move(before);
-    std::swap(videos_, videos);
-    throw;
+    videos->place(change.set, change.set_scene);
+  } catch (const std::invalid_argument& error) {
+    fail(change.set, {}, error.what());
   }
-  light_ = std::move(light);
-  track_ = std::move(track);
-  directions_ = std::move(directions);
-  lens_ = std::move(lens);
+  set_ = std::move(change.set);
+  videos_ = std::move(videos);
+  set_scene_ = std::move(change.set_scene);
+  scene_ = std::move(change.scene);
+  lamps_ = describe_lamps(set_);
+  light_ = std::move(change.light);
+  track_ = std::move(change.track);
+  directions_ = std::move(change.directions);
+  lens_ = std::move(change.lens);
+}
+
+void FrameMaker::change_set(Set set) {
+  check_change(set);
+  finish_change();
+  take_over(prepare(std::move(set), ++scene_version_));
+}
+
+void FrameMaker::change_set_beside(Set set) {
+  check_change(set);
+  finish_change();
+  change_ = std::async(std::launch::async, prepare, std::move(set), ++scene_version_);
+}
+
+// Waits for the change that is on its way.
+void FrameMaker::finish_change() {
+  if (!change_.valid()) return;
+  try {
+    take_over(change_.get());
+  } catch (const std::runtime_error& error) {
+    notes_.emplace_back(error.what());
+  } catch (const std::invalid_argument& error) {
+    notes_.emplace_back(error.what());
+  }
 }
 
 }  // namespace studio

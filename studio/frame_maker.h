@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -88,7 +89,10 @@ class FrameMaker {
   // As make(), with a time of its own.
   std::optional<PreparedFrame> make_at(const Due& due);
 
-  void set_effort(const render::Effort& effort) { set_.effort = effort; }
+  void set_effort(const render::Effort& effort) {
+    finish_change();
+    set_.effort = effort;
+  }
   // Throws std::invalid_argument if no object has that name.
   void move_object(const std::string& name, const PlacementSettings& pose);
   // Another source for one of the set's videos. Throws std::invalid_argument if none has that name,
@@ -98,9 +102,26 @@ class FrameMaker {
   // changes nothing if it cannot be used, std::invalid_argument if the picture's size or rate
   // differ.
   void change_set(Set set);
+  // The same, but what takes long, the reading of models above all, is done beside the frames that
+  // follow, and taken over when it is there, or at the next change of anything. What goes wrong by
+  // then is a note of the next frame.
+  void change_set_beside(Set set);
 
  private:
-  void build_scene();
+  // A set that is ready to be taken over.
+  struct Change {
+    Set set;
+    SetScene set_scene;
+    std::shared_ptr<render::Scene> scene;
+    std::unique_ptr<LightFeed> light;
+    std::optional<calibrate::Track> track;
+    std::shared_ptr<const calibrate::DirectionTable> directions;
+    std::shared_ptr<const calibrate::Lens> lens;
+  };
+  static Change prepare(Set set, std::uint64_t scene_version);
+  void check_change(const Set& set) const;
+  void take_over(Change change);
+  void finish_change();
   std::shared_ptr<const capture::HalfImage> half_plate(const capture::Frame& frame);
 
   Set set_;
@@ -115,6 +136,8 @@ class FrameMaker {
   std::shared_ptr<const calibrate::Lens> lens_;
   std::vector<render::LocalLight> lamps_;
   std::uint64_t scene_version_ = 0;
+  std::future<Change> change_;               // on its way
+  std::vector<std::string> notes_;           // for the next frame
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;
   std::shared_ptr<const capture::Image> last_image_;  // that last_plate_ was made from

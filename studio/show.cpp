@@ -212,18 +212,27 @@ class Show::Stages {
     }
   }
 
+  // A live show goes on while models are read; in others frames depend on no timing.
+  void change_set(Set set) {
+    if (options_.live) {
+      maker_.change_set_beside(std::move(set));
+    } else {
+      maker_.change_set(std::move(set));
+    }
+  }
+
   void apply(ShowCommand& command, Work& work) {
     noting([&] {
-      std::visit(Overloaded{[&](const SetEffort& c) { maker_.set_effort(c.effort); },
-                            [&](const StartRecording& c) { work.recorder.emplace_back(c); },
-                            [&](const StopRecording& c) { work.recorder.emplace_back(c); },
-                            [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
-                            [&](const SetView& c) { view_ = c.view; },
-                            [&](const SetVideo& c) { maker_.change_video(c.name, c.uri); },
-                            [&](const SetPaused& c) { paused_ = c.paused; },
-                            [&](ChangeSet& c) { maker_.change_set(std::move(c.set)); },
-                            [](const Quit&) {}},
-                 command);
+      std::visit(
+          Overloaded{[&](const SetEffort& c) { maker_.set_effort(c.effort); },
+                     [&](const StartRecording& c) { work.recorder.emplace_back(c); },
+                     [&](const StopRecording& c) { work.recorder.emplace_back(c); },
+                     [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
+                     [&](const SetView& c) { view_ = c.view; },
+                     [&](const SetVideo& c) { maker_.change_video(c.name, c.uri); },
+                     [&](const SetPaused& c) { paused_ = c.paused; },
+                     [&](ChangeSet& c) { change_set(std::move(c.set)); }, [](const Quit&) {}},
+          command);
     });
   }
 

@@ -7,9 +7,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <thread>
 
+#include "capture/sandbox.h"
 #include "studio/tone_follower.h"
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
@@ -296,6 +299,38 @@ TEST_F(ShowTest, GoesOnWhenAModelCrashesItsReader) {
   EXPECT_THAT(show.status()->notes,
               Contains(AllOf(HasSubstr("crashing.x3d"), HasSubstr("damaged"))));
   EXPECT_THAT(show.status()->notes, Contains(AllOf(HasSubstr("lost.png"), HasSubstr("magenta"))));
+}
+
+TEST_F(ShowTest, GoesOnLiveWhileAModelIsRead) {
+  if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";
+  // In the place of the models' reader, one that waits for the show's fifth frame, and fails.
+  const std::filesystem::path helpers = dir_ / "helpers", fifth = dir_ / "fifth";
+  std::filesystem::create_directory(helpers);
+  std::filesystem::create_symlink(capture::helper_path("platelight-decode"),
+                                  helpers / "platelight-decode");
+  std::ofstream(helpers / "platelight-model")
+      << "#!/bin/sh\nwhile [ ! -e " << fifth.string() << " ]; do sleep 0.01; done\n";
+  std::filesystem::permissions(helpers / "platelight-model", std::filesystem::perms::owner_all);
+  Set changed = made_set("grey:100000,25,0");
+  ShowOptions options;
+  options.live = true;
+  options.frames = 400;
+  Show show(changed, options);
+  changed.objects.resize(1);
+  changed.objects[0].made.clear();
+  changed.objects[0].mesh = (dir_ / "waiting.obj").string();
+  std::ofstream(changed.objects[0].mesh) << "v 0 0 0\n";
+  setenv("PLATELIGHT_HELPERS", helpers.c_str(), 1);
+  show.post(ChangeSet{changed});
+  int frames = 0;
+  show.run([&](const ShownFrame&) {
+    if (++frames == 5) std::ofstream(fifth) << "now";
+    if (!show.status()->notes.empty()) show.post(Quit{});
+  });
+  unsetenv("PLATELIGHT_HELPERS");
+  EXPECT_GT(frames, 5);
+  EXPECT_THAT(show.status()->notes,
+              Contains(AllOf(HasSubstr("waiting.obj"), HasSubstr("went wrong"))));
 }
 
 TEST_F(ShowTest, RecordsFromOneFrameToAnother) {
