@@ -147,6 +147,7 @@ void bench_load(std::vector<std::string> files, int runs, Console& console) {
       keep_best(best.compile, next.compile);
       keep_best(best.frame, next.frame);
     }
+    // The system counts what we had taken when it began as the helper's.
     rusage helpers{};
     getrusage(RUSAGE_CHILDREN, &helpers);
     const double reader_mb = static_cast<double>(helpers.ru_maxrss) / 1024;
@@ -157,7 +158,7 @@ void bench_load(std::vector<std::string> files, int runs, Console& console) {
       console.say(fmt::format("  {:12} {:6.2f} s, {:6.2f} s of processor, peak {:5.0f} MB", name,
                               stage.wall_s, stage.processor_s, stage.peak_mb));
     }
-    console.say(fmt::format("  its reader took up to {:.0f} MB, and has ended", reader_mb));
+    console.say(fmt::format("  its reader took at most {:.0f} MB, and has ended", reader_mb));
     rows.push_back({{"file", file},
                     {"triangles", best.report.triangles},
                     {"vertices", best.report.vertices},
