@@ -97,6 +97,10 @@ HitPoint Scene::Impl::hit_point(
     p2 = transform_point(matrix, p2);
   }
   hit.position = p0 * w + p1 * u + p2 * v;
+  for (const Vec3f& corner : {p0, p1, p2}) {
+    hit.largest_coordinate = std::max(
+        {hit.largest_coordinate, std::abs(corner.x), std::abs(corner.y), std::abs(corner.z)});
+  }
   const Vec3f area = cross(p1 - p0, p2 - p0);
   const float double_area = length(area);
   hit.geometric_normal = double_area > 0 ? area * (1 / double_area) : -incoming;

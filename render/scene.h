@@ -73,7 +73,8 @@ struct HitPoint {
   Vec3f edge;
   float turn_along = 0, turn_across = 0, turn_both = 0;
   bool back = false;  // the side that the triangle's corners run clockwise on: from inside a body
-  float uv_per_metre = 0;  // texture coordinate units per metre of surface, for mip levels
+  float uv_per_metre = 0;        // texture coordinate units per metre of surface, for mip levels
+  float largest_coordinate = 0;  // of the triangle's corners: its rounding is the hit's
   std::uint32_t material = 0;
   std::uint32_t instance = 0;
 };

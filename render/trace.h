@@ -28,7 +28,8 @@ std::optional<TracedHit> closest_hit(
 Vec3f transmittance(
     const Scene& scene, Vec3f origin, Vec3f direction, float near_m, float far_m, unsigned mask);
 
-// A start point moved off the surface, against hitting it again: scaled to the size of coordinates.
+// A start point moved off the surface, against hitting it again: scaled to the size of coordinates,
+// the point's and its triangle's.
 Vec3f offset_origin(const HitPoint& hit, Vec3f direction);
 
 }  // namespace render

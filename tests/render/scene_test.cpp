@@ -181,6 +181,38 @@ TEST(Scene, LetsTintedLightThroughGlassAndNoneThroughPaint) {
   EXPECT_EQ(transmittance(blocked, {0.3F, 0.1F, 0}, {0, 0, 1}, 0, ray_far, ~0U), Vec3f{});
 }
 
+// A large square through the origin, however it leans: there coordinates are small, its own are
+// not.
+TEST(OffsetOrigin, LeavesALeaningTriangleAlsoNearTheOrigin) {
+  std::mt19937 engine(9);
+  std::normal_distribution<float> random;
+  int met = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    SceneDescription description = one_square();
+    const Vec3f z = normalize(Vec3f{random(engine), random(engine), random(engine)});
+    const Vec3f x = normalize(cross(z, Vec3f{random(engine), random(engine), random(engine)}));
+    const Vec3f y = cross(z, x);
+    const float size = trial % 2 == 0 ? 1.0F : 30.0F;
+    auto mesh = std::make_shared<Mesh>(*description.meshes[0]);
+    for (Vec3f& p : mesh->positions) p = (x * p.x + y * p.y) * size;
+    description.meshes[0] = mesh;
+    const Scene scene(description);
+    for (int i = 0; i < 50; ++i) {
+      const Vec3f from = z * 2 + x * (0.01F * random(engine)), to = y * (0.01F * random(engine));
+      const auto hit = closest_hit(scene, from, normalize(to - from), 0, ~0U, RayKind::camera);
+      ASSERT_TRUE(hit);
+      const HitPoint point = scene.hit_point(hit->geom_id, hit->prim_id, hit->inst_id, hit->u,
+                                             hit->v, normalize(to - from));
+      Vec3f away = normalize(Vec3f{random(engine), random(engine), random(engine)});
+      if (dot(away, point.geometric_normal) < 0) away = -away;
+      const Vec3f origin = offset_origin(point, away);
+      met += closest_hit(scene, origin, away, 0, ~0U, RayKind::reflection).has_value();
+      EXPECT_LT(length(origin - point.position), 1e-4F);
+    }
+  }
+  EXPECT_EQ(met, 0);
+}
+
 TEST(Scene, RefusesWhatDoesNotFitTogether) {
   const auto refuse = [](auto&& change) {
     SceneDescription scene = one_square();
