@@ -144,8 +144,9 @@ BenchScene make_bench_scene(int width, int height, BenchFinish finish) {
   BenchScene shot;
   shot.scene = std::make_unique<render::Scene>(describe(finish));
   const double focal_px = width * 1.32;
-  shot.directions = calibrate::make_direction_table(
-      {"pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}});
+  shot.lens = {
+      "pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}};
+  shot.directions = calibrate::make_direction_table(shot.lens);
   shot.environment = make_bench_sky({});
   shot.plate = make_plate(width, height);
   shot.half_plate = capture::to_half(shot.plate);

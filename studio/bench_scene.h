@@ -19,7 +19,8 @@ namespace studio {
 // stand-in that catches its shadow, nearly all the rest.
 struct BenchScene {
   std::unique_ptr<render::Scene> scene;
-  calibrate::DirectionTable directions;
+  calibrate::Lens lens;                  // a pinhole
+  calibrate::DirectionTable directions;  // of it
   render::Environment environment;
   capture::Image plate;                               // (height, width, 3)
   capture::HalfImage half_plate;                      // the same

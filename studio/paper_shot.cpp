@@ -66,8 +66,9 @@ PaperShot make_paper_shot(std::string_view name, int width, int height) {
   made.compile_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   const double focal_px = 0.5 * width / std::tan(0.5 * paper.horizontal_view_rad);
-  shot.directions = calibrate::make_direction_table(
-      {"pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}});
+  shot.lens = {
+      "pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}};
+  shot.directions = calibrate::make_direction_table(shot.lens);
   render::LightFollower follower;
   BenchLight light =
       follow_bench_sky(follower, paper.environment, {.count = render::Effort{}.light_samples});

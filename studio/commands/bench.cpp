@@ -1,6 +1,7 @@
 // platelight bench: ratios to a limit, both measured in one process.
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <string>
@@ -71,6 +72,7 @@ struct BenchOptions {
   std::vector<std::string> files;
   std::optional<std::int64_t> runs = 5;
   std::optional<std::int64_t> check = 64;
+  std::optional<std::int64_t> converged = 1024;
 };
 
 }  // namespace
@@ -83,18 +85,22 @@ Command bench_command() {
       "platelight bench kernel --json kernel.json",
       [](Arguments& arguments) -> std::function<void(Console&)> {
         auto o = std::make_shared<BenchOptions>();
-        arguments.positional("WHAT", o->what,
-                             "kernel, papers (both papers' scenes), drag (a part of them that "
-                             "moves), inputs (plate, probe, light table), hdr (a live probe's "
-                             "frames), or load (models)");
+        arguments.positional(
+            "WHAT", o->what,
+            "kernel, papers (both papers' scenes), drag (a part of them that moves), cycles (the "
+            "same pictures in Blender's Cycles), inputs (plate, probe, light table), hdr (a live "
+            "probe's frames), or load (models)");
         arguments.repeated("--model", o->files, "load: a model's file; without one, a made one");
         arguments.option("--set", o->set, "the set file whose inputs are measured");
         arguments.option(
             "--pictures", o->pictures,
-            "papers: a directory for pictures of every scene: itself, and depth and rays by pixel");
-        arguments.option("--scene", o->scene, "papers, drag: only this one");
+            "papers: a directory for pictures of every scene: itself, and depth and rays by pixel; "
+            "cycles: for the scenes as files and all pictures");
+        arguments.option("--scene", o->scene, "papers, drag, cycles: only this one");
         arguments.option("--check-error", o->check, 0, 65536,
-                         "papers: paths a pixel of the reference; 0 = none");
+                         "papers, cycles: paths a pixel of the reference; 0 = none");
+        arguments.option("--converged", o->converged, 2, 65536,
+                         "cycles: samples a pixel of Cycles' own converged picture");
         arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
         return [o](Console& console) {
           const int runs = static_cast<int>(*o->runs);
@@ -106,10 +112,16 @@ Command bench_command() {
                                 console);
           }
           if (o->what == "load") return bench_load(o->files, runs, console);
+          if (o->what == "cycles") {
+            if (o->pictures.empty()) throw UsageError("bench cycles needs a place: --pictures DIR");
+            return bench_cycles({o->pictures, runs, std::max(1, static_cast<int>(*o->check)),
+                                 static_cast<int>(*o->converged), o->scene},
+                                console);
+          }
           if (o->what != "inputs") {
             throw UsageError(fmt::format(
-                "there is no benchmark of \"{}\": there are kernel, papers, drag, inputs, hdr "
-                "and load",
+                "there is no benchmark of \"{}\": there are kernel, papers, drag, cycles, inputs, "
+                "hdr and load",
                 o->what));
           }
           if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");

@@ -24,6 +24,18 @@ void bench_papers(const PapersBench& bench, Console& console);
 // then left alone, as a live show does it: when it shows, what a frame takes, when it is sharp.
 void bench_drag(const std::string& scene, Console& console);
 
+struct CyclesBench {
+  std::string
+      directory;         // for the scenes as files, both renderers' pictures, and what Blender says
+  int runs = 5;          // of each of our points: the best counts
+  int check = 256;       // paths a pixel of each of our two references
+  int converged = 1024;  // samples of each of Cycles' two
+  std::string scene;     // this one only; "" = all
+};
+// The scenes of peer_scene.h in Blender's Cycles and here: how far the converged pictures are
+// apart, and error against time of both. Throws std::runtime_error if Blender is missing or fails.
+void bench_cycles(const CyclesBench& bench, Console& console);
+
 // CPU time a frame that a set's inputs take: plate, probe, light table; the best of `runs` passes.
 // Throws SetError.
 void bench_inputs(const std::string& set_path, int runs, Console& console);

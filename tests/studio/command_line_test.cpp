@@ -75,7 +75,7 @@ TEST_F(CommandLine, NamesACommandThatItDoesNotKnow) {
 }
 
 TEST_F(CommandLine, RefusesABenchmarkWithoutItsSubject) {
-  for (const char* words : {"bench wheels", "bench inputs"}) {
+  for (const char* words : {"bench wheels", "bench inputs", "bench cycles"}) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.status, 2) << words;
     expect_one_line(outcome.err);
