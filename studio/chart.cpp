@@ -92,7 +92,7 @@ void mark_front(Chart& chart) {
         !point.peer && std::ranges::none_of(chart.points, [&](const ChartPoint& other) {
           const bool no_worse = other.time_ms <= point.time_ms && other.error <= point.error;
           const bool better = other.time_ms < point.time_ms || other.error < point.error;
-          return !other.peer && no_worse && better;
+          return !other.peer && other.scene == point.scene && no_worse && better;
         });
   }
 }
@@ -105,6 +105,7 @@ std::string chart_json(const Chart& chart) {
     Json point{{"method", p.method},    {"peer", p.peer},   {"settings", settings},
                {"time_ms", p.time_ms},  {"error", p.error}, {"error_p99", p.error_p99},
                {"on_front", p.on_front}};
+    if (!p.scene.empty()) point["scene"] = p.scene;
     for (const auto& [name, value] : p.figures) point[name] = value;
     points.push_back(std::move(point));
   }
@@ -117,6 +118,7 @@ std::string chart_json(const Chart& chart) {
            {"error", sample.error},
            {"reported_error", sample.reported_error ? Json(*sample.reported_error) : Json(nullptr)},
            {"status", sample.status}});
+      for (const auto& [name, value] : sample.figures) samples.back()[name] = value;
     }
     Json stressor{{"stressor", s.stressor}, {"unit", s.unit}, {"samples", samples}};
     if (s.floor > 0) stressor["floor"] = s.floor;
@@ -143,12 +145,15 @@ std::string chart_json(const Chart& chart) {
 std::string chart_csv(const Chart& chart) {
   const std::vector<std::string> settings = names_of(chart.points, &ChartPoint::settings);
   const std::vector<std::string> figures = names_of(chart.points, &ChartPoint::figures);
-  std::string csv = "method,peer";
+  const bool scenes =
+      std::ranges::any_of(chart.points, [](const ChartPoint& p) { return !p.scene.empty(); });
+  std::string csv = scenes ? "scene,method,peer" : "method,peer";
   for (const std::string& name : settings) csv += "," + csv_cell(name);
   csv += ",time_ms,error,error_p99";
   for (const std::string& name : figures) csv += "," + csv_cell(name);
   csv += ",on_front\n";
   for (const ChartPoint& p : chart.points) {
+    if (scenes) csv += csv_cell(p.scene) + ",";
     csv += csv_cell(p.method) + "," + csv_cell(p.peer);
     for (const std::string& name : settings) csv += "," + csv_cell_of(p.settings, name);
     csv += "," + csv_cell(p.time_ms) + "," + csv_cell(p.error) + "," + csv_cell(p.error_p99);

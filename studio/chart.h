@@ -13,6 +13,8 @@ using ChartValue = std::variant<bool, double, std::string>;
 
 // One measured setting of one method.
 struct ChartPoint {
+  std::string scene;    // what it was measured on; those of different scenes do not compete. "" =
+                        // there is one scene
   std::string method;   // "split", "median cut": one colour and one legend line each
   std::string variant;  // of the method: "adaptive grid": one mark each; "" = there are none
   bool peer = false;    // another tool's
@@ -31,6 +33,8 @@ struct StressorSample {
   double error = 0;
   std::optional<double> reported_error;  // what the method expected of itself
   std::string status;                    // "ok", "refused", "failed"
+  std::string label{};                   // a few characters beside the mark; "" = none
+  std::vector<std::pair<std::string, double>> figures{};  // what else was measured
 };
 
 // Error while one circumstance gets worse and worse.
@@ -52,6 +56,7 @@ struct FigurePanel {
   // Against another figure than time, and its axis's name.
   std::string across{};
   std::string across_name{};
+  std::string scene{};  // of this one's points alone; "" = of all
 };
 
 // What an error is made of: it falls from step to step as one thing after the other is made true.
@@ -80,15 +85,17 @@ struct Chart {
   std::vector<ErrorSteps> steps;
 };
 
-// Marks the points of our own that no other of our own beats in both time and error.
+// Marks the points of our own that no other of our own on the same scene beats in both time and
+// error.
 void mark_front(Chart& chart);
 
 // The chart as scripts read it, with the machine that measured it: design's `chart STAGE --json`.
 std::string chart_json(const Chart& chart);
-// One row a point: method, peer, every setting and figure that any point has, time, errors, front.
+// One row a point: its scene, if there are several, method, peer, every setting and figure that any
+// point has, time, errors, front.
 std::string chart_csv(const Chart& chart);
-// The picture: error against time on logarithmic axes, then a smaller one for each figure, split
-// into steps and stressor. The same chart always gives the same text.
+// The picture: error against time on logarithmic axes, for each scene, then a smaller one for each
+// figure, split into steps and stressor. The same chart always gives the same text.
 std::string chart_svg(const Chart& chart);
 
 // Writes STAGE.json, .csv, .svg and .png into a directory, which is made if need be. Throws

@@ -8,19 +8,38 @@
 #include <fmt/format.h>
 
 #include "studio/paper_shot.h"
+#include "studio/picture_error.h"
 
 namespace studio {
 namespace {
 
 // Closer to the whole tree of rays than any setting that is charted.
 constexpr float whole_tree = 0.9999F;
+// Camera rays along a pixel's side: each in the middle of its part, so that all of the pixel is
+// seen, as the reference sees it, and nothing adapts to what they meet.
+constexpr int rays_across = 4;
+
+// The mean of every rays_across x rays_across pixels.
+capture::Image averaged(const capture::Image& fine) {
+  capture::Image image =
+      capture::make_image(fine.height / rays_across, fine.width / rays_across, fine.channels);
+  constexpr float share = 1.0F / (rays_across * rays_across);
+  for (int y = 0; y < image.height * rays_across; ++y) {
+    for (int x = 0; x < image.width * rays_across; ++x) {
+      for (int c = 0; c < image.channels; ++c) {
+        image.at(y / rays_across, x / rays_across, c) += share * fine.at(y, x, c);
+      }
+    }
+  }
+  return image;
+}
 
 class GlassChart {
  public:
   GlassChart(const ChartRequest& request, Console& console)
       : quick_(request.quick),
-        width_(quick_ ? 64 : 320),
-        height_(quick_ ? 48 : 240),
+        width_(quick_ ? 48 : 240),
+        height_(quick_ ? 36 : 180),
         console_(console) {}
 
   Chart measure() {
@@ -28,20 +47,29 @@ class GlassChart {
     chart.stage = "glass";
     chart.title = "Glass: error against time";
     chart.subtitle = fmt::format(
-        "{}x{}, 16 camera rays in pixels with an edge, one in others; error against the same "
-        "camera rays followed to an accuracy of {} %.",
-        width_, height_, "99.99");
+        "{}x{}, {} camera rays in every pixel; error against the same rays followed to an accuracy "
+        "of {} %, and against the path-traced reference.",
+        width_, height_, rays_across * rays_across, "99.99");
     chart.error_name = "relative RMS error of cutting rays";
-    chart.variant_name = "what a cut ray sees";
     const std::vector<std::string_view> scenes =
         quick_ ? std::vector<std::string_view>{"glass_sphere"}
                : std::vector<std::string_view>{"headlight", "glass_sphere"};
-    double done = 0;
-    for (const std::string_view scene : scenes) {
-      console_.progress(done++ / static_cast<double>(scenes.size()), scene);
-      add_scene(scene, chart);
+    for (std::size_t i = 0; i < scenes.size(); ++i) {
+      add_scene(scenes[i], static_cast<double>(i) / static_cast<double>(scenes.size()),
+                1.0 / static_cast<double>(scenes.size()), chart);
     }
-    chart.panels.push_back({"99th percentile of the error", {{"error_p99", ""}}});
+    for (const std::string_view scene : scenes) {
+      chart.panels.push_back({fmt::format("error against the reference, {}", scene),
+                              {{"error_against_reference", ""}},
+                              {},
+                              {},
+                              std::string(scene)});
+      chart.panels.push_back({fmt::format("99th percentile of the error, {}", scene),
+                              {{"error_p99", ""}},
+                              {},
+                              {},
+                              std::string(scene)});
+    }
     return chart;
   }
 
@@ -60,12 +88,13 @@ class GlassChart {
     render_frame(shot.inputs(), job, shot.half_plate, result);
     const std::chrono::duration<double, std::milli> taken =
         std::chrono::steady_clock::now() - start;
-    return {capture::to_float(result.rgba), result.statistics, taken.count()};
+    return {averaged(capture::to_float(result.rgba)), result.statistics, taken.count()};
   }
 
-  // The same camera rays at any accuracy: nothing that adapts to what they see.
+  // The same camera rays at any accuracy.
   static render::Effort effort_of(float accuracy, bool dark, int max_depth) {
     render::Effort effort;
+    effort.aa_samples = 1;
     effort.aa_tolerance = effort.glint_contrast = 0;
     effort.accuracy = accuracy;
     effort.dark_cuts = dark;
@@ -73,30 +102,48 @@ class GlassChart {
     return effort;
   }
 
-  void add_scene(std::string_view name, Chart& chart) const {
+  Truth truth_of_scene(std::string_view name) const {
     const BenchScene shot = make_paper_shot(name, width_, height_).shot;
+    return truth_of(shot.plate, [&](std::uint32_t seed) {
+      return render_reference(shot.inputs(), shot.job, shot.plate,
+                              {.samples = quick_ ? 16 : 64, .seed = seed});
+    });
+  }
+
+  void add_scene(std::string_view name, double from, double share, Chart& chart) const {
+    const auto progress = [&](double done, std::string_view what) {
+      console_.progress(from + share * done, fmt::format("{}: {}", name, what));
+    };
+    progress(0, "reference");
+    const Truth truth = truth_of_scene(name);
+    progress(0.3, "all rays");
+    const BenchScene shot = make_paper_shot(name, width_ * rays_across, height_ * rays_across).shot;
     const Shown whole = render(shot, effort_of(whole_tree, false, 64));
-    const capture::Image mask = render::affected_mask(whole.picture, shot.plate);
     const auto error_of = [&](const Shown& shown) {
-      return render::picture_error(shown.picture, whole.picture, mask);
+      return render::picture_error(shown.picture, whole.picture, truth.mask);
+    };
+    const auto error_against_reference = [&](const Shown& shown) {
+      return render::picture_error(shown.picture, truth.references, truth.mask).relative_rms;
     };
     const std::vector<float> accuracies =
         quick_ ? std::vector{0.8F, 0.95F} : std::vector{0.8F, 0.9F, 0.95F, 0.97F, 0.99F, 0.999F};
     for (const bool dark : {false, true}) {
       for (const float accuracy : accuracies) {
+        progress(dark ? 0.7 : 0.5, "accuracy");
         const Shown shown = render(shot, effort_of(accuracy, dark, 64));
         const render::PictureError error = error_of(shown);
         ChartPoint point;
-        point.method = name;
-        point.variant = dark ? "nothing" : "the environment";
+        point.scene = name;
+        point.method = dark ? "cut rays see nothing" : "cut rays see the environment";
         point.settings = {{"accuracy", double{accuracy}}, {"dark_cuts", dark}};
         point.time_ms = shown.time_ms;
         point.error = error.relative_rms;
         point.error_p99 = error.p99;
-        const double pixels = width_ * height_;
+        const double rays = width_ * height_ * rays_across * rays_across;
         point.figures = {
-            {"secondary_rays", static_cast<double>(shown.statistics.secondary_rays) / pixels},
-            {"shadow_rays", static_cast<double>(shown.statistics.shadow_rays) / pixels},
+            {"error_against_reference", error_against_reference(shown)},
+            {"secondary_rays", static_cast<double>(shown.statistics.secondary_rays) / rays},
+            {"shadow_rays", static_cast<double>(shown.statistics.shadow_rays) / rays},
             {"depth_limit_hits", static_cast<double>(shown.statistics.depth_limit_hits)}};
         point.by_default = !dark && accuracy == render::Effort{}.accuracy;
         point.label = fmt::format("{:.3g} %", 100 * accuracy);
@@ -106,11 +153,16 @@ class GlassChart {
     Stressor depth;
     depth.stressor = fmt::format("deepest ray, {}", name);
     for (const int limit : {1, 2, 4, 8, 16, 32, 64}) {
+      progress(0.9, "depth");
       const Shown shown = render(shot, effort_of(0.99F, false, limit));
       depth.samples.push_back(
           {static_cast<double>(limit), error_of(shown).relative_rms, std::nullopt,
            shown.statistics.depth_limit_hits > 0 ? "some rays ended by the limit" : "ok"});
+      depth.samples.back().figures = {{"error_against_reference", error_against_reference(shown)}};
     }
+    // What is left of the error against the reference, whatever rays are followed: the grid of
+    // camera rays, the table's lights, filters.
+    depth.samples.back().figures.emplace_back("error_of_all_rays", error_against_reference(whole));
     chart.stressors.push_back(std::move(depth));
   }
 

@@ -92,6 +92,26 @@ TEST(MarkFront, KeepsWhatNothingOfOursBeats) {
   }
 }
 
+TEST(MarkFront, KeepsAFrontForEveryScene) {
+  Chart chart = made_chart();
+  const std::size_t points = chart.points.size();
+  for (std::size_t i = 0; i < points; ++i) {
+    ChartPoint slower = chart.points[i];
+    chart.points[i].scene = "car";
+    slower.scene = "headlight";
+    slower.time_ms *= 10;
+    slower.error *= 3;
+    chart.points.push_back(slower);
+  }
+  mark_front(chart);
+  for (std::size_t i = 0; i < points; ++i) {
+    EXPECT_EQ(chart.points[i].on_front, chart.points[points + i].on_front);
+  }
+  EXPECT_EQ(nlohmann::json::parse(chart_json(chart))["points"][points]["scene"], "headlight");
+  EXPECT_TRUE(chart_csv(chart).starts_with("scene,method,peer,"));
+  EXPECT_THAT(chart_svg(chart), HasSubstr(">headlight<"));
+}
+
 TEST(ChartSvg, IsTheSameTextEveryTime) {
   EXPECT_EQ(chart_svg(made_chart()), chart_svg(made_chart()));
 }

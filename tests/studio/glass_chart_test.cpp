@@ -3,10 +3,18 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/studio/quick_chart.h"
 
 namespace studio {
 namespace {
+
+double against_reference(const ChartPoint& p) {
+  const auto found = std::ranges::find(p.figures, "error_against_reference",
+                                       &std::pair<std::string, double>::first);
+  return found == p.figures.end() ? -1 : found->second;
+}
 
 TEST(GlassChart, ErrsLessTheFurtherRaysAreFollowedAndLessThanWithDarkCuts) {
   const Chart chart = measure_quickly(glass_chart());
@@ -17,7 +25,13 @@ TEST(GlassChart, ErrsLessTheFurtherRaysAreFollowedAndLessThanWithDarkCuts) {
   EXPECT_LT(p[0].error, p[2].error);
   EXPECT_LT(p[1].error, p[3].error);
   EXPECT_LT(p[1].error, 0.05);
-  for (const ChartPoint& point : p) EXPECT_GT(point.time_ms, 0);
+  for (const ChartPoint& point : p) {
+    EXPECT_GT(point.time_ms, 0);
+    EXPECT_EQ(point.scene, "glass_sphere");
+    EXPECT_GT(against_reference(point), 0);
+    EXPECT_LT(against_reference(point), point.error + 0.15) << "what is no cut";
+  }
+  EXPECT_LT(against_reference(p[1]), against_reference(p[2]));
 
   ASSERT_EQ(chart.stressors.size(), 1U);
   const auto& depths = chart.stressors[0].samples;
