@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "render/area_light.h"
-#include "render/paper_scenes.h"
 #include "render/standard.h"
 #include "render/texture.h"
 
@@ -20,8 +19,9 @@ constexpr float screen_white = 3;
 constexpr float from_walls = 0.1F;
 
 // Makes the picture on an object a video that lights its surroundings, by 5x5 lamps as the paper
-// has it. Returns the lamps of its one frame.
+// has it, or as many as given. Returns the lamps of its one frame.
 std::vector<render::LocalLight> light_by(const std::string& object,
+                                         std::array<int, 2> lamps,
                                          render::SceneDescription& scene,
                                          render::VideoTexture& video) {
   const auto instance = std::ranges::find(scene.instances, object, &render::Instance::name);
@@ -45,19 +45,25 @@ std::vector<render::LocalLight> light_by(const std::string& object,
   p.emission_video = 0;
   p.emission_gain = screen_white;
   screen = make_standard_material(screen.name, p);
-  const render::AreaLight light = sample_area_light(scene, index, material, {5, 5});
+  const render::AreaLight light = sample_area_light(scene, index, material, lamps);
   return lamps_of(light, video, {{screen_white, screen_white, screen_white}, from_walls});
 }
 
 }  // namespace
 
 PaperShot make_paper_shot(std::string_view name, int width, int height) {
-  render::PaperScene paper = render::made_paper_scene(name);
+  return make_paper_shot(render::made_paper_scene(name), width, height);
+}
+
+PaperShot make_paper_shot(render::PaperScene paper,
+                          int width,
+                          int height,
+                          std::array<int, 2> screen_lamps) {
   PaperShot made;
   BenchScene& shot = made.shot;
   if (!paper.lit_by.empty()) {
     auto video = std::make_unique<render::VideoTexture>();
-    paper.lamps = light_by(paper.lit_by, paper.scene, *video);
+    paper.lamps = light_by(paper.lit_by, screen_lamps, paper.scene, *video);
     shot.video = std::move(video);
     shot.videos = {shot.video.get()};
   }

@@ -8,7 +8,9 @@
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "studio/charts/screen_lamps.h"
 #include "tests/studio/quick_chart.h"
 
 namespace studio {
@@ -21,38 +23,47 @@ const Chart& quick_chart() {
 
 double lights_of(const ChartPoint& p) { return std::get<double>(p.settings.at(0).second); }
 
-double figure(const ChartPoint& p, const std::string& name) {
-  const auto found = std::ranges::find(p.figures, name, &std::pair<std::string, double>::first);
-  return found == p.figures.end() ? -1 : found->second;
+// All but the screens' lamps, which have tests of their own.
+std::vector<ChartPoint> points_of_tables() {
+  std::vector<ChartPoint> points = quick_chart().points;
+  std::erase_if(points, [](const ChartPoint& p) { return p.method == "lamps on a screen"; });
+  return points;
+}
+
+double figure(const std::vector<std::pair<std::string, double>>& figures, const std::string& name) {
+  const auto found = std::ranges::find(figures, name, &std::pair<std::string, double>::first);
+  return found == figures.end() ? -1 : found->second;
 }
 
 // Tests run in processes of their own, and each takes the whole chart: this one looks at all
 // points.
 TEST(LightsChart, HasEveryMethodErringLessWithMoreLightsAndCalmWhereLightIsFollowed) {
   std::map<std::string, std::set<std::string>> variants;
-  for (const ChartPoint& p : quick_chart().points) {
+  const std::vector<ChartPoint> points = points_of_tables();
+  for (const ChartPoint& p : points) {
     EXPECT_EQ(p.peer, p.method == "per-pixel importance sampling");
     EXPECT_GT(p.error, 0);
     EXPECT_GT(p.error_p99, 0);
-    EXPECT_GT(figure(p, "flicker"), 0);
+    EXPECT_GT(figure(p.figures, "flicker"), 0);
     variants[p.method].insert(p.variant);
   }
   EXPECT_EQ(variants.size(), 3U);
   for (const char* method : {"split", "median cut"}) {
     EXPECT_EQ(variants[method].size(), 4U) << method;
   }
-  EXPECT_EQ(std::ranges::count(quick_chart().points, true, &ChartPoint::by_default), 1);
+  EXPECT_EQ(std::ranges::count(points, true, &ChartPoint::by_default), 1);
 
   std::map<std::string, std::map<double, double>> errors;
-  for (const ChartPoint& p : quick_chart().points) {
+  for (const ChartPoint& p : points) {
     if (p.peer || p.variant == "every pixel") errors[p.method][lights_of(p)] = p.error;
   }
   for (const auto& [method, by_lights] : errors) {
     EXPECT_LT(by_lights.rbegin()->second, by_lights.begin()->second / 2) << method;
   }
-  for (const ChartPoint& p : quick_chart().points) {
+  for (const ChartPoint& p : points) {
     if (p.peer) continue;
-    EXPECT_LT(figure(p, "flicker_followed"), figure(p, "flicker") / 10) << p.method << p.label;
+    EXPECT_LT(figure(p.figures, "flicker_followed"), figure(p.figures, "flicker") / 10)
+        << p.method << p.label;
   }
 }
 
@@ -70,8 +81,40 @@ TEST(LightsChart, ExpectsMoreErrorThanThereIsUnderEverySkyAndNumberOfLights) {
       ++swept;
     }
   }
-  EXPECT_GE(swept, 15);
+  EXPECT_GE(swept, 19);
   EXPECT_GT(worst, 0.1) << "the sweep must go to where the table fails";
+
+  // So lights that are chosen for an error bound keep it.
+  const auto bounds = std::ranges::find_if(quick_chart().stressors, [](const Stressor& s) {
+    return s.stressor.starts_with("error bound");
+  });
+  ASSERT_NE(bounds, quick_chart().stressors.end());
+  double before = 1e9;
+  for (const StressorSample& s : bounds->samples) {
+    EXPECT_EQ(s.status, "ok") << s.value;
+    EXPECT_LE(s.error, s.value);
+    const double lights = figure(s.figures, "lights"), needed = figure(s.figures, "lights_needed");
+    EXPECT_LT(lights, before) << "a wider bound takes fewer";
+    EXPECT_LE(needed, lights);
+    EXPECT_GT(needed, 0);
+    before = lights;
+  }
+}
+
+TEST(LightsChart, HasScreensErringLessWithMoreLampsAndLittleByDefault) {
+  std::map<std::string, std::map<double, double>> errors;
+  Chart chart;
+  add_screen_lamps(true, chart);
+  for (const ChartPoint& p : chart.points) {
+    errors[p.scene + p.variant][lights_of(p)] = p.error;
+    EXPECT_GT(figure(p.figures, "still_ms"), 0);
+  }
+  ASSERT_EQ(errors.size(), 3U) << "the bare floor, and the room with two kinds of shadow rays";
+  // In the room, what stands just below the screen sees its lamps one by one.
+  for (const auto& [scene, by_lamps] : errors) EXPECT_LT(by_lamps.at(25), by_lamps.at(1)) << scene;
+  const auto& closed_form = errors.rbegin()->second;
+  EXPECT_LT(closed_form.at(25), 0.005);
+  EXPECT_LT(closed_form.at(25), closed_form.at(1) / 10);
 }
 
 }  // namespace

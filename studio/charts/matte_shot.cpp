@@ -1,0 +1,49 @@
+// The matte car.
+#include "studio/charts/matte_shot.h"
+
+#include "render/sampled_light.h"
+
+namespace studio {
+
+BenchLight light_of(const render::Environment& sky, const render::LightTableSettings& settings) {
+  render::LightFollower follower;
+  return follow_bench_sky(follower, sky, settings);
+}
+
+render::PictureError error_of(const capture::Image& picture, const Truth& truth) {
+  return render::picture_error(picture, truth.references, truth.mask);
+}
+
+MatteShot::MatteShot(int width, int height)
+    : shot_(make_bench_scene(width, height, BenchFinish::matte)) {
+  shot_.job.effort.aa_samples = 1;
+}
+
+capture::Image MatteShot::render(const BenchLight& light, const Visibility& visibility) {
+  render::FrameJob job = shot_.job;
+  job.effort.light_samples = static_cast<int>(light.table.lights.size());
+  job.effort.adaptive_visibility = visibility.adaptive;
+  job.effort.interleave = visibility.interleave;
+  job.lights = light.table;
+  render_frame(inputs(light.environment), job, shot_.half_plate, result_);
+  return capture::to_float(result_.rgba);
+}
+
+capture::Image MatteShot::render_sampled(const render::Environment& sky,
+                                         int samples,
+                                         std::uint32_t seed) {
+  return render_sampled_light(inputs(sky), shot_.job, shot_.plate, {samples, seed});
+}
+
+Truth MatteShot::truth(const render::Environment& sky, int samples) {
+  return truth_of(shot_.plate,
+                  [&](std::uint32_t seed) { return render_sampled(sky, samples / 2, seed); });
+}
+
+render::FrameInputs MatteShot::inputs(const render::Environment& environment) const {
+  render::FrameInputs inputs = shot_.inputs();
+  inputs.environment = &environment;
+  return inputs;
+}
+
+}  // namespace studio
