@@ -8,12 +8,13 @@
 #include "studio/charts/lens.h"
 #include "studio/charts/lights.h"
 #include "studio/charts/photograph.h"
+#include "studio/charts/render.h"
 
 namespace studio {
 
 std::span<const ChartStage> chart_stages() {
-  static const std::vector<ChartStage> all{glass_chart(), hdr_chart(), lens_chart(), lights_chart(),
-                                           photograph_chart()};
+  static const std::vector<ChartStage> all{glass_chart(),  hdr_chart(),        lens_chart(),
+                                           lights_chart(), photograph_chart(), render_chart()};
   return all;
 }
 

@@ -17,6 +17,7 @@ namespace studio {
 struct ChartRequest {
   std::string set;     // set file to measure with; "" = the stage's own made scene
   bool quick = false;  // fewer points and repeats: for tests
+  std::string out{};   // directory for pictures beside the chart; "" = none are wanted
 };
 
 struct ChartStage {

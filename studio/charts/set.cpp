@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <initializer_list>
 #include <iterator>
 #include <stdexcept>
 #include <vector>
@@ -13,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "studio/effort_points.h"
+#include "studio/effort_settings.h"
 #include "studio/picture_error.h"
 #include "studio/show.h"
 
@@ -39,81 +39,28 @@ class Scratch {
   fs::path path_;
 };
 
-// An effort to be measured, and what of the set's own it changes.
-struct Setting {
-  std::string method;
-  std::string label;
-  render::Effort effort;
-};
-
-// From the fastest to the most accurate, all settings turned together.
-std::vector<Setting> dial(const render::Effort& base) {
-  struct Step {
-    int aa_samples;
-    float aa_tolerance, glint_contrast;
-    int light_samples, interleave;
-    bool adaptive_visibility;
-    float accuracy;
-  };
-  constexpr Step steps[] = {{1, 0, 0, 16, 4, true, 0.9F},
-                            {1, 0, 0, 32, 2, true, 0.9F},
-                            {4, 0, 0, 32, 1, true, 0.95F},
-                            {4, 0.4F, 0.4F, 32, 1, true, 0.95F},
-                            {4, 0.2F, 0.2F, 64, 1, true, 0.95F},
-                            {16, 0.1F, 0.1F, 64, 1, true, 0.97F},
-                            {16, 0.03F, 0.05F, 128, 1, false, 0.98F},
-                            {64, 0.02F, 0.03F, 128, 1, false, 0.99F}};
-  std::vector<Setting> settings;
-  for (const Step& step : steps) {
-    render::Effort effort = base;
-    effort.aa_samples = step.aa_samples;
-    effort.aa_tolerance = step.aa_tolerance;
-    effort.glint_contrast = step.glint_contrast;
-    effort.light_samples = step.light_samples;
-    effort.interleave = step.interleave;
-    effort.adaptive_visibility = step.adaptive_visibility;
-    effort.accuracy = step.accuracy;
-    settings.push_back({"all together", fmt::format("{}", settings.size() + 1), effort});
-  }
-  return settings;
-}
-
-// The set's own effort with one setting at other values.
-template <class T>
-void vary(std::vector<Setting>& settings,
-          const std::string& method,
-          const render::Effort& base,
-          T render::Effort::*member,
-          std::initializer_list<T> values) {
-  for (const T value : values) {
-    render::Effort effort = base;
-    effort.*member = value;
-    if (effort != base)
-      settings.push_back({method, fmt::format("{:.3g}", static_cast<double>(value)), effort});
-  }
-}
-
-std::vector<Setting> settings_to_measure(const render::Effort& base, bool quick) {
+std::vector<EffortSetting> settings_to_measure(const render::Effort& base, bool quick) {
   using render::Effort;
-  std::vector<Setting> all{{"the set's own", "the set's own", base}};
-  const std::vector<Setting> steps = dial(base);
+  std::vector<EffortSetting> all{{"the set's own", "the set's own", base}};
+  const std::vector<EffortSetting> steps = effort_dial(base);
   if (quick) {
     all.push_back(steps[2]);
     return all;
   }
   std::ranges::copy_if(steps, std::back_inserter(all),
-                       [&](const Setting& s) { return s.effort != base; });
-  vary(all, "rays at edges and glints", base, &Effort::aa_samples, {1, 4, 64});
-  vary(all, "tolerance of uncertain pixels", base, &Effort::aa_tolerance,
-       {0.0F, 0.4F, 0.2F, 0.1F, 0.05F, 0.02F});
-  vary(all, "contrast of glints", base, &Effort::glint_contrast, {0.0F, 0.4F, 0.2F, 0.05F, 0.02F});
-  vary(all, "lights", base, &Effort::light_samples, {16, 32, 128, 256});
-  vary(all, "shadow rays", base, &Effort::interleave, {2, 4});
+                       [&](const EffortSetting& s) { return s.effort != base; });
+  vary_effort(all, "rays at edges and glints", base, &Effort::aa_samples, {1, 4, 64});
+  vary_effort(all, "tolerance of uncertain pixels", base, &Effort::aa_tolerance,
+              {0.0F, 0.4F, 0.2F, 0.1F, 0.05F, 0.02F});
+  vary_effort(all, "contrast of glints", base, &Effort::glint_contrast,
+              {0.0F, 0.4F, 0.2F, 0.05F, 0.02F});
+  vary_effort(all, "lights", base, &Effort::light_samples, {16, 32, 128, 256});
+  vary_effort(all, "shadow rays", base, &Effort::interleave, {2, 4});
   if (base.adaptive_visibility) {
     all.push_back({"shadow rays", "every pixel", base});
     all.back().effort.adaptive_visibility = false;
   }
-  vary(all, "accuracy", base, &Effort::accuracy, {0.8F, 0.9F, 0.98F, 0.99F});
+  vary_effort(all, "accuracy", base, &Effort::accuracy, {0.8F, 0.9F, 0.98F, 0.99F});
   return all;
 }
 
@@ -140,7 +87,7 @@ Take put_on_air(Set set, std::int64_t frames) {
   return take;
 }
 
-ChartPoint point_of(const Setting& setting, const Take& take, const render::PictureError& e) {
+ChartPoint point_of(const EffortSetting& setting, const Take& take, const render::PictureError& e) {
   ChartPoint point;
   point.method = setting.method;
   point.label = setting.label;
@@ -168,7 +115,7 @@ Chart chart_set(const std::string& set_path, const SetChartSettings& settings, C
       fmt::format("{}x{}, from one shown frame to the next; labels: the setting's value",
                   set.show.width, set.show.height);
   chart.time_name = "time per frame, ms";
-  const std::vector<Setting> all = settings_to_measure(set.effort, settings.quick);
+  const std::vector<EffortSetting> all = settings_to_measure(set.effort, settings.quick);
   Truth truth;
   double done = 0;
   // In two rounds, so that what else the machine does for a while slows no point alone.

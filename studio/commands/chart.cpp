@@ -60,10 +60,12 @@ void chart(const ChartOptions& options, Console& console) {
   if (wanted.size() > 1 && console.wants_figures()) {
     throw UsageError("--json takes the figures of one stage; --out has them all");
   }
+  const std::string out = options.out.empty() ? "." : options.out;
+  ChartRequest request = options.request;
+  request.out = out;
   for (const ChartStage* stage : wanted) {
-    Chart measured = stage->measure(options.request, console);
+    Chart measured = stage->measure(request, console);
     mark_front(measured);
-    const std::string out = options.out.empty() ? "." : options.out;
     write_chart(measured, out);
     console.figures(chart_json(measured));
     console.say(fmt::format("{0}/{1}.svg, .png, .csv, .json", out, measured.stage));
