@@ -161,6 +161,8 @@ AreaLight sample_area_light(const SceneDescription& scene,
   std::vector<Part> parts(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
   add_instance(scene, scene.instances.at(instance), material, samples, parts);
   AreaLight light;
+  light.instance = instance;
+  light.material = material;
   for (int j = 0; j < rows; ++j) {
     for (int i = 0; i < columns; ++i) {
       const Part& part = parts[static_cast<std::size_t>(j * columns + i)];
@@ -196,6 +198,8 @@ std::vector<LocalLight> lamps_of(const AreaLight& light,
     lamp.intensity = l * s.area_m2;
     lamp.planned = glow.gain * (planned_grey * s.area_m2);
     lamp.area_m2 = s.area_m2;
+    lamp.instance = light.instance;
+    lamp.material = light.material;
     sum += l * s.area_m2;
     area += s.area_m2;
   }

@@ -20,6 +20,7 @@ struct AreaSample {
 
 struct AreaLight {
   std::vector<AreaSample> samples;
+  std::uint32_t instance = no_instance, material = 0;  // that glow
 };
 
 // Most samples along a side.

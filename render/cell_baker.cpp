@@ -67,6 +67,7 @@ void CellBaker::bake(const FrameContext& frame,
   lender_.fill(-1);
   queue_.clear();
   lamp_terms_.clear();
+  lamps_apart_.fill(0);
   trace_centres();
   const bool smooth_edges = effort_.aa_samples > 1;
   if (smooth_edges) keep_centres();
@@ -198,7 +199,11 @@ void CellBaker::shade_points(int count, bool grid) {
   receive(count, grid);
   const auto& instances = frame_->inputs.scene->description().instances;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-    const ShadePoint& p = points_[i];
+    ShadePoint& p = points_[i];
+    if (lamps_apart_[i] && glows_by_lamps(p)) {
+      p.radiance = {};
+      p.video = {};
+    }
     collect(p);
     if (p.kind == RayKind::camera && instances[p.hit.instance].kind == ObjectKind::stand_in) {
       base_[target_of(p)].seen += mean(p.throughput);
@@ -305,7 +310,10 @@ void CellBaker::receive(int count, bool grid) {
   std::fill_n(place.begin(), count, nowhere);
   std::fill_n(light_of_point_.begin(), count, Light{});
   std::array<std::uint8_t, stream_rays> glossy{};
-  for (const Lobe& lobe : lobes_) glossy[static_cast<std::size_t>(lobe.point - points_.data())] = 1;
+  for (const Lobe& lobe : lobes_) {
+    std::uint8_t& flags = glossy[static_cast<std::size_t>(lobe.point - points_.data())];
+    flags = static_cast<std::uint8_t>(flags | (lobe.lamps ? 3 : 1));
+  }
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const ShadePoint& p = points_[i];
     if (!glossy[i] && !receives_light(p)) continue;
@@ -323,7 +331,7 @@ void CellBaker::receive(int count, bool grid) {
     set_receiver(k, p);
     ++r.count;
     r.active[k / 64] |= std::uint64_t{1} << (k % 64);
-    if (p.diffuse != Vec3f{} || p.catches_lamps) {
+    if (p.diffuse != Vec3f{} || p.catches_lamps || glossy[i] > 1) {
       r.by_lamps[k / 64] |= std::uint64_t{1} << (k % 64);
     }
   }
@@ -485,6 +493,7 @@ void CellBaker::bounce() {
         p.throughput =
             p.throughput * passed_through(*frame_->inputs.scene, q.media, stream_.far_m[i]);
       }
+      if (hit) lamps_apart_[static_cast<std::size_t>(count - 1)] = q.lamps_apart;
       p.media = q.media;
       p.kind = q.kind == RayKind::difference ? RayKind::reflection : q.kind;
       p.depth = q.depth;
@@ -493,6 +502,7 @@ void CellBaker::bounce() {
     run_background({group_.data(), leaving});
     shade_points(count, false);
   }
+  lamps_apart_.fill(0);
 }
 
 }  // namespace render

@@ -54,6 +54,7 @@ class CellBaker final : public RaySink {
     RayKind kind;
     std::uint8_t depth;
     bool one_of_many;  // of rays all over a rough lobe: its compact light is found apart
+    bool lamps_apart;  // and so are the lamps that it mirrors: it does not see what glows by them
     Media media;
   };
 
@@ -66,6 +67,7 @@ class CellBaker final : public RaySink {
     float roughness, share;
     std::uint32_t number;  // of the lobe on its path, for random numbers
     bool difference;
+    bool lamps;  // it mirrors lamps
   };
 
   // What the rays of one sample add up to under the planned light.
@@ -168,6 +170,10 @@ class CellBaker final : public RaySink {
   bool turn_within_lobe(const ShadePoint& from, std::uint32_t number, NewRay& ray) const;
   void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
   void add_compact(const Lobe& lobe, std::size_t light, Vec3f passed);
+  bool mirrors_lamps(const ShadePoint& from, const NewRay& ray) const;
+  bool glows_by_lamps(const ShadePoint& p) const;
+  void add_lamps_of_centre(const Lobe& lobe, std::size_t centre);
+  void add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed);
   float compact_density(const Lobe& lobe, std::size_t light) const;
   void add_environment(std::size_t slot,
                        std::size_t target,
@@ -202,7 +208,8 @@ class CellBaker final : public RaySink {
   std::array<Light, stream_rays> light_of_point_;
   std::array<ShadePoint*, stream_rays> group_;
   std::array<std::uint8_t, stream_rays> done_;
-  std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
+  std::array<std::uint8_t, stream_rays> lamps_apart_;  // of the rays that met the points
+  std::array<std::int16_t, stream_rays> lender_;       // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<CellTransport::EnvironmentTerm> sorted_places_;
   std::vector<PointLight> tested_;

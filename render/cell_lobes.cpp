@@ -82,14 +82,18 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   NewRay ray = asked;
   const bool one_of_many = turn_within_lobe(from, pushed_, ray);
   const bool straight = ray.kind == RayKind::camera;
-  if (!straight && asked.normal != Vec3f{} && frame_->planned->compact_apart) {
-    const float share =
-        one_of_many ? 1.0F : share_without_compact(*frame_->planned, ray.roughness, ray.spread);
-    if (share > 0) {
+  bool lamps = lamps_apart_[static_cast<std::size_t>(&from - points_.data())] != 0;
+  if (!straight && asked.normal != Vec3f{}) {
+    lamps = mirrors_lamps(from, asked);
+    const float share = !frame_->planned->compact_apart ? 0.0F
+                        : one_of_many
+                            ? 1.0F
+                            : share_without_compact(*frame_->planned, ray.roughness, ray.spread);
+    if (share > 0 || lamps) {
       const float area = length(asked.spread.a) * length(asked.spread.b);
       lobes_.push_back({&from, SeenLobe(asked.normal, from.hit.geometric_normal, -from.incoming),
                         asked.throughput, 0.5F * std::sqrt(area), asked.roughness, share, pushed_,
-                        asked.kind == RayKind::difference});
+                        asked.kind == RayKind::difference, lamps});
     }
   }
   // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
@@ -121,7 +125,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   }
   queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.footprint_m,
                     spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, ray.media});
+                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps, ray.media});
 }
 
 void CellBaker::add_environment(std::size_t slot,
@@ -158,8 +162,9 @@ void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool
       if (!in(cell.lit[light])) continue;
       add_compact(lobe, light, in(cell.seen[light]) ? Vec3f{1, 1, 1} : Vec3f{});
     }
+    if (lobe.lamps) add_lamps_of_centre(lobe, k);
   }
-  if (grid || frame_->compact.empty()) return;
+  if (grid) return;
   const auto receiver_of = [&](const Lobe& lobe) {
     return receiver_of_point[static_cast<std::size_t>(lobe.point - points_.data())];
   };
@@ -169,6 +174,18 @@ void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool
     if (frame_->job->lights.lights[l.light].compact == 0) continue;
     for (const Lobe& lobe : std::ranges::equal_range(lobes_, l.point, {}, receiver_of)) {
       add_compact(lobe, l.light, l.passed);
+    }
+  }
+  if (frame_->job->lights.lamps.empty()) return;
+  const Receivers& r = receivers_;
+  for (const PointLamp& l : reached_) {
+    const std::size_t k = l.point;
+    for (const Lobe& lobe : std::ranges::equal_range(lobes_, l.point, {}, receiver_of)) {
+      if (!lobe.lamps) continue;
+      const auto open = ray_to_lamp(
+          {{r.px[k], r.py[k], r.pz[k]}, {r.nx[k], r.ny[k], r.nz[k]}, {r.gx[k], r.gy[k], r.gz[k]}},
+          frame_->job->lights.lamps[l.lamp]);
+      if (open && open->per_intensity > 0) add_lamp(lobe, l.lamp, l.factor / open->per_intensity);
     }
   }
 }
@@ -183,6 +200,66 @@ void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
   transport_->lights.push_back(
       {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
   samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;
+}
+
+// Whether a lobe mirrors lamps: where it is wider than each of them, so that they add up to the
+// surface that they are samples of. A narrower one has to meet that itself.
+bool CellBaker::mirrors_lamps(const ShadePoint& from, const NewRay& ray) const {
+  if (ray.roughness < mirror_roughness) return false;
+  const float cone = 0.25F * length(ray.spread.a) * length(ray.spread.b);
+  const float alpha = ray.roughness * ray.roughness;
+  const float squared_rad = std::max(alpha * alpha, cone);
+  bool any = false;
+  for (const LocalLight& lamp : frame_->job->lights.lamps) {
+    if (lamp.instance == no_instance) continue;
+    const Vec3f to = lamp.position - from.hit.position;
+    if (lamp.area_m2 > pi * dot(to, to) * squared_rad) return false;
+    any = true;
+  }
+  return any;
+}
+
+bool CellBaker::glows_by_lamps(const ShadePoint& p) const {
+  if (p.radiance == Vec3f{} && p.video.index < 0) return false;
+  return std::ranges::any_of(frame_->job->lights.lamps, [&](const LocalLight& lamp) {
+    return lamp.instance == p.hit.instance && lamp.material == p.hit.material;
+  });
+}
+
+void CellBaker::add_lamps_of_centre(const Lobe& lobe, std::size_t centre) {
+  const CellLamps& cell = transport_->lamps;
+  for (std::size_t i = 0; i < cell.numbers.size(); ++i) {
+    if (!(cell.factors[i].at[centre] > 0)) continue;
+    Vec3f passed{1, 1, 1};
+    for (const TintedLight& tint : cell.tints) {
+      if (tint.light == i && tint.centre == centre) passed -= tint.lost_share;
+    }
+    add_lamp(lobe, cell.numbers[i], passed);
+  }
+}
+
+// What a lobe mirrors of a lamp that its point sees. What is too dim is left out, as rays are.
+void CellBaker::add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed) {
+  const std::vector<LocalLight>& lamps = frame_->job->lights.lamps;
+  const LocalLight& lamp = lamps[number];
+  if (lamp.instance == no_instance) return;
+  const ShadePoint& p = *lobe.point;
+  const Vec3f to = lamp.position - p.hit.position;
+  const float squared = dot(to, to);
+  if (!(squared > 0)) return;
+  const Vec3f direction = to / std::sqrt(squared);
+  const float facing = -dot(lamp.normal, direction);
+  if (!(facing > 0)) return;
+  const float disc = lamp.area_m2 / pi;
+  const float blur_rad = calibrate::hypotenuse(std::sqrt(disc / squared), lobe.cone_rad);
+  const float density = lobe.seen.blurred(lobe.roughness, blur_rad, direction);
+  const Vec3f weight = lobe.throughput * passed * (density * facing / (squared + disc));
+  const Vec3f planned = weight * frame_->planned_table->lamps[number].intensity;
+  const float least = (1 - frame_->job->effort.accuracy) / (8 * static_cast<float>(lamps.size()));
+  if (!(largest(planned) > least)) return;
+  lamp_terms_.push_back(
+      {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(number), weight});
+  samples_[p.slot].added += planned;
 }
 
 // What a lobe mirrors of a compact light, per irradiance. A lobe that is not much wider than the

@@ -53,6 +53,7 @@ std::uint64_t transport_key(const FrameContext& context) {
   for (const LocalLight& lamp : context.planned_table->lamps) {
     key.mix(lamp.position), key.mix(lamp.normal), key.mix(lamp.intensity);
     key.mix(lamp.area_m2), key.mix(std::uint64_t{lamp.ambient});
+    key.mix(std::uint64_t{lamp.instance} << 32 | lamp.material);
   }
   for (const capture::Image* level : context.planned_levels) key.mix(level->height);
   key.mix(context.planned->radiance.pixels);

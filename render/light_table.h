@@ -20,6 +20,8 @@ struct DirectionalLight {
   friend bool operator==(const DirectionalLight&, const DirectionalLight&) = default;
 };
 
+inline constexpr std::uint32_t no_instance = ~0U;
+
 // A small lamp of the set: a point, or one sample of a glowing surface. Its intensity may change
 // from frame to frame without a ray being taken; what shadows it casts depends on the rest.
 struct LocalLight {
@@ -32,6 +34,9 @@ struct LocalLight {
   float area_m2 = 0;
   // 1 = light from everywhere: irradiance = intensity on any surface, without shadow.
   std::uint32_t ambient = 0;
+  // Of the glowing surface: where lobes are rough enough to mirror its lamps, they do not meet the
+  // surface itself as well. no_instance: lobes do not mirror the lamp.
+  std::uint32_t instance = no_instance, material = 0;
   friend bool operator==(const LocalLight&, const LocalLight&) = default;
 };
 

@@ -101,6 +101,40 @@ struct LitFloor {
   }
 };
 
+// A rough floor before the screen. Seen as rays alone would see it, where the middles of lobes
+// meet the screen, it errs by a half and more.
+TEST(VideoLight, IsMirroredByRoughSurfacesAsTheReferenceSays) {
+  constexpr int width = 48, height = 36, first_row = 26;
+  for (const auto& [roughness, metallic] : {std::pair{0.5F, 1.0F}, {0.7F, 0.0F}}) {
+    MadeRoom room(width, height);
+    render::SceneDescription scene = MadeRoom::describe();
+    auto parameters = render::standard_parameters(scene.materials[1], 0, 1);
+    parameters.roughness = roughness;
+    parameters.metallic = metallic;
+    scene.materials[1] = render::make_standard_material("floor", parameters);
+    scene.instances.resize(4);  // without the balls, and the walls out of sight
+    for (const std::size_t wall : {1U, 2U}) scene.instances[wall].set_from_object[11] = -100;
+    room.scene = std::make_unique<render::Scene>(std::move(scene));
+    light(room);
+    std::array<capture::Image, 2> truth;
+    for (std::uint32_t i = 0; i < 2; ++i) {
+      truth[i] = render_reference(room.inputs(), room.job, capture::make_image(height, width),
+                                  {.samples = 384, .seed = i + 1});
+    }
+    capture::Image floor = capture::make_image(height, width, 1);
+    for (int y = first_row; y < height; ++y) {
+      for (int x = 0; x < width; ++x) floor.at(y, x) = 1;
+    }
+    const auto error = [&] {
+      const capture::Image shown = capture::to_float(render_room(room).rgba);
+      return render::picture_error(shown, truth, floor).relative_rms;
+    };
+    EXPECT_LT(error(), 0.04) << roughness << " " << metallic;
+    for (render::LocalLight& lamp : room.job.lights.lamps) lamp.instance = render::no_instance;
+    EXPECT_GT(error(), 0.5) << roughness << " " << metallic;
+  }
+}
+
 TEST(VideoLight, LightsAFloorAsTheReferenceSays) {
   LitFloor floor;
   MadeRoom& room = floor.room;
