@@ -40,20 +40,44 @@ Vec3f above(Vec3f view, Vec3f normal) {
   return cosine >= grazing_cosine ? view : normalize(view + normal * (grazing_cosine - cosine));
 }
 
-Vec3f mapped_normal(const StandardParameters& parameters,
-                    const SceneDescription& scene,
-                    const HitPoint& hit,
-                    float footprint_uv) {
+// What a filtered normal map shows of a surface: the mean of its normals, and how they spread
+// about it, as what GGX's alpha squared grows by.
+struct MappedNormal {
+  Vec3f normal;
+  float rougher = 0;
+};
+
+// The spread of normals whose mean is of length `l`: twice the variance of their slopes, by the
+// concentration of a von Mises-Fisher distribution.
+//
+// Toksvig, "Mipmapping Normal Maps", JGT 10(3), 2005; the concentration after Banerjee et al.,
+// "Clustering on the Unit Hypersphere using von Mises-Fisher Distributions", JMLR 2005.
+float spread_of_normals(float l) {
+  const float squared = l * l;
+  return squared < 1 ? 2 * (1 - squared) / (l * (3 - squared)) : 0;
+}
+
+MappedNormal mapped_normal(const StandardParameters& parameters,
+                           const SceneDescription& scene,
+                           const HitPoint& hit,
+                           float footprint_uv) {
   const Texture* map = texture_at(scene, parameters.normal_texture);
-  if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return hit.normal;
-  const auto texel = sample(*map, hit.u, hit.v, footprint_uv);
+  if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return {hit.normal};
+  const auto in_tangents = [&](float width_uv) {
+    const auto texel = sample(*map, hit.u, hit.v, width_uv);
+    return Vec3f{(2 * texel[0] - 1) * parameters.normal_scale,
+                 (2 * texel[1] - 1) * parameters.normal_scale, 2 * texel[2] - 1};
+  };
+  const Vec3f mean = in_tangents(footprint_uv);
+  const float l = length(mean);
   const Vec3f tangent = normalize(hit.tangent - hit.normal * dot(hit.normal, hit.tangent));
   const Vec3f bitangent = cross(hit.normal, tangent) * hit.handedness;
-  const Vec3f normal = tangent * ((2 * texel[0] - 1) * parameters.normal_scale) +
-                       bitangent * ((2 * texel[1] - 1) * parameters.normal_scale) +
-                       hit.normal * (2 * texel[2] - 1);
-  const float l = length(normal);
-  return l > 1e-6F && dot(normal, hit.normal) > 0 ? normal / l : hit.normal;
+  const Vec3f normal = tangent * mean.x + bitangent * mean.y + hit.normal * mean.z;
+  if (!(l > 1e-6F) || !(dot(normal, hit.normal) > 0)) return {hit.normal};
+  MappedNormal mapped{normal / l};
+  // Beside the map's own texels, whose eight bits are no unit vectors either.
+  if (footprint_uv > 0) mapped.rougher = spread_of_normals(l / length(in_tangents(0)));
+  return mapped;
 }
 
 }  // namespace
@@ -130,7 +154,12 @@ StandardSurface standard_surface(const StandardParameters& parameters,
     surface.emission = {surface.emission.x * emission[0], surface.emission.y * emission[1],
                         surface.emission.z * emission[2]};
   }
-  surface.normal = mapped_normal(parameters, scene, hit, footprint_uv);
+  const MappedNormal mapped = mapped_normal(parameters, scene, hit, footprint_uv);
+  surface.normal = mapped.normal;
+  if (mapped.rougher > 0) {
+    const float alpha = surface.roughness * surface.roughness;
+    surface.roughness = std::sqrt(std::min(std::sqrt(alpha * alpha + mapped.rougher), 1.0F));
+  }
   surface.coat_normal = hit.normal;
   return surface;
 }

@@ -7,10 +7,17 @@
 #include <cstring>
 #include <numbers>
 #include <random>
+#include <stdexcept>
+
+#include "render/scene.h"
+#include "render/texture.h"
 
 namespace {
 
 using calibrate::Vec3f;
+using render::HitPoint;
+using render::SceneDescription;
+using render::StandardParameters;
 using render::StandardSurface;
 
 class Random {
@@ -190,6 +197,52 @@ TEST(StandardParameters, RefuseAnotherShaderAWrongSizeAndNaN) {
   p.metallic = NAN;
   EXPECT_THROW(render::standard_parameters(render::make_standard_material("paint", p), 0),
                std::invalid_argument);
+}
+
+// A texture of one colour, but for its left half.
+SceneDescription scene_with_texture(std::array<std::uint8_t, 3> left,
+                                    std::array<std::uint8_t, 3> right) {
+  std::vector<std::uint8_t> texels;
+  for (int i = 0; i < 64; ++i) {
+    const auto& texel = i % 8 < 4 ? left : right;
+    texels.insert(texels.end(), texel.begin(), texel.end());
+  }
+  SceneDescription scene;
+  scene.textures = {
+      std::make_shared<render::Texture>(render::make_texture(8, 8, 3, false, texels))};
+  return scene;
+}
+
+HitPoint hit_at(float u) {
+  HitPoint hit;
+  hit.normal = hit.geometric_normal = {0, 0, 1};
+  hit.tangent = {1, 0, 0};
+  hit.u = u;
+  hit.v = 0.5F;
+  hit.uv_per_metre = 1;
+  return hit;
+}
+
+TEST(StandardSurface, IsRougherTheMoreNormalsAFootprintHolds) {
+  // Two slopes of 0.2, one to each side.
+  const SceneDescription scene = scene_with_texture({102, 128, 252}, {153, 128, 252});
+  StandardParameters parameters;
+  parameters.roughness = 0.1F;
+  parameters.normal_texture = 0;
+  const auto surface = [&](float footprint_m) {
+    return standard_surface(parameters, scene, hit_at(0.25F), footprint_m);
+  };
+  EXPECT_NEAR(surface(0).roughness, 0.1, 1e-6);
+  EXPECT_LT(surface(0).normal.x, -0.15F);
+  const StandardSurface far = surface(4);
+  EXPECT_NEAR(far.normal.x, 0, 0.01);
+  // alpha^2 = .01^2 + 2 * .2^2 / 2, the variance being along one axis of two.
+  EXPECT_NEAR(std::pow(far.roughness, 4), 0.04, 0.006);
+  EXPECT_GT(surface(1).roughness, 0.1F);
+  EXPECT_LE(surface(1).roughness, far.roughness);
+  // What is flat stays as smooth as it is.
+  const SceneDescription flat = scene_with_texture({128, 128, 255}, {128, 128, 255});
+  EXPECT_NEAR(standard_surface(parameters, flat, hit_at(0.25F), 4).roughness, 0.1, 1e-4);
 }
 
 }  // namespace

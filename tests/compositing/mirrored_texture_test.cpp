@@ -1,0 +1,181 @@
+// Textures far away, straight on and after bounces: filtered as wide as what a sample sees.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "made_shot.h"
+#include "render/reference.h"
+#include "render/texture.h"
+
+namespace compositing {
+namespace {
+
+constexpr int width = 64, height = 48;
+
+std::shared_ptr<render::Mesh> square(std::array<render::Vec3f, 4> corners,
+                                     float repeats,
+                                     std::uint32_t material) {
+  auto mesh = std::make_shared<render::Mesh>();
+  mesh->positions.assign(corners.begin(), corners.end());
+  mesh->uvs = {{0, 0}, {repeats, 0}, {repeats, repeats}, {0, repeats}};
+  mesh->triangles = {{0, 1, 2}, {0, 2, 3}};
+  mesh->materials = {material};
+  return mesh;
+}
+
+// A glowing chequered wall 24 m behind a viewer who sees it in `mirrors` mirrors, one after the
+// other. Its squares of a few centimetres are much finer than the pixels there.
+struct ChequeredShot {
+  MadeShot shot;
+
+  explicit ChequeredShot(int mirrors, float roughness = 0) {
+    register_shaders();
+    std::vector<std::uint8_t> texels;
+    for (int y = 0; y < 16; ++y) {
+      for (int x = 0; x < 16; ++x) {
+        for (int c = 0; c < 3; ++c) texels.push_back((x / 8 + y / 8) % 2 == 0 ? 255 : 0);
+      }
+    }
+    render::SceneDescription scene;
+    scene.background = "environment";
+    scene.textures = {
+        std::make_shared<render::Texture>(render::make_texture(16, 16, 3, true, texels))};
+    render::StandardParameters wall;
+    std::fill_n(wall.base_color, 3, 0.0F);
+    wall.specular = 0;
+    std::fill_n(wall.emission, 3, 1.0F);
+    wall.emission_texture = 0;
+    render::StandardParameters chrome;
+    chrome.metallic = 1;
+    chrome.roughness = roughness;
+    scene.materials = {make_standard_material("wall", wall),
+                       make_standard_material("chrome", chrome)};
+    const auto add = [&](std::shared_ptr<render::Mesh> mesh) {
+      scene.meshes.push_back(std::move(mesh));
+      scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+    };
+    const float s = 30, far = -24;
+    add(square({{{-s, far, -s}, {s, far, -s}, {s, far, s}, {-s, far, s}}}, 331.7F, 0));
+    if (mirrors == 2) {  // a corner of two, which sends back where it comes from
+      add(square({{{0, 4, -9}, {9, -5, -9}, {9, -5, 9}, {0, 4, 9}}}, 1, 1));
+      add(square({{{0, 4, -9}, {-9, -5, -9}, {-9, -5, 9}, {0, 4, 9}}}, 1, 1));
+    } else {
+      add(square({{{-9, 3, -9}, {9, 3, -9}, {9, 3, 9}, {-9, 3, 9}}}, 1, 1));
+    }
+    shot.scene = std::make_unique<render::Scene>(std::move(scene));
+    const double f = width * 0.9;
+    shot.directions = calibrate::make_direction_table(
+        {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+    shot.environment = made_sky(16, 0, 0);
+    shot.plate = capture::to_half(capture::make_image(height, width));
+    const calibrate::Vec3 towards =
+        mirrors == 0 ? calibrate::Vec3{0.3, -24, 0.2} : calibrate::Vec3{0.6, 4, 0.3};
+    shot.job.cam_from_set = calibrate::look_at({0.1, 0, 0.1}, towards, 0);
+    shot.job.effort.aa_samples = 1;  // one ray a pixel: nothing but the filter smooths
+  }
+};
+
+TEST(MirroredTexture, DoesNotAliasWhereverItIsSeen) {
+  for (const int mirrors : {0, 1, 2}) {
+    const ChequeredShot made(mirrors);
+    const MadeShot& shot = made.shot;
+    const capture::Image black = capture::make_image(height, width);
+    const capture::Image truth = render_reference(shot.inputs(), shot.job, black, {.samples = 256});
+    render::FrameResult result;
+    render_frame(shot.inputs(), shot.job, shot.plate, result);
+    const capture::Image shown = capture::to_float(result.rgba);
+    capture::Image all = capture::make_image(height, width, 1);
+    std::ranges::fill(all.pixels, 1.0F);
+    const render::PictureError error = render::picture_error(shown, truth, all);
+    EXPECT_LT(error.relative_rms, 0.06) << mirrors << " mirrors; unfiltered it would be about 1";
+    double mean = 0;
+    for (const float value : truth.pixels) mean += value / static_cast<double>(truth.pixels.size());
+    EXPECT_GT(mean, 0.4) << mirrors << " mirrors must show the wall (and alpha)";
+  }
+}
+
+// Metal flakes in a clear coat, as models of cars have them: a normal map of small tilted facets.
+// Far away each pixel holds many, which together are a rough metal.
+MadeShot flaky_paint(float tilt) {
+  register_shaders();
+  std::mt19937 random(3);
+  std::normal_distribution<float> slope(0, tilt);
+  constexpr int side = 64;
+  std::vector<std::uint8_t> texels;
+  for (int i = 0; i < side * side; ++i) {
+    const render::Vec3f n = normalize(render::Vec3f{slope(random), slope(random), 1});
+    for (const float value : {n.x, n.y, n.z}) {
+      texels.push_back(static_cast<std::uint8_t>(std::lround(127.5F * (value + 1))));
+    }
+  }
+  render::SceneDescription scene;
+  scene.background = "environment";
+  scene.textures = {
+      std::make_shared<render::Texture>(render::make_texture(side, side, 3, false, texels))};
+  render::StandardParameters paint;
+  paint.base_color[1] = paint.base_color[2] = 0.4F;
+  paint.metallic = 1;
+  paint.roughness = 0.2F;
+  paint.clearcoat = 1;
+  paint.normal_texture = 0;
+  scene.materials = {make_standard_material("paint", paint)};
+  auto panel = square({{{-4, 5, -3}, {4, 5, -3}, {4, 5, 3}, {-4, 5, 3}}}, 60, 0);
+  panel->normals.assign(4, {0, -1, 0});
+  panel->tangents.assign(4, {1, 0, 0, 1});
+  scene.meshes = {panel};
+  scene.instances.emplace_back();
+  MadeShot shot;
+  shot.scene = std::make_unique<render::Scene>(std::move(scene));
+  const double f = width * 0.9;
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  // A soft box behind the viewer, whose reflection the flakes blur.
+  shot.environment.radiance = capture::make_image(64, 128, 3);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 128; ++x) {
+      const render::Vec3f d =
+          render::direction_of_texel(static_cast<float>(x), static_cast<float>(y), 128, 64);
+      const bool box = d.y < -0.8F && std::abs(d.x) < 0.25F && std::abs(d.z) < 0.25F;
+      for (int c = 0; c < 3; ++c) shot.environment.radiance.at(y, x, c) = box ? 5.0F : 0.3F;
+    }
+  }
+  render::smooth_for_reflections(shot.environment);
+  shot.plate = capture::to_half(capture::make_image(height, width));
+  shot.job.cam_from_set = calibrate::look_at({0.3, 0, 0.2}, {0, 5, 0}, 0);
+  return shot;
+}
+
+// As a plain mirror under the mean of their normals, flakes of these tilts would err by 24 and 83
+// %.
+TEST(NormalMap, FarAwayIsARougherSurfaceAsInTheReference) {
+  for (const auto& [tilt, most] : {std::pair{0.0F, 0.02}, {0.1F, 0.1}, {0.25F, 0.16}}) {
+    const MadeShot shot = flaky_paint(tilt);
+    const capture::Image black = capture::make_image(height, width);
+    std::array<capture::Image, 2> truth;
+    for (std::uint32_t i = 0; i < 2; ++i) {
+      truth[i] = render_reference(shot.inputs(), shot.job, black, {.samples = 128, .seed = i + 1});
+    }
+    render::FrameResult result;
+    render_frame(shot.inputs(), shot.job, shot.plate, result);
+    capture::Image all = capture::make_image(height, width, 1);
+    std::ranges::fill(all.pixels, 1.0F);
+    const capture::Image shown = capture::to_float(result.rgba);
+    EXPECT_LT(render::picture_error(shown, truth, all).relative_rms, most) << tilt;
+  }
+}
+
+// Not even where all light comes back may flakes add any.
+TEST(NormalMap, NeverSendsBackMoreThanItGets) {
+  MadeShot shot = flaky_paint(0.25F);
+  std::ranges::fill(shot.environment.radiance.pixels, 1.0F);
+  render::smooth_for_reflections(shot.environment);
+  render::FrameResult result;
+  render_frame(shot.inputs(), shot.job, shot.plate, result);
+  for (const float value : capture::to_float(result.rgba).pixels) ASSERT_LE(value, 1.002F);
+}
+
+}  // namespace
+}  // namespace compositing
