@@ -55,7 +55,8 @@ void join(SceneDescription& whole, const SceneDescription& part, const Placement
     for (std::int32_t* texture :
          {&parameters.base_color_texture, &parameters.metallic_roughness_texture,
           &parameters.normal_texture, &parameters.clearcoat_texture,
-          &parameters.transmission_texture, &parameters.emission_texture}) {
+          &parameters.transmission_texture, &parameters.emission_texture,
+          &parameters.clearcoat_roughness_texture}) {
       if (*texture >= 0) *texture += first_texture;
     }
     if (parameters.emission_video >= 0) parameters.emission_video += first_video;

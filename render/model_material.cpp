@@ -114,7 +114,6 @@ void MaterialImport::note_unhandled(const aiMaterial& material, const std::strin
   float sheen[3];
   if (colour(material, AI_MATKEY_SHEEN_COLOR_FACTOR, sheen) && sheen[0] + sheen[1] + sheen[2] > 0)
     leave_out("sheen is");
-  if (has(AI_MATKEY_CLEARCOAT_ROUGHNESS_TEXTURE)) leave_out("the coat's roughness map is");
   if (has(AI_MATKEY_CLEARCOAT_NORMAL_TEXTURE)) leave_out("the coat's normal map is");
   if (has(aiTextureType_HEIGHT, 0)) leave_out("the height map is");
 }
@@ -142,6 +141,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   p.normal_texture = textured(aiTextureType_NORMALS, 0, false);
   p.emission_texture = textured(aiTextureType_EMISSIVE, 0, true);
   p.clearcoat_texture = textured(AI_MATKEY_CLEARCOAT_TEXTURE, false);
+  p.clearcoat_roughness_texture = textured(AI_MATKEY_CLEARCOAT_ROUGHNESS_TEXTURE, false);
   p.transmission_texture = textured(AI_MATKEY_TRANSMISSION_TEXTURE, false);
 
   const float unit_roughness = metallic_roughness ? 1.0F : 0.5F;

@@ -16,7 +16,7 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 96, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 100, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
@@ -106,7 +106,7 @@ StandardParameters standard_parameters(const Material& material,
   for (const std::int32_t index :
        {parameters.base_color_texture, parameters.metallic_roughness_texture,
         parameters.normal_texture, parameters.clearcoat_texture, parameters.transmission_texture,
-        parameters.emission_texture})
+        parameters.emission_texture, parameters.clearcoat_roughness_texture})
     if (index < -1 || (index >= 0 && static_cast<std::size_t>(index) >= texture_count))
       refuse("it names texture " + std::to_string(index) + " of " + std::to_string(texture_count));
   const std::int32_t video = parameters.emission_video;
@@ -144,6 +144,9 @@ StandardSurface standard_surface(const StandardParameters& parameters,
   surface.clearcoat = unit(parameters.clearcoat);
   if (surface.clearcoat > 0) surface.clearcoat *= look_up(parameters.clearcoat_texture)[0];
   surface.clearcoat_roughness = unit(parameters.clearcoat_roughness);
+  if (surface.clearcoat > 0) {
+    surface.clearcoat_roughness *= look_up(parameters.clearcoat_roughness_texture)[1];
+  }
   surface.specular = unit(parameters.specular);
   surface.transmission = unit(parameters.transmission);
   if (surface.transmission > 0) surface.transmission *= look_up(parameters.transmission_texture)[0];

@@ -47,6 +47,7 @@ struct StandardParameters {
   float specular = 1;  // share of the mirrored light of what is not metal (KHR_materials_specular)
   std::uint32_t two_sided = 1;
   std::int32_t emission_video = -1;  // of SceneDescription::videos: emission is times its light
+  std::int32_t clearcoat_roughness_texture = -1;  // green
 };
 
 // The block in a material of the shader "standard", and back. Throws std::invalid_argument, naming

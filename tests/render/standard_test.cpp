@@ -223,6 +223,19 @@ HitPoint hit_at(float u) {
   return hit;
 }
 
+TEST(StandardSurface, TakesTheCoatsRoughnessTimesTheGreenOfItsMap) {
+  const SceneDescription scene = scene_with_texture({9, 51, 200}, {9, 255, 200});
+  StandardParameters parameters;
+  parameters.clearcoat = 1;
+  parameters.clearcoat_roughness = 0.5F;
+  parameters.clearcoat_roughness_texture = 0;
+  EXPECT_NEAR(standard_surface(parameters, scene, hit_at(0.25F), 0).clearcoat_roughness, 0.1, 1e-4);
+  EXPECT_NEAR(standard_surface(parameters, scene, hit_at(0.75F), 0).clearcoat_roughness, 0.5, 1e-4);
+  parameters.clearcoat_roughness_texture = 1;
+  EXPECT_THROW(standard_parameters(render::make_standard_material("paint", parameters), 1),
+               std::invalid_argument);
+}
+
 TEST(StandardSurface, IsRougherTheMoreNormalsAFootprintHolds) {
   // Two slopes of 0.2, one to each side.
   const SceneDescription scene = scene_with_texture({102, 128, 252}, {153, 128, 252});
