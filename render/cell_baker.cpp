@@ -52,11 +52,15 @@ void CellBaker::bake(const FrameContext& frame,
   shadow_rays_ = {frame.inputs.scene, frame.planned_table.get(), &effort_};
   x0_ = x0;
   y0_ = y0;
+  block_ = block_of_stage(stage);
   transport_ = &transport;
   statistics_ = &statistics;
   const std::uint64_t rays_before =
       statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays;
   transport.clear();
+  const auto& table = *frame.inputs.directions;
+  transport.blocks = {block_, std::min(cell_size, table.width - x0),
+                      std::min(cell_size, table.height - y0)};
   if (frame.inputs.count_rays) transport.counts.resize(cell_pixels);
   counting_ = frame.inputs.count_rays ? transport.counts.data() : nullptr;
   samples_.fill({});
@@ -133,7 +137,7 @@ void CellBaker::trace_centres() {
   // 4x4 blocks one after the other: coherent for Embree, and each stream is exactly one cell.
   for (int i = 0; i < cell_pixels; ++i) {
     const auto [x, y] = pixel_of_ray(i);
-    const bool in = x0_ + x < table.width && y0_ + y < table.height;
+    const bool in = transport_->blocks.has_ray(x, y);
     if (in) {
       const std::size_t t = table.index(y0_ + y, x0_ + x);
       set_camera_ray(i, {table.x[t], table.y[t], table.z[t]});
@@ -157,7 +161,7 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
     p.hit = frame_->inputs.scene->hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i],
                                             p.incoming);
   }
-  p.spread_rad = frame_->pixel_angle;
+  p.spread_rad = frame_->pixel_angle * static_cast<float>(block_);
   p.blur_m = 0;
   p.footprint_m = s.far_m[i] < ray_far ? s.far_m[i] * p.spread_rad : 0;
   p.throughput = {1, 1, 1};

@@ -242,7 +242,8 @@ class CellBaker final : public RaySink {
   CellTransport* transport_ = nullptr;
   RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for
   int x0_ = 0, y0_ = 0;
-  CellMask inside_{};
+  int block_ = 1;      // pixels a side that share a camera ray
+  CellMask inside_{};  // pixels that have one
 };
 
 }  // namespace render

@@ -145,6 +145,21 @@ void light_shadow_points(const CellTransport& cell, const FrameLight& light, Rel
   }
 }
 
+// The pixels of a block show what the one does that has a ray.
+void fill_blocks(const CellTransport::Blocks& blocks, CellPicture& picture) {
+  for (int y = 0; y < blocks.rows; ++y) {
+    for (int x = 0; x < blocks.columns; ++x) {
+      const auto to = static_cast<std::size_t>(y * cell_size + x);
+      const auto from = static_cast<std::size_t>(blocks.middle(y, blocks.rows) * cell_size +
+                                                 blocks.middle(x, blocks.columns));
+      picture.added[to] = picture.added[from];
+      picture.share[to] = picture.share[from];
+      picture.passed[to] = picture.passed[from];
+      picture.seen[to] = picture.seen[from];
+    }
+  }
+}
+
 }  // namespace
 
 Vec3f plate_at(const capture::Image& level, float x, float y) {
@@ -163,6 +178,7 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
 
 void CellTransport::clear() {
   empty = true;
+  blocks = {};
   base.fill({});
   nx.fill(0), ny.fill(0), nz.fill(0);
   diffuse.fill({});
@@ -262,6 +278,7 @@ void relight(const CellTransport& cell,
     picture.passed[k] /= n;
     picture.seen[k] /= n;
   }
+  if (cell.blocks.size > 1) fill_blocks(cell.blocks, picture);
 }
 
 }  // namespace render

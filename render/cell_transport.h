@@ -99,7 +99,20 @@ struct CellTransport {
     Base base;
   };
 
+  // Pixels that share a camera ray.
+  struct Blocks {
+    int size = 1;                               // pixels a side
+    int columns = cell_size, rows = cell_size;  // of the cell's pixels that are in the picture
+
+    // The pixel that stands for its block: one next to the middle.
+    int middle(int i, int end) const { return std::min(i - i % size + (size - 1) / 2, end - 1); }
+    bool has_ray(int x, int y) const {
+      return x < columns && y < rows && middle(x, columns) == x && middle(y, rows) == y;
+    }
+  };
+
   bool empty = true;  // nothing but plate
+  Blocks blocks;
   std::array<Base, cell_pixels> base;
   // Centres that receive light: normals and answers; masks say which.
   alignas(64) std::array<float, cell_pixels> nx, ny, nz;

@@ -7,15 +7,20 @@ namespace render {
 
 namespace {
 
-constexpr float coarse_accuracy = 0.95F, coarse_contrast = 0.4F;
+constexpr float block_accuracy = 0.8F, coarse_accuracy = 0.95F, coarse_contrast = 0.4F;
 
 }  // namespace
+
+int block_of_stage(int stage) { return 1 << std::max(one_ray_stage - stage, 0); }
 
 Effort effort_of_stage(const Effort& effort, int stage) {
   Effort coarse = effort;
   if (stage >= finished_stage) return coarse;
-  coarse.accuracy = std::min(effort.accuracy, coarse_accuracy);
-  if (stage > 0) {
+  const bool blocks = stage < one_ray_stage;
+  coarse.accuracy = std::min(effort.accuracy, blocks ? block_accuracy : coarse_accuracy);
+  // Of a block, the pixel that stands for all would see the same share of the lights everywhere.
+  if (blocks) coarse.interleave = 1;
+  if (stage > one_ray_stage) {
     const auto at_least = [](float value) {
       return value > 0 ? std::max(value, coarse_contrast) : 0.0F;
     };

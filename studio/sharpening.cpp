@@ -8,16 +8,15 @@
 namespace studio {
 namespace {
 
-using render::finished_stage;
+using render::finished_stage, render::one_ray_stage;
 
 constexpr double share_of_frame = 0.6;  // of its time, for rendering
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
-// Of the cells, as many coarse ones as are found in a frame however long they take.
-constexpr double least = 0.01;
-
 // What a stage takes, in cells of the coarsest.
-constexpr std::array<double, render::refinement_stages> cost{1, 4, 16};
+constexpr std::array<double, render::refinement_stages> cost{1, 4, 16, 64, 256, 1024};
+// Of the cells, as many are found in a frame with a ray a pixel however long they take.
+constexpr double least = 0.01 * cost[one_ray_stage];
 
 // The step through all cells in which they take their turns, spread over the picture: by the golden
 // section (Knuth, "The Art of Computer Programming" 3, 6.4).
@@ -35,7 +34,10 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
 // What a frame may spend, in coarse cells.
 double Sharpening::budget(std::size_t cells) const {
   const auto all = static_cast<double>(cells);
-  if (!live_) return all * (cost[1] + cost[2]) / std::max(frames_a_second_ - 1, 1.0);
+  if (!live_) {
+    const double rest = cost[one_ray_stage + 1] + cost[finished_stage];
+    return all * rest / std::max(frames_a_second_ - 1, 1.0);
+  }
   if (!(cell_ms_ > 0)) return 0;
   const double ms = std::max(share_of_frame * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
   return std::max(ms / cell_ms_, least * all);
@@ -54,8 +56,9 @@ std::vector<std::uint8_t> Sharpening::next(std::span<const int> kept) {
   if (!full_) stopped_ = false;
   double left = budget(cells);
   // What is found anew is as fine at once as there is time for.
-  std::size_t first = 0;
+  std::size_t first = one_ray_stage;
   if (live_) {
+    first = 0;
     while (first < finished_stage && static_cast<double>(lost) * cost[first + 1] <= left) ++first;
   }
   spent_ = static_cast<double>(lost) * cost[first];

@@ -95,6 +95,7 @@ Command bench_command() {
         arguments.option(
             "--pictures", o->pictures,
             "papers: a directory for pictures of every scene: itself, and depth and rays by pixel; "
+            "drag: for what it shows; "
             "cycles: for the scenes as files and all pictures");
         arguments.option("--scene", o->scene, "papers, drag, cycles: only this one");
         arguments.option("--check-error", o->check, 0, 65536,
@@ -106,7 +107,7 @@ Command bench_command() {
           const int runs = static_cast<int>(*o->runs);
           if (o->what == "kernel") return bench_kernel(runs, console);
           if (o->what == "hdr") return bench_hdr(runs, console);
-          if (o->what == "drag") return bench_drag(o->scene, console);
+          if (o->what == "drag") return bench_drag(o->scene, o->pictures, console);
           if (o->what == "papers") {
             return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene},
                                 console);

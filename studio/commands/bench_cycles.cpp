@@ -21,12 +21,11 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/exr.h"
-#include "capture/png.h"
-#include "compositing/display.h"
 #include "render/pixel_rays.h"
 #include "render/trace.h"
 #include "studio/commands/benches.h"
 #include "studio/commands/compare_with_cycles.h"
+#include "studio/display_png.h"
 #include "studio/machine.h"
 #include "studio/peer_scene.h"
 
@@ -215,13 +214,6 @@ std::vector<NamedEffort> efforts() {
   return all;
 }
 
-void write_png(const fs::path& path, const Image& rgba) {
-  const compositing::Display display;
-  std::vector<std::uint8_t> codes(rgba.pixels.size() / 4 * 3);
-  display.to_rgb8(capture::to_half(rgba), codes);
-  capture::write_png(path, rgba.width, rgba.height, 3, codes);
-}
-
 Json compare(const std::string& name, const CyclesBench& bench, Console& console) {
   const fs::path directory = fs::absolute(fs::path(bench.directory) / name);
   PeerScene scene = make_peer_scene(name, width, height);
@@ -243,8 +235,8 @@ Json compare(const std::string& name, const CyclesBench& bench, Console& console
     theirs_converged[i] =
         over_plate(directory / fmt::format("cycles_{}_{}.exr", bench.converged, i + 2), shot.plate);
   }
-  write_png(directory / "platelight.png", ours_converged[0]);
-  write_png(directory / "cycles.png", theirs_converged[0]);
+  write_display_png(directory / "platelight.png", ours_converged[0]);
+  write_display_png(directory / "cycles.png", theirs_converged[0]);
 
   std::vector<Point> their_points, our_points;
   for (const Json& made : theirs["pictures"]) {

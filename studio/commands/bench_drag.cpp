@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 
 #include "render/kernel.h"
 #include "studio/commands/benches.h"
+#include "studio/display_png.h"
 #include "studio/machine.h"
 #include "studio/paper_shot.h"
 #include "studio/sharpening.h"
@@ -42,8 +44,10 @@ double median_of(std::vector<double> values) {
 // The scene's frames one after the other, each as soon as the one before is done.
 class Dragging {
  public:
-  explicit Dragging(const Drag& drag)
+  // `pictures`: a directory for the last picture of the drag, and that of a second later, or none.
+  Dragging(const Drag& drag, std::string pictures)
       : drag_(drag),
+        pictures_(std::move(pictures)),
         shot_(make_paper_shot(drag.scene, width, height).shot),
         scene_(shot_.scene->description()),
         still_(scene_) {
@@ -54,7 +58,7 @@ class Dragging {
   }
 
   Json run() {
-    wait();
+    wait(waited / 10);
     const capture::HalfImage before = result_.rgba;
     std::vector<double> ms;
     double lost = 0;
@@ -66,7 +70,10 @@ class Dragging {
       if (first_changed < 0 && result_.rgba.pixels != before.pixels) first_changed = i;
     }
     const double drag_ms = median_of(ms);
-    const double a_second_later = wait();
+    write_picture("dragged", capture::to_float(result_.rgba));
+    const capture::Image after_1_s = wait(waited);
+    write_picture("a_second_later", after_1_s);
+    const double a_second_later = error_of(after_1_s);
     return {{"scene", drag_.scene},
             {"part", drag_.part},
             {"first_changed_frame", first_changed},
@@ -89,6 +96,11 @@ class Dragging {
     shot_.scene = std::make_unique<render::Scene>(scene_, *shot_.scene);
   }
 
+  void write_picture(const char* when, const capture::Image& rgba) const {
+    if (pictures_.empty() || rgba.pixels.empty()) return;
+    write_display_png(fmt::format("{}/{}_{}.png", pictures_, drag_.scene, when), rgba);
+  }
+
   double show() {
     render::FrameJob job = shot_.job;
     render::FrameInputs inputs = shot_.inputs();
@@ -105,14 +117,14 @@ class Dragging {
     return ms.count();
   }
 
-  // Until the picture is sharp. Returns the error, against the finished picture, of the one that is
-  // shown a second of the clock after the last move.
-  double wait() {
+  // Until the picture is sharp, or for so many frames. Returns what is shown a second of the clock
+  // after the last move, if it takes as long.
+  capture::Image wait(int frames) {
     double passed_ms = 0;
     capture::Image after_1_s;
     sharp_after_s_ = -1;
     sharpness_after_1_s_ = 1;
-    for (int i = 0; i < waited && sharp_after_s_ < 0; ++i) {
+    for (int i = 0; i < frames && sharp_after_s_ < 0; ++i) {
       passed_ms += std::max(show(), 1000 / rate.value());
       if (passed_ms >= 1000 && after_1_s.pixels.empty()) {
         after_1_s = capture::to_float(result_.rgba);
@@ -120,16 +132,22 @@ class Dragging {
       }
       if (sharpening_.share() == 1) sharp_after_s_ = passed_ms * 1e-3;
     }
-    if (after_1_s.pixels.empty()) return 0;
+    return after_1_s;
+  }
+
+  // Against the finished picture; none if that is what was shown before a second was over.
+  double error_of(const capture::Image& shown) {
+    if (shown.pixels.empty()) return 0;
     if (sharp_after_s_ < 0) {
       render::render_frame(shot_.inputs(), shot_.job, shot_.half_plate, result_);
     }
     const capture::Image finished = capture::to_float(result_.rgba);
     const capture::Image mask = render::affected_mask(finished, shot_.plate);
-    return render::picture_error(after_1_s, finished, mask).relative_rms;
+    return render::picture_error(shown, finished, mask).relative_rms;
   }
 
   Drag drag_;
+  std::string pictures_;
   BenchScene shot_;
   render::SceneDescription scene_, still_;
   render::KeptTransport kept_;
@@ -140,14 +158,15 @@ class Dragging {
 
 }  // namespace
 
-void bench_drag(const std::string& only, Console& console) {
+void bench_drag(const std::string& only, const std::string& pictures, Console& console) {
+  if (!pictures.empty()) std::filesystem::create_directories(pictures);
   Json rows = Json::array();
   console.say(
       "scene          dragged            first changed  cells anew   fps   sharp after   error "
       "after 1 s");
   for (const Drag& drag : drags) {
     if (!only.empty() && only != drag.scene) continue;
-    const Json row = Dragging(drag).run();
+    const Json row = Dragging(drag, pictures).run();
     const double sharp_s = row["sharp_after_s"];
     console.say(fmt::format("{:14} {:18} {:>13} {:9.0f} % {:6.1f} {:>13} {:12.1f} %", drag.scene,
                             drag.part, row["first_changed_frame"].get<int>(),

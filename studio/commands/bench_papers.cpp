@@ -9,11 +9,11 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/png.h"
-#include "compositing/display.h"
 #include "render/false_colour.h"
 #include "render/paper_scenes.h"
 #include "studio/commands/benches.h"
 #include "studio/commands/kernel_rate.h"
+#include "studio/display_png.h"
 #include "studio/machine.h"
 #include "studio/paper_shot.h"
 #include "studio/picture_error.h"
@@ -51,13 +51,6 @@ double error_of(const BenchScene& shot,
   render_frame(shot.inputs(), job, shot.half_plate, result);
   picture = capture::to_float(result.rgba);
   return render::picture_error(picture, truth.references, truth.mask).relative_rms;
-}
-
-void write_picture(const std::string& path, const capture::Image& rgba) {
-  const compositing::Display display;
-  std::vector<std::uint8_t> codes(rgba.pixels.size() / 4 * 3);
-  display.to_rgb8(capture::to_half(rgba), codes);
-  capture::write_png(path, rgba.width, rgba.height, 3, codes);
 }
 
 // The depth of every pixel's ray tree and its rays, as the headlight paper's figures 2 and 3.
@@ -111,7 +104,8 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
     row["error"] = error_of(shot, fast, truth, picture);
     row["error_default"] = error_of(shot, shot.job, truth, picture);
     if (!bench.pictures.empty()) {
-      write_picture(fmt::format("{}/{}_reference.png", bench.pictures, name), truth.references[0]);
+      write_display_png(fmt::format("{}/{}_reference.png", bench.pictures, name),
+                        truth.references[0]);
     }
   } else {
     render::FrameResult result;
@@ -119,7 +113,7 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
     picture = capture::to_float(result.rgba);
   }
   if (!bench.pictures.empty()) {
-    write_picture(fmt::format("{}/{}.png", bench.pictures, name), picture);
+    write_display_png(fmt::format("{}/{}.png", bench.pictures, name), picture);
     write_views(fmt::format("{}/{}", bench.pictures, name), shot, fast);
   }
   const auto figures = render::paper_figures();

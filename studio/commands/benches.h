@@ -22,7 +22,8 @@ void bench_papers(const PapersBench& bench, Console& console);
 
 // A part of each scene of the papers, or of one, dragged for a second of frames at 25 a second and
 // then left alone, as a live show does it: when it shows, what a frame takes, when it is sharp.
-void bench_drag(const std::string& scene, Console& console);
+// `pictures`: a directory for what is shown at the end of the drag and a second later, or none.
+void bench_drag(const std::string& scene, const std::string& pictures, Console& console);
 
 struct CyclesBench {
   std::string
