@@ -154,7 +154,7 @@ std::array<float, channels> sample_levels(const Texture& texture,
   const float* colour = texture.srgb ? tables.light_of_code.data() : alpha;
   Level level{texture.texels.data(), texture.width, texture.height};
   const int longer = std::max(texture.width, texture.height);
-  const float footprint_texels = footprint_uv * static_cast<float>(longer);
+  const float footprint_texels = footprint_uv * static_cast<float>(longer) * trilinear_texel;
   if (!(footprint_texels > 1)) return sample_level<channels>(level, u, v, colour, alpha);
 
   // log2 by exponent and mantissa, linear between powers of two: within .09 of a level.

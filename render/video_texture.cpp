@@ -11,6 +11,7 @@
 #include "capture/rgbe.h"
 #include "render/cell_transport.h"
 #include "render/environment.h"
+#include "render/texture.h"
 
 namespace render {
 namespace {
@@ -216,31 +217,35 @@ std::size_t find_video_samples(int width,
   const auto unit = [](float value) {
     return std::isfinite(value) ? std::clamp(value, 0.0F, 1.0F) : 0;
   };
-  u = unit(u);
-  v = unit(v);
-  const auto place = [&](int level, float share) {
+  std::size_t count = 0;
+  const auto add = [&](int level, float at_u, float at_v, float share) {
     const auto w = static_cast<float>(std::max(1, width >> level));
     const auto h = static_cast<float>(std::max(1, height >> level));
-    return VideoSample{static_cast<std::uint32_t>(level), u * w - 0.5F, v * h - 0.5F, share};
+    samples[count++] = {static_cast<std::uint32_t>(level), unit(at_u) * w - 0.5F,
+                        unit(at_v) * h - 0.5F, share};
   };
-  const float footprint_texels =
-      footprint_uv * std::sqrt(static_cast<float>(width) * static_cast<float>(height));
+  const float texels = std::sqrt(static_cast<float>(width) * static_cast<float>(height));
+  const float footprint_texels = std::min(footprint_uv * texels, 1e6F);
   if (!(footprint_texels > 1)) {
-    samples[0] = place(0, 1);
-    return 1;
+    add(0, u, v, 1);
+    return count;
   }
   int last = 0;
   while (std::max(width, height) >> last > 1) ++last;
-  const float level = std::log2(std::min(footprint_texels, 1e6F));
+  const float level = std::max(0.0F, std::log2(trilinear_texel * 0.5F * footprint_texels));
   const int fine = static_cast<int>(level);
-  const float fraction = level - static_cast<float>(fine);
-  if (fine >= last || !(fraction > 0)) {
-    samples[0] = place(std::min(fine, last), 1);
-    return 1;
+  const float fraction = fine < last ? level - static_cast<float>(fine) : 0;
+  // Four places of one, at first.
+  const float apart_texels = 0.25F * footprint_texels * std::min(footprint_texels - 1, 1.0F);
+  const float apart_u = apart_texels / static_cast<float>(width);
+  const float apart_v = apart_texels / static_cast<float>(height);
+  for (const float du : {-apart_u, apart_u}) {
+    for (const float dv : {-apart_v, apart_v}) {
+      add(std::min(fine, last), u + du, v + dv, 0.25F * (1 - fraction));
+      if (fraction > 0) add(fine + 1, u + du, v + dv, 0.25F * fraction);
+    }
   }
-  samples[0] = place(fine, 1 - fraction);
-  samples[1] = place(fine + 1, fraction);
-  return 2;
+  return count;
 }
 
 Vec3f sample(const VideoTexture& texture, float u, float v, float footprint_uv) {

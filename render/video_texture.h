@@ -67,12 +67,13 @@ struct VideoSample {
   std::uint32_t level;
   float x, y, share;
 };
-inline constexpr std::size_t most_video_samples = 2;
+inline constexpr std::size_t most_video_samples = 8;
 
 // The places of a look-up at (u, v), 0..1 from the picture's top left, into a video of this size;
-// its outermost texels go on beyond. `footprint_uv` is the filter's width, in units of u and v on a
-// surface that shows the picture undistorted: trilinear between the two nearest levels, bilinear
-// where it is below a texel. Returns how many. What is not finite counts as 0.
+// its outermost texels go on beyond. `footprint_uv` is the width, in units of u and v on a surface
+// that shows the picture undistorted, of the square whose mean is wanted: four trilinear places
+// as in texture.h, each for a quarter of it; bilinear where it is below a texel. Returns how many.
+// What is not finite counts as 0.
 std::size_t find_video_samples(int width,
                                int height,
                                float u,

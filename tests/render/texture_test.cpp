@@ -67,6 +67,24 @@ TEST(Texture, IsContinuousInTheFootprintAndAcrossItsEdge) {
   EXPECT_NEAR(sample(texture, 0.0F, 0.5F, 0)[0], sample(texture, 0.99999F, 0.5F, 0)[0], 2e-3);
 }
 
+// An edge, as squares of any size cross it.
+TEST(Texture, IsNearTheMeanOfASquare) {
+  constexpr int edge = 31;
+  std::vector<std::uint8_t> texels(64 * 64);
+  for (std::size_t i = 0; i < texels.size(); ++i) texels[i] = i % 64 < edge ? 0 : 255;
+  const Texture texture = make_texture(64, 64, 1, false, texels);
+  for (const float width : {1.5F, 2.0F, 3.0F, 4.0F, 6.0F, 8.0F, 12.0F}) {
+    double squares = 0;
+    int count = 0;
+    for (float x = edge - width; x < edge + width; x += 0.13F) {
+      const float mean = std::clamp((x - edge) / width + 0.5F, 0.0F, 1.0F);
+      squares += std::pow(sample(texture, x / 64, 0.4F, width / 64)[0] - mean, 2);
+      ++count;
+    }
+    EXPECT_LT(std::sqrt(squares / count), 0.08) << width;
+  }
+}
+
 TEST(Texture, StaysFiniteForAnyCoordinate) {
   const Texture texture = make_texture(3, 7, 2, false, random_texels(42, 3));
   for (const float bad : {NAN, INFINITY, -INFINITY, 1e30F, -1e30F, -0.0F, 1.0F, -1e-20F}) {

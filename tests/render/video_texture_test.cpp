@@ -144,11 +144,41 @@ TEST(SampleVideo, GoesOnBeyondTheEdgeAndDoesNotRepeat) {
   EXPECT_EQ(sample(texture, std::nanf(""), 0.5F, std::nanf("")).x, 0);
 }
 
+// A picture's edge, as squares of any size cross it.
+TEST(SampleVideo, IsTheMeanOfASquare) {
+  constexpr int edge = 31;
+  capture::Image image = capture::make_image(64, 64);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = edge; x < 64; ++x) image.at(y, x, 0) = 1;
+  }
+  const VideoTexture texture = make_video_texture(image);
+  for (const float width : {1.5F, 2.0F, 3.0F, 4.0F, 6.0F, 8.0F, 12.0F}) {
+    double squares = 0;
+    int count = 0;
+    for (float x = edge - width; x < edge + width; x += 0.13F) {
+      const float mean = std::clamp((x - edge) / width + 0.5F, 0.0F, 1.0F);
+      squares += std::pow(sample(texture, x / 64, 0.4F, width / 64).x - mean, 2);
+      ++count;
+    }
+    EXPECT_LT(std::sqrt(squares / count), 0.05) << width;
+  }
+}
+
+TEST(SampleVideo, HasNoJumpAsSquaresGrow) {
+  const VideoTexture texture = make_video_texture(noise(64, 64));
+  float before = sample(texture, 0.43F, 0.58F, 0.9F / 64).x;
+  for (float footprint = 0.9F / 64; footprint < 1; footprint *= 1.01F) {
+    const float now = sample(texture, 0.43F, 0.58F, footprint).x;
+    EXPECT_NEAR(now, before, 0.03F) << footprint;
+    before = now;
+  }
+}
+
 TEST(SampleVideo, NearsTheMeanAsTheFilterGrows) {
   const VideoTexture texture = make_video_texture(noise(64, 64));
   const float mean = texture.levels.back().at(0, 0, 0);
   float before = 2;
-  for (const float footprint : {0.0F, 0.06F, 0.2F, 1.0F, 3.0F}) {
+  for (const float footprint : {0.0F, 0.06F, 0.2F, 1.0F, 8.0F}) {
     float worst = 0;
     for (float u = 0.05F; u < 1; u += 0.1F)
       worst = std::max(worst, std::abs(sample(texture, u, u, footprint).x - mean));
