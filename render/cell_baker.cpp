@@ -492,6 +492,8 @@ void CellBaker::bounce() {
       p.spread_rad = q.spread_rad;
       p.footprint_m = q.footprint_m + (hit ? stream_.far_m[i] * q.spread_rad : 0);
       p.blur_m = hit ? stream_.far_m[i] * lobe_width(q.roughness) : 0;
+      // It stands for a part of a lobe whose parts overlap.
+      if (q.one_of_many) p.blur_m = p.footprint_m;
       p.throughput = q.throughput;
       if (hit && q.media.count > 0) {
         p.throughput =

@@ -29,7 +29,7 @@ enum class RayKind : std::uint8_t {
 struct SeenVideo {
   std::int32_t index = -1;  // of SceneDescription::videos, or none
   float u = 0, v = 0;
-  float footprint_uv = 0;  // see find_video_samples
+  float footprint_uv = 0, blur_uv = 0;  // see find_video_samples
   Vec3f gain;
 };
 

@@ -34,8 +34,10 @@ class StandardShader final : public Shader {
       const StandardWeights weights = standard_weights(surface, view);
       constexpr float per_pi = 0.318309886F;
       if (block.emission_video >= 0) {
-        p->video = {block.emission_video, p->hit.u, p->hit.v,
-                    std::max(p->footprint_m, p->blur_m) * p->hit.uv_per_metre, surface.emission};
+        const float uv_per_metre = p->hit.uv_per_metre;
+        p->video = {
+            block.emission_video,     p->hit.u,        p->hit.v, p->footprint_m * uv_per_metre,
+            p->blur_m * uv_per_metre, surface.emission};
       } else {
         p->radiance = surface.emission;
       }

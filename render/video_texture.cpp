@@ -213,6 +213,7 @@ std::size_t find_video_samples(int width,
                                float u,
                                float v,
                                float footprint_uv,
+                               float blur_uv,
                                std::array<VideoSample, most_video_samples>& samples) {
   const auto unit = [](float value) {
     return std::isfinite(value) ? std::clamp(value, 0.0F, 1.0F) : 0;
@@ -226,23 +227,34 @@ std::size_t find_video_samples(int width,
   };
   const float texels = std::sqrt(static_cast<float>(width) * static_cast<float>(height));
   const float footprint_texels = std::min(footprint_uv * texels, 1e6F);
-  if (!(footprint_texels > 1)) {
+  const float blur_texels = std::min(blur_uv * texels, 1e6F);
+  const bool blurred = blur_texels >= footprint_texels;
+  const float widest = blurred ? blur_texels : footprint_texels;
+  if (!(widest > 1)) {
     add(0, u, v, 1);
     return count;
   }
   int last = 0;
   while (std::max(width, height) >> last > 1) ++last;
-  const float level = std::max(0.0F, std::log2(trilinear_texel * 0.5F * footprint_texels));
-  const int fine = static_cast<int>(level);
+  const float texel = blurred ? blur_texels : trilinear_texel * 0.5F * footprint_texels;
+  const float level = std::max(0.0F, std::log2(texel));
+  const int fine = std::min(static_cast<int>(level), last);
   const float fraction = fine < last ? level - static_cast<float>(fine) : 0;
+  const auto add_trilinear = [&](float at_u, float at_v, float share) {
+    add(fine, at_u, at_v, share * (1 - fraction));
+    if (fraction > 0) add(fine + 1, at_u, at_v, share * fraction);
+  };
+  if (blurred) {
+    add_trilinear(u, v, 1);
+    return count;
+  }
   // Four places of one, at first.
   const float apart_texels = 0.25F * footprint_texels * std::min(footprint_texels - 1, 1.0F);
   const float apart_u = apart_texels / static_cast<float>(width);
   const float apart_v = apart_texels / static_cast<float>(height);
   for (const float du : {-apart_u, apart_u}) {
     for (const float dv : {-apart_v, apart_v}) {
-      add(std::min(fine, last), u + du, v + dv, 0.25F * (1 - fraction));
-      if (fraction > 0) add(fine + 1, u + du, v + dv, 0.25F * fraction);
+      add_trilinear(u + du, v + dv, 0.25F);
     }
   }
   return count;
@@ -251,7 +263,7 @@ std::size_t find_video_samples(int width,
 Vec3f sample(const VideoTexture& texture, float u, float v, float footprint_uv) {
   std::array<VideoSample, most_video_samples> samples;
   const std::size_t count =
-      find_video_samples(texture.width(), texture.height(), u, v, footprint_uv, samples);
+      find_video_samples(texture.width(), texture.height(), u, v, footprint_uv, 0, samples);
   Vec3f sum;
   for (std::size_t i = 0; i < count; ++i) {
     const auto& [level, x, y, share] = samples[i];

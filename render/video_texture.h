@@ -72,13 +72,15 @@ inline constexpr std::size_t most_video_samples = 8;
 // The places of a look-up at (u, v), 0..1 from the picture's top left, into a video of this size;
 // its outermost texels go on beyond. `footprint_uv` is the width, in units of u and v on a surface
 // that shows the picture undistorted, of the square whose mean is wanted: four trilinear places
-// as in texture.h, each for a quarter of it; bilinear where it is below a texel. Returns how many.
+// as in texture.h, each for a quarter of it; bilinear where it is below a texel. `blur_uv`: how
+// wide the texels of a level are that does for a rough lobe, if that is as wide. Returns how many.
 // What is not finite counts as 0.
 std::size_t find_video_samples(int width,
                                int height,
                                float u,
                                float v,
                                float footprint_uv,
+                               float blur_uv,
                                std::array<VideoSample, most_video_samples>& samples);
 
 // Light at (u, v), filtered so.
