@@ -72,6 +72,7 @@ void CellBaker::bake(const FrameContext& frame,
   queue_.clear();
   lamp_terms_.clear();
   lamps_apart_.fill(0);
+  sent_.fill(0);
   trace_centres();
   const bool smooth_edges = effort_.aa_samples > 1;
   if (smooth_edges) keep_centres();

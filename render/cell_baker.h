@@ -220,6 +220,7 @@ class CellBaker final : public RaySink {
   std::vector<QueuedRay> queue_;         // capacity reserved
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
   std::uint32_t pushed_ = 0;
+  std::array<int, cell_pixels> sent_{};  // rays that surfaces have sent on, by pixel
 
   std::array<Sample, slots> samples_;  // centres, then further ones shaded on their own
   std::array<CellTransport::Base, slots> base_;

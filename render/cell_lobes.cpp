@@ -97,8 +97,10 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     }
   }
   // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
-  const bool deep = from.depth >= effort_.max_depth || queue_.size() == queue_.capacity();
-  if (deep) ++statistics_->depth_limit_hits;
+  const bool deep = from.depth >= effort_.max_depth;
+  const bool many = sent_[from.pixel] >= effort_.max_rays || queue_.size() == queue_.capacity();
+  statistics_->depth_limit_hits += deep;
+  statistics_->ray_limit_hits += many;
   const auto too_dim = [&] {
     const float least = 1 - effort_.accuracy;
     if (straight || weight >= least) return weight < least;
@@ -107,7 +109,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
                  frame_->brightest_video);
     return weight * brightest < least;
   };
-  if (deep || too_dim()) {
+  if (deep || many || too_dim()) {
     if (effort_.dark_cuts) return;
     if (straight) {
       CellTransport::Base& base = base_[target_of(from)];
@@ -123,6 +125,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     }
     return;
   }
+  ++sent_[from.pixel];
   queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.footprint_m,
                     spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
                     static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps, ray.media});

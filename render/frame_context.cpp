@@ -68,6 +68,7 @@ std::uint64_t transport_key(const FrameContext& context) {
   key.mix(e.aa_samples), key.mix(e.aa_tolerance), key.mix(e.glint_contrast);
   key.mix(e.interleave), key.mix(std::uint64_t{e.adaptive_visibility});
   key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
+  key.mix(e.max_rays);
   key.mix(std::uint64_t{e.dark_cuts});
   return key.value();
 }
@@ -180,6 +181,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   }
   if (!(e.accuracy >= 0 && e.accuracy <= 1)) throw std::invalid_argument("accuracy must be 0 to 1");
   if (e.max_depth < 0 || e.max_depth > 64) throw std::invalid_argument("max_depth must be 0 to 64");
+  if (e.max_rays < 0) throw std::invalid_argument("max_rays must be 0 or more");
   if (e.tile_size < cell_size || e.tile_size % cell_size != 0) {
     throw std::invalid_argument("tile_size must be a multiple of 16");
   }

@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t frame_job_magic = 0x354A4650;  // "PFJ5"
+constexpr std::uint32_t frame_job_magic = 0x364A4650;  // "PFJ6"
 constexpr std::uint32_t tile_job_magic = 0x314A5450;   // "PTJ1"
 
 // Calls visit on every single number of an Effort, so that writing and reading cannot differ.
@@ -16,7 +16,7 @@ void for_each_setting(E& effort, F&& visit) {
       visit(effort.light_samples), visit(effort.interleave);
   visit(effort.adaptive_visibility), visit(effort.cull_lights), visit(effort.accuracy),
       visit(effort.dark_cuts);
-  visit(effort.max_depth), visit(effort.tile_size);
+  visit(effort.max_depth), visit(effort.max_rays), visit(effort.tile_size);
 }
 
 template <class R, class F>
@@ -126,6 +126,7 @@ RenderStatistics& RenderStatistics::operator+=(const RenderStatistics& o) {
   secondary_rays += o.secondary_rays;
   kept_rays += o.kept_rays;
   depth_limit_hits += o.depth_limit_hits;
+  ray_limit_hits += o.ray_limit_hits;
   clamped_values += o.clamped_values;
   clipped_plate += o.clipped_plate;
   virtual_pixels += o.virtual_pixels;

@@ -33,6 +33,7 @@ struct Effort {
   float accuracy = 0.97F;  // rays whose share of the pixel falls below 1 - accuracy are cut
   bool dark_cuts = false;  // cut rays see nothing, instead of the environment: for charts
   int max_depth = 64;      // safety net; counted when hit
+  int max_rays = 65536;    // that surfaces send on for a pixel; another safety net
   int tile_size = 32;      // pixels, a multiple of 16
   friend bool operator==(const Effort&, const Effort&) = default;
 };
@@ -86,6 +87,7 @@ struct RenderStatistics {
   std::uint64_t secondary_rays = 0;
   std::uint64_t kept_rays = 0;         // that transport kept from earlier frames stands for
   std::uint64_t depth_limit_hits = 0;  // rays that max_depth ended
+  std::uint64_t ray_limit_hits = 0;    // and those that max_rays did
   std::uint64_t clamped_values = 0;    // outputs beyond half, or not finite, made finite
   std::uint64_t clipped_plate = 0;     // stand-in pixels whose plate is clipped
   std::uint64_t virtual_pixels = 0;    // with A > 0

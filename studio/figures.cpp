@@ -20,6 +20,7 @@ Json effort_json(const render::Effort& effort) {
           {"cull_lights", effort.cull_lights},
           {"accuracy", effort.accuracy},
           {"max_depth", effort.max_depth},
+          {"max_rays", effort.max_rays},
           {"tile_size", effort.tile_size}};
 }
 
@@ -105,6 +106,7 @@ std::string show_figures(const Set& set,
             {"damaged_plate_frames", s.damaged_plate_frames},
             {"clamped_values", s.statistics.clamped_values},
             {"depth_limit_hits", s.statistics.depth_limit_hits},
+            {"ray_limit_hits", s.statistics.ray_limit_hits},
             {"clipped_plate_pixels", s.statistics.clipped_plate},
             {"virtual_pixels", s.statistics.virtual_pixels},
             {"affected_pixels", s.statistics.affected_pixels},

@@ -130,6 +130,7 @@ render::Effort read_effort_section(Section section) {
   section.boolean("cull_lights", effort.cull_lights);
   section.number("accuracy", effort.accuracy, {0, 1});
   section.integer("max_depth", effort.max_depth, 1, 64);
+  section.integer("max_rays", effort.max_rays, 0, 1'000'000);
   section.integer("tile_size", effort.tile_size, 16, 1024);
   if (effort.tile_size % 16 != 0) section.fault("tile_size", "must be a multiple of 16");
   section.finish();

@@ -40,7 +40,8 @@ Json rays_of(const BenchScene& shot, const render::FrameJob& job) {
   return {{"primary", s.primary_rays},
           {"shadow", s.shadow_rays},
           {"secondary", s.secondary_rays},
-          {"depth_limit_hits", s.depth_limit_hits}};
+          {"depth_limit_hits", s.depth_limit_hits},
+          {"ray_limit_hits", s.ray_limit_hits}};
 }
 
 double error_of(const BenchScene& shot,

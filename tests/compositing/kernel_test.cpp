@@ -467,6 +467,7 @@ TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
   refuse([](render::FrameJob& job) { job.effort.tile_size = 20; });
   refuse([](render::FrameJob& job) { job.effort.accuracy = 2; });
   refuse([](render::FrameJob& job) { job.effort.max_depth = -1; });
+  refuse([](render::FrameJob& job) { job.effort.max_rays = -1; });
   refuse([](render::FrameJob& job) { job.lights.lights[0].irradiance.x = std::nanf(""); });
   refuse([](render::FrameJob& job) {
     job.lights.lights.assign(render::most_compact_lights + 1, {{0, 0, 1}, {1, 1, 1}, 0, 1});

@@ -148,6 +148,12 @@ TEST(KernelAtTheEdge, CountsTheDepthLimitInAHallOfMirrors) {
   MadeShot shot = made_shot(40, 30, scene);
   shot.job.effort.accuracy = 1;
   EXPECT_GT(render(shot).statistics.depth_limit_hits, 1000U);
+  EXPECT_EQ(render(shot).statistics.ray_limit_hits, 0U);
+  shot.job.effort.max_rays = 5;
+  const render::RenderStatistics few = render(shot).statistics;
+  EXPECT_EQ(few.depth_limit_hits, 0U);
+  EXPECT_EQ(few.secondary_rays, 5U * 40 * 30);
+  EXPECT_EQ(few.ray_limit_hits, 40U * 30);
 }
 
 }  // namespace

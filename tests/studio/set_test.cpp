@@ -112,6 +112,7 @@ adaptive_visibility = false
 cull_lights = false
 accuracy = 0.9
 max_depth = 4
+max_rays = 900
 tile_size = 32
 [display]
 display = "sRGB"
