@@ -162,15 +162,22 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
     p.hit = frame_->inputs.scene->hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i],
                                             p.incoming);
   }
-  p.spread_rad = frame_->pixel_angle * static_cast<float>(block_);
-  p.blur_m = 0;
-  p.footprint_m = s.far_m[i] < ray_far ? s.far_m[i] * p.spread_rad : 0;
+  p.footprint_m = p.blur_m = 0;
   p.throughput = {1, 1, 1};
   p.pixel = pixel;
   p.slot = slot;
   p.kind = RayKind::camera;
   p.depth = 0;
   p.media.count = 0;
+}
+
+// The cone of a camera ray: round, so wide.
+void CellBaker::set_camera_cone(ShadePoint& p, int index, float width_rad) const {
+  const auto& m = frame_->set_from_cam;
+  const Vec3f right{m[0], m[3], m[6]};
+  const Vec3f a = normalize(right - p.incoming * dot(right, p.incoming));
+  const float far_m = stream_.far_m[static_cast<std::size_t>(index)];
+  arrive(p, {}, {a * width_rad, cross(p.incoming, a) * width_rad}, far_m);
 }
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.
@@ -267,7 +274,9 @@ void CellBaker::shade_centres() {
     const auto pixel = static_cast<std::uint32_t>(y * cell_size + x);
     if (!is_inside(pixel)) continue;
     if (stream_.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID) {
-      set_point(points_[static_cast<std::size_t>(count++)], i, pixel, pixel);
+      ShadePoint& p = points_[static_cast<std::size_t>(count++)];
+      set_point(p, i, pixel, pixel);
+      set_camera_cone(p, i, frame_->pixel_angle * static_cast<float>(block_));
     } else {
       ShadePoint& p = points_[stream_rays - ++leaving];
       set_point(p, i, pixel, pixel);
@@ -490,8 +499,7 @@ void CellBaker::bounce() {
           hit ? points_[static_cast<std::size_t>(count++)] : points_[stream_rays - ++leaving];
       set_point(p, static_cast<int>(i), q.pixel, q.slot);
       if (!hit) group_[leaving - 1] = &p;
-      p.spread_rad = q.spread_rad;
-      p.footprint_m = q.footprint_m + (hit ? stream_.far_m[i] * q.spread_rad : 0);
+      if (hit) arrive(p, q.steps, q.spread, stream_.far_m[i]);
       p.blur_m = hit ? stream_.far_m[i] * lobe_width(q.roughness) : 0;
       // It stands for a part of a lobe whose parts overlap.
       if (q.one_of_many) p.blur_m = p.footprint_m;

@@ -47,8 +47,7 @@ class CellBaker final : public RaySink {
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;
-    Spread spread;
-    float footprint_m, spread_rad;
+    Spread spread, steps;  // across the sample's cone: of directions, of where it begins
     float roughness;
     std::uint32_t pixel, slot;
     RayKind kind;
@@ -123,6 +122,7 @@ class CellBaker final : public RaySink {
   void trace(int count, bool coherent, RayKind kind);
   void set_camera_ray(int i, Vec3f v_cam);
   void set_point(ShadePoint& p, int i, std::uint32_t pixel, std::uint32_t slot);
+  void set_camera_cone(ShadePoint& p, int i, float width_rad) const;
   void trace_centres();
   void shade_centres();
   template <class F>

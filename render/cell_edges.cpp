@@ -199,8 +199,7 @@ void CellBaker::finish_further(int count) {
     ShadePoint& p =
         hit ? points_[static_cast<std::size_t>(shaded++)] : points_[stream_rays - ++leaving];
     set_point(p, i, f.pixel, static_cast<std::uint32_t>(slot));
-    p.spread_rad *= finer;
-    p.footprint_m *= finer;
+    if (hit) set_camera_cone(p, i, frame_->pixel_angle * finer);
     if (hit && neighbour >= 0 && edge_[f.pixel] != Edge::shadow)
       lender_[static_cast<std::size_t>(shaded - 1)] = static_cast<std::int16_t>(neighbour);
     if (!hit) group_[leaving - 1] = &p;

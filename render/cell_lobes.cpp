@@ -19,10 +19,10 @@ constexpr std::uint32_t parts_of_source = 4;
 // Of a source so many of its radii from a lobe's middle, places that are not drawn will do.
 constexpr float far_source = 3;
 
-// The mean width of a cone. What goes straight on keeps it.
-float spread_of(const Spread& spread, const ShadePoint& from) {
-  const float area = length(spread.a) * length(spread.b);
-  return area > 0 ? std::min(std::sqrt(area), widest_rad) : from.spread_rad;
+// Not wider than cones get.
+Vec3f bounded(Vec3f turn) {
+  const float squared = dot(turn, turn);
+  return squared > widest_rad * widest_rad ? turn * (widest_rad / std::sqrt(squared)) : turn;
 }
 
 // Unit vectors across a unit direction.
@@ -33,6 +33,13 @@ struct Across {
             cross(std::abs(direction.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}, direction))),
         b(cross(direction, a)) {}
 };
+
+// A cone about a direction as wide as that, but round.
+Spread rounded(const Spread& spread, Vec3f direction) {
+  const float width_rad = std::sqrt(length(spread.a) * length(spread.b));
+  const Across across(direction);
+  return {across.a * width_rad, across.b * width_rad};
+}
 
 }  // namespace
 
@@ -80,6 +87,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   pushed_ = pushing_ == &from ? pushed_ + 1 : 0;
   pushing_ = &from;
   NewRay ray = asked;
+  const bool as_it_came = asked.spread.a == Vec3f{} && asked.spread.b == Vec3f{};
+  ray.spread = as_it_came ? from.turns : Spread{bounded(asked.spread.a), bounded(asked.spread.b)};
   const bool one_of_many = turn_within_lobe(from, pushed_, ray);
   const bool straight = ray.kind == RayKind::camera;
   bool lamps = lamps_apart_[static_cast<std::size_t>(&from - points_.data())] != 0;
@@ -101,11 +110,13 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const bool many = sent_[from.pixel] >= effort_.max_rays || queue_.size() == queue_.capacity();
   statistics_->depth_limit_hits += deep;
   statistics_->ray_limit_hits += many;
+  const float least = 1 - effort_.accuracy;
+  // What little a ray adds is not worth many steps along its cone.
+  const Spread cone = straight || weight >= least ? ray.spread : rounded(ray.spread, ray.direction);
   const auto too_dim = [&] {
-    const float least = 1 - effort_.accuracy;
     if (straight || weight >= least) return weight < least;
     const float brightest =
-        std::max(largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, ray.spread)),
+        std::max(largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, cone)),
                  frame_->brightest_video);
     return weight * brightest < least;
   };
@@ -118,16 +129,16 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
       base.passed += mean(ray.throughput);
       base.seen += mean(ray.throughput);
     } else if (ray.kind == RayKind::bent) {
-      leave_bent(from.slot, from.pixel, ray.direction, ray.spread, ray.throughput);
+      leave_bent(from.slot, from.pixel, ray.direction, cone, ray.throughput);
     } else if (ray.kind == RayKind::reflection) {
-      add_environment(from.slot, target_of(from), ray.direction, ray.roughness, ray.spread,
-                      one_of_many, ray.throughput);
+      add_environment(from.slot, target_of(from), ray.direction, ray.roughness, cone, one_of_many,
+                      ray.throughput);
     }
     return;
   }
   ++sent_[from.pixel];
-  queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.footprint_m,
-                    spread_of(ray.spread, from), ray.roughness, from.pixel, from.slot, ray.kind,
+  queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.steps,
+                    ray.roughness, from.pixel, from.slot, ray.kind,
                     static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps, ray.media});
 }
 

@@ -99,6 +99,18 @@ float alpha_of(float roughness) {
   return roughness > 0 ? std::min(roughness * roughness, 1.0F) : 0.0F;
 }
 
+// The axes of an ellipse that has `spread` as conjugate diameters.
+Spread axes_of(const Spread& spread) {
+  const Vec3f &a = spread.a, &b = spread.b;
+  const float twice = 2 * dot(a, b), less = dot(a, a) - dot(b, b);
+  const float whole = std::sqrt(twice * twice + less * less);
+  if (!(std::abs(twice) > 1e-3F * whole)) return spread;
+  // The cosine and sine of half of the angle whose tangent is twice / less.
+  const float cosine = std::sqrt(0.5F + 0.5F * less / whole);
+  const float sine = std::copysign(std::sqrt(std::max(0.5F - 0.5F * less / whole, 0.0F)), twice);
+  return {a * cosine + b * sine, b * cosine - a * sine};
+}
+
 // A cone that is longer than wide, taken in steps along its longer side.
 struct ConeSteps {
   float count = 1;
@@ -106,15 +118,16 @@ struct ConeSteps {
   Vec3f step{};
 };
 ConeSteps cone_steps(const Environment& env, float alpha, const Spread& spread) {
-  const float aa = dot(spread.a, spread.a), bb = dot(spread.b, spread.b);
+  const auto [a, b] = axes_of(spread);
+  const float aa = dot(a, a), bb = dot(b, b);
   if (!(aa + bb > 0) || !std::isfinite(aa + bb)) return {};
   const float longer = std::sqrt(std::max(aa, bb)), shorter = std::sqrt(std::min(aa, bb));
   const float texel_rad = pi / static_cast<float>(env.smoothed[0].height);
   // No finer than what the lobe or the map blurs.
   const float narrow = std::max({shorter, lobe_width * alpha, blur_texels * texel_rad});
-  const float count = std::clamp(std::ceil(longer / narrow), 1.0F, most_steps);
+  const float count = std::clamp(std::ceil(0.99F * longer / narrow), 1.0F, most_steps);
   return {count, std::sqrt(std::max(longer / count, shorter) * shorter),
-          (aa > bb ? spread.a : spread.b) * (1 / count)};
+          (aa > bb ? a : b) * (1 / count)};
 }
 
 // Gathers the samples of one direction.

@@ -57,7 +57,7 @@ std::array<float, 2> texel_of_direction(Vec3f direction, int width, int height);
 double texel_solid_angle(int row, int width, int height);
 
 // How directions change across a sample's cone, one way and the other: full widths in radians, both
-// perpendicular to the middle direction. Nothing: one ray.
+// perpendicular to the middle direction, as conjugate diameters of an ellipse. Nothing: one ray.
 struct Spread {
   Vec3f a, b;
 };

@@ -114,11 +114,7 @@ class GlassShader final : public Shader {
       const float less = -(dot(widened, normal) + dot(p.incoming, turn));  // of the cosine
       return widened * ratio + turn * bend + normal * (less * ratio * (1 - ratio * from / to));
     };
-    const Vec3f slant = normalize(-p.incoming - normal * from);
-    const Vec3f side = cross(normal, slant);
-    const Vec3f across = normalize(cross(side, p.incoming));
-    return {turned(slant * (p.footprint_m / std::max(from, 0.1F)), across * p.spread_rad),
-            turned(side * p.footprint_m, side * p.spread_rad)};
+    return {turned(p.steps.a, p.turns.a), turned(p.steps.b, p.turns.b)};
   }
 };
 

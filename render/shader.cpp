@@ -1,6 +1,8 @@
 // The registry of shaders.
 #include "render/shader.h"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <stdexcept>
 
@@ -35,20 +37,27 @@ std::shared_ptr<const T> find(const Table<T>& table, std::string_view name, cons
 
 }  // namespace
 
-// Seen at a slant the cone covers a longer piece of surface that way.
+void arrive(ShadePoint& p, const Spread& steps, const Spread& turns, float distance_m) {
+  const auto arrived = [&](Vec3f step, Vec3f turn) {
+    const Vec3f moved = step + turn * distance_m;
+    return moved - p.incoming * dot(moved, p.incoming);
+  };
+  const Vec3f a = arrived(steps.a, turns.a), b = arrived(steps.b, turns.b);
+  p.footprint_m = std::sqrt(length(a) * length(b));
+  // Seen at a slant the cone covers a longer piece of surface that way.
+  const Vec3f normal = p.hit.normal;
+  const Vec3f along = p.incoming * (1 / std::max(-dot(normal, p.incoming), 0.1F));
+  p.steps = {a + along * dot(a, normal), b + along * dot(b, normal)};
+  p.turns = turns;
+}
+
 Spread mirrored_spread(const ShadePoint& p, Vec3f normal, Vec3f view) {
   const float cosine = dot(normal, view);
-  const Vec3f slant = normalize(view - normal * cosine);
-  const Vec3f side = cross(normal, slant);
-  const auto mirrored_turn = [&](Vec3f step) {
+  const auto mirrored_turn = [&](Vec3f step, Vec3f widened) {
     const Vec3f turn = turn_of_normal(p.hit, step);
-    return (normal * dot(turn, view) + turn * cosine) * 2;
+    return widened + turn * (2 * cosine) + normal * (2 * (dot(turn, view) - dot(widened, normal)));
   };
-  Spread spread{mirrored_turn(slant * (p.footprint_m / std::max(cosine, 0.1F))),
-                mirrored_turn(side * p.footprint_m)};
-  spread.b += side * p.spread_rad;
-  spread.a += normalize(cross(side, mirrored(view, normal))) * p.spread_rad;
-  return spread;
+  return {mirrored_turn(p.steps.a, p.turns.a), mirrored_turn(p.steps.b, p.turns.b)};
 }
 
 void register_shader(std::string name, std::shared_ptr<const Shader> shader) {

@@ -41,7 +41,8 @@ struct ShadePoint {
   Vec3f incoming;           // unit, direction of the ray that arrived
   float footprint_m = 0;    // width of the sample's cone here
   float blur_m = 0;         // width here of the rough lobe that a ray in its middle stands for
-  float spread_rad = 0;     // by how much that cone widens a metre: its full angle
+  Spread steps;             // across that cone: how the hit moves on the surface, in metres,
+  Spread turns;             // ... and how `incoming` turns
   Vec3f throughput;         // share of the pixel that this ray carries
   std::uint32_t pixel = 0;  // index in the cell, for patterns
   std::uint32_t slot = 0;   // the sample that the result is added to
@@ -68,13 +69,20 @@ struct NewRay {
   Vec3f throughput;  // the point's own, times the surface's share
   Vec3f normal;      // that the lobe lies about; zero = straight through
   float roughness;   // of the lobe, 0 = mirror: picks the environment's smoothing
-  Spread spread;     // of the sample's cone from here on
+  Spread spread;     // of the sample's cone from here on; nothing = as it came
   RayKind kind;
   Media media = {};  // that it goes on in
 };
 
-// The cone of a sample that is mirrored at a surface of unit normal `normal` to the unit direction
-// `view` that it came from. A curved mirror widens it by twice the angle that its normal turns.
+// Fills footprint, steps and turns of a point with its hit and incoming: the cone of a sample whose
+// ray came `distance_m` far, and where it began moved by `steps` across it, while its direction
+// turned by `turns`. Of first order.
+//
+// Igehy, "Tracing Ray Differentials", SIGGRAPH 1999, section 3.
+void arrive(ShadePoint& p, const Spread& steps, const Spread& turns, float distance_m);
+
+// How directions change across the cone of a sample that is mirrored at a surface of unit normal
+// `normal` to the unit direction `view` that it came from. From the same paper.
 Spread mirrored_spread(const ShadePoint& p, Vec3f normal, Vec3f view);
 
 // Where shade() puts rays. Rays whose share is too small are replaced by the environment's (or the

@@ -53,7 +53,7 @@ class RenderChart {
         out_(request.out),
         width_(quick_ ? 64 : 320),
         height_(quick_ ? 48 : 240),
-        paths_(quick_ ? 32 : 128),
+        paths_(quick_ ? 512 : 128),  // in few pixels noise does not even out
         console_(console) {
     if (!out_.empty()) std::filesystem::create_directories(out_);
   }
