@@ -18,6 +18,10 @@ constexpr float wide_lobe = 2;
 constexpr std::uint32_t parts_of_source = 4;
 // Of a source so many of its radii from a lobe's middle, places that are not drawn will do.
 constexpr float far_source = 3;
+// By how much weaker rays inside a clear body may be before they are cut. What lies straight on is
+// not what they see where they come out, and that may be the sun. One ray a pixel shows nothing
+// that small.
+constexpr float inside_glass = 0.125F;
 
 // Not wider than cones get.
 Vec3f bounded(Vec3f turn) {
@@ -110,7 +114,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const bool many = sent_[from.pixel] >= effort_.max_rays || queue_.size() == queue_.capacity();
   statistics_->depth_limit_hits += deep;
   statistics_->ray_limit_hits += many;
-  const float least = 1 - effort_.accuracy;
+  const bool finer = ray.media.count > 0 && effort_.aa_samples > 1;
+  const float least = (1 - effort_.accuracy) * (finer ? inside_glass : 1);
   // What little a ray adds is not worth many steps along its cone.
   const Spread cone = straight || weight >= least ? ray.spread : rounded(ray.spread, ray.direction);
   const auto too_dim = [&] {
