@@ -153,7 +153,7 @@ TEST(KernelAtTheEdge, CountsTheDepthLimitInAHallOfMirrors) {
   const render::RenderStatistics few = render(shot).statistics;
   EXPECT_EQ(few.depth_limit_hits, 0U);
   EXPECT_EQ(few.secondary_rays, 5U * 40 * 30);
-  EXPECT_EQ(few.ray_limit_hits, 40U * 30);
+  EXPECT_GE(few.ray_limit_hits, 40U * 30);
 }
 
 }  // namespace
