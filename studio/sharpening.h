@@ -33,15 +33,20 @@ class Sharpening {
   double share() const { return share_; }
 
  private:
+  template <class T>
+  using ByStage = std::array<T, render::refinement_stages>;
+
   double budget(std::size_t cells) const;
+  std::size_t after(std::size_t stage) const;
 
   double frame_ms_, frames_a_second_;
   bool live_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
   double relight_ms_ = 0;                // a frame that finds no cell anew
-  double cell_ms_ = 0;                   // a cell of the coarsest stage; 0 = not known yet
-  double spent_ = 0;                     // by the last frame, in coarse cells
-  std::size_t promoted_ = 0;             // cells that went on in it
+  ByStage<double> cost_;                 // of a cell: live in ms, once a frame was timed
+  ByStage<bool> timed_{};                // whether that is more than a guess
+  ByStage<std::size_t> found_{};         // cells of the last frame that were found anew
+  std::size_t promoted_ = 0;             // those that went on in it
   double share_ = 0;
 };
 
