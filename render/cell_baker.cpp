@@ -21,12 +21,6 @@ void clear_answer(ShadePoint& p) {
   p.video = {};
 }
 
-bool sees_stand_ins(RayKind kind) { return kind == RayKind::camera || kind == RayKind::bent; }
-
-// The full angle of a disc that holds half of its light as near its middle as a lobe does: half of
-// a lobe lies within 2 alpha of the mirrored direction.
-float lobe_width(float roughness) { return 2 * 2 / 0.7F * roughness * roughness; }
-
 // Whether the table's light matters to a point.
 bool receives_light(const ShadePoint& p) {
   return p.diffuse != Vec3f{} || p.catches_shadow || p.catches_lamps;
@@ -444,80 +438,6 @@ void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
     transport_->shared.push_back({slot, c, true, p.throughput * p.plate_share});
   }
   catch_lamps(p, centre, light_[centre].lamps);
-}
-
-// The space that the stream's rays passed, up to what they met.
-void CellBaker::mark_passed(std::size_t count) {
-  const RayStream& s = stream_;
-  for (std::size_t i = 0; i < count; ++i) {
-    // A real surface may let a ray see what is behind it.
-    const float far_m = s.mask[i] & mask_stand_in ? ray_far : s.far_m[i];
-    grid_->mark_line({s.ox[i], s.oy[i], s.oz[i]}, {s.dx[i], s.dy[i], s.dz[i]}, far_m,
-                     transport_->reach.passed);
-  }
-}
-
-void CellBaker::bounce() {
-  while (!queue_.empty()) {
-    const std::size_t n = std::min<std::size_t>(queue_.size(), stream_rays);
-    const std::size_t from = queue_.size() - n;
-    for (std::size_t i = 0; i < n; ++i) {
-      const QueuedRay& q = queue_[from + i];
-      if (counting_) {
-        RayCount& pixel = counting_[q.pixel];
-        ++pixel.rays;
-        pixel.depth = std::max<std::uint32_t>(pixel.depth, q.depth);
-      }
-      stream_.ox[i] = q.origin.x, stream_.oy[i] = q.origin.y, stream_.oz[i] = q.origin.z;
-      stream_.dx[i] = q.direction.x, stream_.dy[i] = q.direction.y, stream_.dz[i] = q.direction.z;
-      stream_.near_m[i] = 0;
-      stream_.mask[i] = sees_stand_ins(q.kind) ? mask_virtual | mask_stand_in : mask_virtual;
-    }
-    trace(static_cast<int>(n), false, RayKind::reflection);
-    if (grid_) mark_passed(n);
-    statistics_->secondary_rays += n;
-    int count = 0;
-    std::size_t leaving = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const QueuedRay& q = queue_[from + i];
-      const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
-      const std::size_t target = q.slot < cell_pixels ? q.pixel : cell_pixels + q.pixel;
-      if (!hit && q.kind != RayKind::camera) {
-        if (q.kind == RayKind::bent) {
-          leave_bent(q.slot, q.pixel, q.direction, q.spread, q.throughput);
-        } else if (q.kind == RayKind::reflection) {
-          add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
-                          q.throughput);
-        }
-        continue;
-      }
-      if (hit && q.kind == RayKind::difference) {
-        add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
-                        -q.throughput);
-      }
-      ShadePoint& p =
-          hit ? points_[static_cast<std::size_t>(count++)] : points_[stream_rays - ++leaving];
-      set_point(p, static_cast<int>(i), q.pixel, q.slot);
-      if (!hit) group_[leaving - 1] = &p;
-      if (hit) arrive(p, q.steps, q.spread, stream_.far_m[i]);
-      p.blur_m = hit ? stream_.far_m[i] * lobe_width(q.roughness) : 0;
-      // It stands for a part of a lobe whose parts overlap.
-      if (q.one_of_many) p.blur_m = p.footprint_m;
-      p.throughput = q.throughput;
-      if (hit && q.media.count > 0) {
-        p.throughput =
-            p.throughput * passed_through(*frame_->inputs.scene, q.media, stream_.far_m[i]);
-      }
-      if (hit) lamps_apart_[static_cast<std::size_t>(count - 1)] = q.lamps_apart;
-      p.media = q.media;
-      p.kind = q.kind == RayKind::difference ? RayKind::reflection : q.kind;
-      p.depth = q.depth;
-    }
-    queue_.resize(from);
-    run_background({group_.data(), leaving});
-    shade_points(count, false);
-  }
-  lamps_apart_.fill(0);
 }
 
 }  // namespace render

@@ -135,6 +135,8 @@ class CellBaker final : public RaySink {
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_shared(const ShadePoint& p, std::size_t centre);
   void collect(const ShadePoint& p);
+
+  // cell_bounce.cpp
   void mark_passed(std::size_t count);
   void bounce();
 

@@ -23,6 +23,7 @@
 #include "capture/exr.h"
 #include "render/pixel_rays.h"
 #include "render/trace.h"
+#include "studio/commands/bench_rows.h"
 #include "studio/commands/benches.h"
 #include "studio/commands/compare_with_cycles.h"
 #include "studio/display_png.h"
@@ -326,11 +327,7 @@ void bench_cycles(const CyclesBench& bench, Console& console) {
     rows.push_back(compare(name, bench, console));
   }
   if (rows.empty()) make_peer_scene(bench.scene, width, height);  // throws, naming those there are
-  const Machine machine = this_machine();
-  console.figures(Json{
-      {"rows", rows},
-      {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}}}}
-                      .dump(2));
+  give_rows(rows, console);
 }
 
 }  // namespace studio

@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 
 #include "render/kernel.h"
+#include "studio/commands/bench_rows.h"
 #include "studio/commands/benches.h"
 #include "studio/display_png.h"
-#include "studio/machine.h"
 #include "studio/paper_shot.h"
 #include "studio/sharpening.h"
 
@@ -175,10 +175,7 @@ void bench_drag(const std::string& only, const std::string& pictures, Console& c
                             100 * row["error_after_1_s"].get<double>()));
     rows.push_back(row);
   }
-  const Machine machine = this_machine();
-  console.figures(
-      Json{{"drags", rows}, {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}}}}.dump(
-          2));
+  give_rows(rows, console);
 }
 
 }  // namespace studio

@@ -17,8 +17,8 @@
 #include "render/made_headlight.h"
 #include "render/made_model_file.h"
 #include "studio/bench_scene.h"
+#include "studio/commands/bench_rows.h"
 #include "studio/commands/benches.h"
-#include "studio/machine.h"
 
 namespace studio {
 namespace {
@@ -167,11 +167,7 @@ void bench_load(std::vector<std::string> files, int runs, Console& console) {
                     {"first_frame", to_json(best.frame)},
                     {"reader_peak_mb", reader_mb}});
   }
-  const Machine machine = this_machine();
-  console.figures(Json{
-      {"rows", rows},
-      {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}}}}
-                      .dump(2));
+  give_rows(rows, console);
 }
 
 }  // namespace studio

@@ -11,10 +11,10 @@
 #include "capture/png.h"
 #include "render/false_colour.h"
 #include "render/paper_scenes.h"
+#include "studio/commands/bench_rows.h"
 #include "studio/commands/benches.h"
 #include "studio/commands/kernel_rate.h"
 #include "studio/display_png.h"
-#include "studio/machine.h"
 #include "studio/paper_shot.h"
 #include "studio/picture_error.h"
 
@@ -154,11 +154,7 @@ void bench_papers(const PapersBench& bench, Console& console) {
     if (!bench.scene.empty() && name != bench.scene) continue;
     rows.push_back(row_of(name, bench, console));
   }
-  const Machine machine = this_machine();
-  console.figures(Json{
-      {"rows", rows},
-      {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}}}}
-                      .dump(2));
+  give_rows(rows, console);
 }
 
 }  // namespace studio
