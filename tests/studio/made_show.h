@@ -14,6 +14,7 @@
 #include "capture/live_reader.h"
 #include "studio/set.h"
 #include "studio/start.h"
+#include "tests/made_files.h"
 
 namespace studio {
 
@@ -119,5 +120,22 @@ inline std::string write_made_set(const std::filesystem::path& directory,
                       << more;
   return path;
 }
+
+// Made shows, and a directory for each.
+class MadeShowTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    start();
+    register_grey_camera();
+  }
+  void SetUp() override { dir_ = made::make_temporary_directory(); }
+  void TearDown() override { std::filesystem::remove_all(dir_); }
+
+  Set made_set(const std::string& source, const std::string& more = "") const {
+    return read_set(write_made_set(dir_, source, more));
+  }
+
+  std::filesystem::path dir_;
+};
 
 }  // namespace studio

@@ -40,6 +40,7 @@ TEST(RenderChart, TellsErrorAndTimeOfEverySceneAndWhereItErrs) {
     const ChartPoint& fastest = *points.at("1");
     EXPECT_TRUE(by_default.by_default);
     EXPECT_LT(by_default.error, 0.7 * fastest.error) << scene;
+    EXPECT_GT(by_default.error, 0) << scene;
     EXPECT_TRUE(by_default.on_front) << scene << ": nothing here errs less";
     for (const char* share : {"groups_within_5_percent", "groups_rms_within_5_percent"}) {
       EXPECT_GT(figure(by_default.figures, share), figure(fastest.figures, share)) << scene;

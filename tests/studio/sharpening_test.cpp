@@ -127,21 +127,12 @@ TEST(Sharpening, StaysWhereTheMemoryEnds) {
   EXPECT_GT(last, 0.6);
 }
 
-class SharpeningShow : public ::testing::Test {
- protected:
-  void SetUp() override {
-    register_grey_camera();
-    start();
-    dir_ = made::make_temporary_directory();
-  }
-  void TearDown() override { std::filesystem::remove_all(dir_); }
-  std::filesystem::path dir_;
-};
+using SharpeningShow = MadeShowTest;
 
 // What is moved shows in the very next frame, coarse; a second later the picture is as sharp as the
 // effort asks.
 TEST_F(SharpeningShow, ShowsAMoveAtOnceAndIsSharpASecondLater) {
-  Set set = read_set(write_made_set(dir_, "grey:60,25,0"));
+  Set set = made_set("grey:60,25,0");
   const auto pictures_of = [&](bool sharpen) {
     set.show.sharpen = sharpen;
     Show show(set);

@@ -17,19 +17,7 @@ namespace {
 
 using testing::AllOf, testing::Contains, testing::HasSubstr;
 
-class ShowModels : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    start();
-    register_grey_camera();
-  }
-  void SetUp() override { dir_ = made::make_temporary_directory(); }
-  void TearDown() override { std::filesystem::remove_all(dir_); }
-
-  Set made_set(const std::string& source) const { return read_set(write_made_set(dir_, source)); }
-
-  std::filesystem::path dir_;
-};
+using ShowModels = MadeShowTest;
 
 TEST_F(ShowModels, GoesOnWhenAModelCrashesItsReader) {
   // A group that holds itself, and a picture that is not there.

@@ -21,21 +21,7 @@ using namespace std::chrono_literals;
 using testing::Contains;
 using testing::HasSubstr;
 
-class ShowTest : public testing::Test {
- protected:
-  static void SetUpTestSuite() {
-    start();
-    register_grey_camera();
-  }
-  void SetUp() override { dir_ = made::make_temporary_directory(); }
-  void TearDown() override { std::filesystem::remove_all(dir_); }
-
-  Set made_set(const std::string& source, const std::string& more = "") const {
-    return read_set(write_made_set(dir_, source, more));
-  }
-
-  std::filesystem::path dir_;
-};
+using ShowTest = MadeShowTest;
 
 using Pictures = std::vector<std::vector<capture::Half>>;
 
