@@ -76,8 +76,11 @@ void write_map(const std::string& path,
                const std::vector<GroupError>& groups,
                const std::vector<GroupError>& worst) {
   constexpr double top = 40, bottom = 40;
-  Svg svg(enlarged * width, enlarged * height + top + bottom);
-  svg.rectangle(0, 0, enlarged * width, enlarged * height + top + bottom, "#ffffff");
+  double legend = 10;
+  for (const ErrorClass& c : classes) legend += 32 + text_width(c.name, 11.5);
+  const double wide = std::max({double{enlarged} * width, legend, 20 + text_width(title, 14)});
+  Svg svg(wide, enlarged * height + top + bottom);
+  svg.rectangle(0, 0, wide, enlarged * height + top + bottom, "#ffffff");
   svg.text(10, 26, title, {14});
   const auto place = [&](const GroupError& g, auto&& draw) {
     const int columns = std::min(error_group, width - g.x);
