@@ -81,6 +81,10 @@ void subtract_open(Receivers& r, std::size_t k, const DirectionalLight& light) {
   r.open_b[k] -= cosine * light.irradiance.z;
 }
 
+// That a tested light may stand for: where a point faces few of those that it tests, they are too
+// few to tell how much light there is.
+constexpr float most_stood_for = 16;
+
 struct Box {
   Vec3f centre, half;
 };
@@ -121,6 +125,21 @@ bool can_be_blocked(const LightContext& context, const Box& box, Vec3f l) {
          std::any_of(boxes.begin(), boxes.end(),
                      [&](const Scene::Bounds& b) { return may_block(b, box, l); });
 }
+
+// A point that counts little tests every second, fourth ... light only; compact ones are few and
+// strong, and are tested by all. 0 = none.
+std::uint32_t stride_of(const Effort& effort, float share, const DirectionalLight& light) {
+  if (light.compact != 0) return 1;
+  if (share == 0) return 0;
+  if (effort.accuracy >= 1 || share >= 0.5F) return 1;
+  return share >= 0.2F ? 2 : share >= 0.05F ? 4 : 8;
+}
+
+bool shines_on(const Receivers& r, std::size_t k, Vec3f l) {
+  return cosine_at(r, k, l) > 0 && r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0;
+}
+
+float sum(Vec3f v) { return v.x + v.y + v.z; }
 
 void clear_sums(Receivers& r) {
   r.open_r.fill(0), r.open_g.fill(0), r.open_b.fill(0);
@@ -206,17 +225,27 @@ void gather_points(const LightContext& context,
   clear_sums(r);
   const auto& lights = context.table->lights;
   const bool real = context.scene->has_real_blockers();
-  // Compact lights are few and strong: all points test all of them.
-  const auto stride_of = [&](std::size_t k, const DirectionalLight& light) -> std::uint32_t {
-    if (light.compact != 0) return 1;
-    if (r.share[k] == 0) return 0;  // none
-    if (context.effort->accuracy >= 1 || r.share[k] >= 0.5F) return 1;
-    return r.share[k] >= 0.2F ? 2 : r.share[k] >= 0.05F ? 4 : 8;
+  const auto is_tested = [&](std::size_t k, std::uint32_t i) {
+    const std::uint32_t stride = stride_of(*context.effort, r.share[k], lights[i]);
+    return stride != 0 && (i + k) % stride == 0;
   };
+  std::array<float, cell_pixels> stands_for;  // lights, of each that the point tests
+  stands_for.fill(1);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
+    if (stride_of(*context.effort, r.share[k], {}) <= 1) continue;
+    float of_tested = 0, of_all = 0;
+    for (std::uint32_t i = 0; i < lights.size(); ++i) {
+      if (lights[i].compact != 0 || !shines_on(r, k, lights[i].direction)) continue;
+      const float e = cosine_at(r, k, lights[i].direction) * sum(lights[i].irradiance);
+      of_all += e;
+      if (is_tested(k, i)) of_tested += e;
+    }
+    if (of_tested > 0) stands_for[k] = std::min(of_all / of_tested, most_stood_for);
+  }
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
     const Vec3f passed = blocked ? Vec3f{} : share;
-    const auto weight =
-        cosine_at(r, k, lights[i].direction) * static_cast<float>(stride_of(k, lights[i]));
+    const float weight =
+        cosine_at(r, k, lights[i].direction) * (lights[i].compact != 0 ? 1.0F : stands_for[k]);
     const Vec3f open = lights[i].irradiance * weight;
     const Vec3f lost = open * (Vec3f{1, 1, 1} - passed);
     r.open_r[k] += open.x, r.open_g[k] += open.y, r.open_b[k] += open.z;
@@ -227,11 +256,7 @@ void gather_points(const LightContext& context,
   for (std::uint32_t i = 0; i < lights.size(); ++i) {
     const Vec3f l = lights[i].direction;
     for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-      const std::uint32_t stride = stride_of(k, lights[i]);
-      if (stride == 0 || (i + k) % stride != 0) continue;
-      if (!(cosine_at(r, k, l) > 0) || !(r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0)) {
-        continue;
-      }
+      if (!is_tested(k, i) || !shines_on(r, k, l)) continue;
       if (real && r.real_first[k]) {
         const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
         ++statistics.shadow_rays;

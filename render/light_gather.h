@@ -93,13 +93,14 @@ void gather_cell(const LightContext& context,
 // A light that was tested at a point.
 struct PointLight {
   std::uint16_t point, light;
-  float weight;  // the cosine, times the lights that this one stands for
+  float weight;  // the cosine, times the light that this one stands for
   Vec3f passed;  // share of its light that arrives
 };
 
 // The same for any points, tested lights appended to `tested`: every point tests every light, or,
 // where its share of the picture is small and the effort allows it, every second, fourth ... of
-// them, begun at another one from point to point.
+// them, begun at another one from point to point. Those stand for the rest so that a point from
+// which nothing is hidden gets all of the light.
 void gather_points(const LightContext& context,
                    Receivers& receivers,
                    GatherWorkspace& workspace,
