@@ -6,9 +6,14 @@
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 
+#include <algorithm>
+#include <atomic>
+#include <functional>
 #include <mutex>
+#include <numeric>
 #include <stdexcept>
 
+#include "render/kept_transport.h"
 #include "render/kernel.h"
 
 namespace render {
@@ -49,6 +54,27 @@ void copy_rows(const std::vector<capture::Half>& from, const Rect& rect, capture
     std::copy_n(from.begin() + row * y, row,
                 to.pixels.begin() + static_cast<std::ptrdiff_t>(to.index(rect.y + y, rect.x)));
   }
+}
+
+// The frame's tiles, row by row, but those first whose cells to be found take most.
+std::vector<int> tiles_by_work(const FrameContext& context, int size, int columns, int rows) {
+  std::vector<int> order(static_cast<std::size_t>(columns * rows)), work(order.size());
+  std::iota(order.begin(), order.end(), 0);
+  const KeptTransport* kept = context.inputs.kept;
+  if (!kept) return order;
+  const int width = context.inputs.directions->width, height = context.inputs.directions->height;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const int x0 = order[i] % columns * size, y0 = order[i] / columns * size;
+    for (int y = y0; y < std::min(y0 + size, height); y += cell_size) {
+      for (int x = x0; x < std::min(x0 + size, width); x += cell_size) {
+        const int stage = context.stage_of(x / cell_size, y / cell_size);
+        if (!kept->find(x / cell_size, y / cell_size, stage)) work[i] += 1 << 2 * stage;
+      }
+    }
+  }
+  std::ranges::stable_sort(order, std::greater(),
+                           [&](int i) { return work[static_cast<std::size_t>(i)]; });
+  return order;
 }
 
 }  // namespace
@@ -106,11 +132,14 @@ void render_frame(const FrameContext& context,
     const std::lock_guard lock(statistics_mutex);
     result.statistics += worker.result.statistics;
   };
-  // Tile by tile: a few of them hold nearly all the work, and must not come to one thread together.
+  // One after the other, those with most to find first: a few of them hold nearly all the work, and
+  // no thread may be left with one of those when the others are done.
+  const std::vector<int> order = tiles_by_work(context, size, columns, rows);
+  std::atomic<std::size_t> next = 0;
   tbb::parallel_for(
       tbb::blocked_range<int>(0, columns * rows),
       [&](const tbb::blocked_range<int>& tiles) {
-        for (int i = tiles.begin(); i != tiles.end(); ++i) render(i);
+        for (int i = tiles.begin(); i != tiles.end(); ++i) render(order[next++]);
       },
       tbb::simple_partitioner());
 }

@@ -12,12 +12,17 @@ namespace {
 using render::finished_stage, render::one_ray_stage;
 
 constexpr double share_of_frame = 0.7;  // of its time, for rendering
+constexpr double share_at_rest = 0.8;   // ... where nothing is found anew, and cells can wait
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
-// What a cell takes at each stage, of the coarsest one's, as long as nothing better is known.
-constexpr std::array<double, render::refinement_stages> expected_cost{1, 4, 16, 64, 256, 1024};
+// What a cell takes at each stage, of the coarsest one's, as long as nothing better is known: as in
+// the papers' scenes (`platelight bench drag`), where a few rays at edges are little more than one
+// everywhere.
+constexpr std::array<double, render::refinement_stages> expected_cost{1, 2, 6, 14, 18, 60};
 // Of the cells, as many are found in a frame with a ray a pixel however long they take.
 constexpr double least = 0.01;
+// By how much more a stage that was never timed is taken to cost, until it was.
+constexpr double caution = 4;
 // A stage that takes less than this times the one before takes its place.
 constexpr double worth_a_stage = 2;
 
@@ -38,14 +43,15 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
       cost_(expected_cost) {}
 
 // What a frame may spend.
-double Sharpening::budget(std::size_t cells) const {
+double Sharpening::budget(std::size_t cells, bool at_rest) const {
   const auto all = static_cast<double>(cells);
   if (!live_) {
     const double rest = cost_[one_ray_stage + 1] + cost_[finished_stage];
     return all * rest / std::max(frames_a_second_ - 1, 1.0);
   }
   if (std::ranges::none_of(timed_, std::identity())) return 0;
-  const double ms = std::max(share_of_frame * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
+  const double share = at_rest ? share_at_rest : share_of_frame;
+  const double ms = std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
   return std::max(ms, least * all * cost_[one_ray_stage]);
 }
 
@@ -67,7 +73,7 @@ std::vector<std::uint8_t> Sharpening::next(std::span<const int> kept) {
     stages[i] = static_cast<std::uint8_t>(std::max(kept[i], 0));
   }
   if (!full_) stopped_ = false;
-  double left = budget(cells);
+  double left = budget(cells, lost == 0);
   // What is found anew is as fine at once as there is time for.
   std::size_t first = one_ray_stage;
   if (live_) {
@@ -84,6 +90,9 @@ std::vector<std::uint8_t> Sharpening::next(std::span<const int> kept) {
   const std::size_t stride = stride_of(cells);
   for (std::size_t stage = 0; stage < finished_stage && !stopped_; ++stage) {
     const std::size_t to = after(stage);
+    // A stage is timed the first time by itself.
+    const bool untimed = live_ && !timed_[to];
+    if (untimed && lost + promoted_ > 0) break;
     for (std::size_t turn = 0; turn < cells; ++turn) {
       if (!(left > 0)) break;
       const std::size_t i = turn * stride % cells;
@@ -92,7 +101,7 @@ std::vector<std::uint8_t> Sharpening::next(std::span<const int> kept) {
       anew[i] = 1;
       ++promoted_;
       ++found_[to];
-      left -= cost_[to];
+      left -= cost_[to] * (untimed ? caution : 1);
     }
   }
   const double reached = std::accumulate(stages.begin(), stages.end(), 0.0);
@@ -120,7 +129,7 @@ void Sharpening::took(double render_ms, bool full) {
   for (std::size_t s = 0; s < found_.size(); ++s) {
     if (found_[s] == 0) continue;
     const double part = static_cast<double>(found_[s]) * cost_[s] / foreseen;
-    const double change = known ? std::pow(ratio, followed * part) : 1;
+    const double change = known ? std::pow(ratio, (timed_[s] ? followed : 1) * part) : 1;
     cost_[s] *= change;
     timed_[s] = true;
     // What is finer and not yet known is guessed from it.

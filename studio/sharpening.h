@@ -36,7 +36,7 @@ class Sharpening {
   template <class T>
   using ByStage = std::array<T, render::refinement_stages>;
 
-  double budget(std::size_t cells) const;
+  double budget(std::size_t cells, bool at_rest) const;
   std::size_t after(std::size_t stage) const;
 
   double frame_ms_, frames_a_second_;
