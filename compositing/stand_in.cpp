@@ -6,6 +6,7 @@
 #include <cstring>
 #include <stdexcept>
 
+#include "compositing/billboard.h"
 #include "render/shader.h"
 #include "render/standard.h"
 #include "render/trace.h"
@@ -85,6 +86,7 @@ class PlateBackground final : public render::BackgroundShader {
 
 void register_shaders() {
   render::register_shader("stand_in", std::make_shared<StandInShader>());
+  register_billboards();
   render::register_background("plate", std::make_shared<PlateBackground>());
 }
 

@@ -195,7 +195,8 @@ void CellBaker::for_each_shader(int count, F&& call) {
 // Answers, then light, at the first `count` points; in a grid each is its pixel's centre.
 void CellBaker::shade_points(int count, bool grid) {
   if (count == 0) return;
-  const ShadeContext context{&frame_->inputs.scene->description(), frame_->inputs.scene};
+  const Scene& scene = *frame_->inputs.scene;
+  const ShadeContext context{&scene.description(), &scene, scene.pictures()};
   lobes_.clear();
   pushing_ = nullptr;
   for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
@@ -219,7 +220,8 @@ void CellBaker::shade_points(int count, bool grid) {
 
 void CellBaker::run_background(std::span<ShadePoint* const> leaving) {
   if (leaving.empty()) return;
-  const ShadeContext context{&frame_->inputs.scene->description(), frame_->inputs.scene};
+  const Scene& scene = *frame_->inputs.scene;
+  const ShadeContext context{&scene.description(), &scene, scene.pictures()};
   for (ShadePoint* p : leaving) {
     clear_answer(*p);
     p->hit = {};

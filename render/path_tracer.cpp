@@ -185,6 +185,9 @@ PathTracer::PathTracer(const Scene& scene,
       surfacing.matte = true;
     } else if (material.shader == "glass") {
       surfacing.glass = true;
+    } else if (scene.shader_of(static_cast<std::uint32_t>(materials_.size()))
+                   .picture_of(material)) {
+      surfacing.picture = true;
     } else {
       surfacing.parameters =
           standard_parameters(material, description.textures.size(), videos.size());
@@ -372,6 +375,20 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
   leave(direction);
 }
 
+// Goes on behind a picture. False if there is nothing more to see.
+bool PathTracer::pass_picture(Walk& w, const HitPoint& hit) const {
+  const SceneDescription& description = scene_.description();
+  const auto layer = scene_.shader_of(hit.material)
+                         .layer({&description, &scene_, scene_.pictures()},
+                                description.materials[hit.material], hit, 0);
+  if (!layer) return false;
+  w.result.radiance += times(w.glow_share, layer->radiance);
+  w.share = times(w.share, layer->passed);
+  w.glow_share = times(w.glow_share, layer->passed);
+  w.origin = offset_origin(hit, w.direction);
+  return w.share != Vec3f{};
+}
+
 void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
   for (; w.depth < rules_.max_depth; ++w.depth) {
     const auto met = closest_hit(scene_, w.origin, w.direction, 0, w.mask, w.kind);
@@ -400,6 +417,11 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     }
     if (materials_[hit.material].glass) {
       pass_glass(w, hit, numbers);
+      if (!survives(w, numbers)) break;
+      continue;
+    }
+    if (materials_[hit.material].picture) {
+      if (!pass_picture(w, hit)) break;
       if (!survives(w, numbers)) break;
       continue;
     }

@@ -50,8 +50,8 @@ enum class PathLobe : std::uint8_t;
 // Without lamps, and with diffuse bounces, glowing surfaces light others where paths meet them.
 class PathTracer {
  public:
-  // Throws std::invalid_argument if a material is neither "standard", "glass" nor
-  // "stand_in".
+  // Throws std::invalid_argument if a material is neither "standard", "glass", "stand_in" nor one
+  // that shows a live picture.
   PathTracer(const Scene& scene,
              const EnvironmentSampler& environment,
              std::span<const LocalLight> lamps,
@@ -89,6 +89,7 @@ class PathTracer {
                           Vec3f view,
                           SampleSequence& numbers) const;
   void pass_glass(Walk& w, const HitPoint& hit, SampleSequence& numbers) const;
+  bool pass_picture(Walk& w, const HitPoint& hit) const;
   bool scatter(Walk& w,
                const HitPoint& hit,
                const StandardSurface& surface,
@@ -107,6 +108,7 @@ class PathTracer {
     StandardParameters parameters;
     bool matte = false;  // a stand-in: all its light is diffuse
     bool glass = false;
+    bool picture = false;
   };
   std::vector<Surfacing> materials_;
 };

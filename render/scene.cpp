@@ -155,7 +155,7 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
       hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
                 RTCHitN_v(args->hit, n, lane), incoming);
-  const ShadeContext context{&description, nullptr};
+  const ShadeContext context{&description, nullptr, pictures};
   return compiled->shaders[hit.material]->transmittance(
       context, description.materials[hit.material], hit, incoming, kind);
 }
@@ -256,8 +256,9 @@ std::uint64_t next_id() {
 
 }  // namespace
 
-Scene::Scene(SceneDescription description) : impl_(std::make_unique<Impl>()) {
+Scene::Scene(SceneDescription description, Pictures pictures) : impl_(std::make_unique<Impl>()) {
   check(description);
+  impl_->pictures = std::move(pictures);
   auto compiled = std::make_shared<Compiled>();
   compiled->build(description);
   compiled->id = impl_->id = next_id();
@@ -266,8 +267,10 @@ Scene::Scene(SceneDescription description) : impl_(std::make_unique<Impl>()) {
   impl_->assemble();
 }
 
-Scene::Scene(SceneDescription description, const Scene& before) : impl_(std::make_unique<Impl>()) {
+Scene::Scene(SceneDescription description, const Scene& before, Pictures pictures)
+    : impl_(std::make_unique<Impl>()) {
   check(description);
+  impl_->pictures = std::move(pictures);
   impl_->id = next_id();
   if (before.impl_->compiled->two_level &&
       differ_in_moves_only(description, before.description())) {
@@ -316,13 +319,17 @@ Scene::Bounds Scene::bounds() const { return impl_->all_bounds; }
 Scene::Bounds Scene::blocker_bounds() const { return impl_->blocker_bounds; }
 const std::vector<Scene::Bounds>& Scene::blocker_boxes() const { return impl_->blocker_boxes; }
 std::size_t Scene::skipped_triangles() const { return impl_->compiled->skipped; }
+const Scene::Pictures& Scene::pictures() const { return impl_->pictures; }
 const Scene::Places& Scene::places() const { return impl_->places; }
 
 std::optional<std::vector<Scene::Bounds>> Scene::moved(const Places& before, const Places& now) {
   if (before.parts != now.parts) return std::nullopt;
   std::vector<Bounds> where;
   for (std::size_t i = 0; i < now.bounds.size(); ++i) {
-    if (before.set_from_object[i] == now.set_from_object[i]) continue;
+    if (before.set_from_object[i] == now.set_from_object[i] &&
+        before.pictures[i] == now.pictures[i]) {
+      continue;
+    }
     for (const Bounds& bounds : {before.bounds[i], now.bounds[i]}) {
       if (bounds.lower.x <= bounds.upper.x) where.push_back(bounds);
     }

@@ -18,6 +18,7 @@ struct RTCDeviceTy;
 namespace render {
 
 class BackgroundShader;
+class LivePicture;
 class Shader;
 struct Glass;
 
@@ -94,10 +95,12 @@ class Scene {
  public:
   // Throws std::invalid_argument for indices out of range, std::runtime_error if Embree fails.
   // Triangles that are not finite are left out and counted.
-  explicit Scene(SceneDescription description);
+  // Instances that show a live picture must be ones that move.
+  using Pictures = std::vector<std::shared_ptr<const LivePicture>>;
+  explicit Scene(SceneDescription description, Pictures pictures = {});
   // The same scene, bit for bit, at next to no cost where it differs from `before` only in where
-  // moving instances stand.
-  Scene(SceneDescription description, const Scene& before);
+  // moving instances stand and in its pictures.
+  Scene(SceneDescription description, const Scene& before, Pictures pictures = {});
   ~Scene();
   Scene(const Scene&) = delete;
   Scene& operator=(const Scene&) = delete;
@@ -135,14 +138,17 @@ class Scene {
   Bounds blocker_bounds() const;
   const std::vector<Bounds>& blocker_boxes() const;
   std::size_t skipped_triangles() const;
-  // Where the moving instances of a scene stand, and what else it is made of.
+  const Pictures& pictures() const;
+  // Where the moving instances of a scene stand, what they show, and what else it is made of.
   struct Places {
     std::uint64_t parts = 0;  // differs between scenes that share nothing
     std::vector<std::array<float, 12>> set_from_object;
     std::vector<Bounds> bounds;
+    Pictures pictures;  // of each, or null
   };
   const Places& places() const;
-  // Bounds, before and after, of what stands elsewhere in `now`; nothing if more than that differs.
+  // Bounds, before and after, of what stands elsewhere in `now` or shows another picture; nothing
+  // if more than that differs.
   static std::optional<std::vector<Bounds>> moved(const Places& before, const Places& now);
 
  private:

@@ -77,6 +77,7 @@ void Scene::Compiled::build(const SceneDescription& description) {
   }
   mesh_scenes.assign(meshes, nullptr);
   parts_of_mesh.resize(meshes);
+  find_pictures(description);
   for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
     const Instance& instance = description.instances[i];
     const Mesh& mesh = *description.meshes[instance.mesh];
@@ -103,6 +104,25 @@ void Scene::Compiled::build(const SceneDescription& description) {
   if (two_level) rtcCommitScene(placed);
   blocker_boxes = find_blocker_boxes(description);
   is_built(device);
+}
+
+void Scene::Compiled::find_pictures(const SceneDescription& description) {
+  for (const auto& mesh : description.meshes) {
+    std::optional<std::size_t>& shown = picture_of_mesh.emplace_back();
+    for (const std::uint32_t material : mesh->materials) {
+      const auto picture = shaders[material]->picture_of(description.materials[material]);
+      if (picture && shown && *picture != *shown) {
+        throw std::invalid_argument("scene: a mesh shows two live pictures");
+      }
+      if (picture) shown = picture;
+    }
+  }
+  for (const Instance& instance : description.instances) {
+    if (picture_of_mesh[instance.mesh] && !instance.moves) {
+      throw std::invalid_argument("scene: object " + instance.name +
+                                  " shows a live picture, but is not one that moves");
+    }
+  }
 }
 
 void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
@@ -145,6 +165,12 @@ void Scene::Impl::assemble() {
     normal_matrices[i] = normal_matrix(instance.set_from_object);
     const Bounds bounds = placed_bounds(c.mesh_bounds[instance.mesh], instance.set_from_object);
     places.set_from_object.push_back(instance.set_from_object);
+    const std::optional<std::size_t>& picture = c.picture_of_mesh[instance.mesh];
+    if (picture && (*picture >= pictures.size() || !pictures[*picture])) {
+      throw std::invalid_argument("scene: object " + instance.name +
+                                  " shows a live picture that is not there");
+    }
+    places.pictures.push_back(picture ? pictures[*picture] : nullptr);
     places.bounds.push_back(bounds);
     all_bounds = joined(all_bounds, bounds);
     if (instance.kind == ObjectKind::virtual_object) {

@@ -48,6 +48,7 @@ struct Scene::Compiled {
   std::vector<std::vector<const Part*>> parts_of_mesh;  // inside instanced scenes
   std::vector<std::array<float, 9>> normal_matrices;    // per instance; of what moves, as it began
   std::vector<Bounds> mesh_bounds;                      // of meshes that move, in their own frame
+  std::vector<std::optional<std::size_t>> picture_of_mesh;    // of the scene's, that it shows
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds;  // of what does not move
   std::vector<Bounds> blocker_boxes;                          // of it
   std::size_t skipped = 0;
@@ -68,6 +69,7 @@ struct Scene::Compiled {
   }
 
   void build(const SceneDescription& scene);
+  void find_pictures(const SceneDescription& scene);
   void add_parts(const SceneDescription& scene,
                  std::uint32_t mesh_index,
                  std::uint32_t instance,
@@ -91,6 +93,7 @@ struct Scene::Impl {
   // By geometry of `scene`: the instance that it is, or Part::none where it holds what is placed.
   std::vector<std::uint32_t> instance_of_geometry;
   Places places;
+  Pictures pictures;
   std::vector<std::array<float, 9>> normal_matrices;  // per instance
   std::vector<std::uint8_t> mirrored;                 // per instance: inside out by its matrix
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds, blocker_bounds = no_bounds;

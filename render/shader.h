@@ -13,6 +13,7 @@
 
 #include "render/environment.h"
 #include "render/glass.h"
+#include "render/live_picture.h"
 #include "render/scene.h"
 
 namespace render {
@@ -96,6 +97,13 @@ class RaySink {
 struct ShadeContext {
   const SceneDescription* scene = nullptr;
   const Scene* compiled = nullptr;  // for shade()
+  std::span<const std::shared_ptr<const LivePicture>> pictures = {};
+};
+
+// What a flat picture adds to what is behind it, and the share of that which it lets pass.
+struct Layer {
+  Vec3f radiance;
+  Vec3f passed;
 };
 
 class Shader {
@@ -117,6 +125,22 @@ class Shader {
   // has no holes: it is not called.
   virtual std::optional<Vec3f> shadow_everywhere(const Material& material) const {
     static_cast<void>(material);
+    return std::nullopt;
+  }
+  // The scene's live picture that the material shows, if it shows one. What its instances hide and
+  // show changes with it, as if they moved.
+  virtual std::optional<std::size_t> picture_of(const Material& material) const {
+    static_cast<void>(material);
+    return std::nullopt;
+  }
+  // Of shaders that only glow and let light pass straight on: what shade() gives, for the
+  // reference's paths. `footprint_m`: width of the square of surface whose mean is wanted.
+  virtual std::optional<Layer> layer(const ShadeContext& context,
+                                     const Material& material,
+                                     const HitPoint& hit,
+                                     float footprint_m) const {
+    static_cast<void>(context), static_cast<void>(material), static_cast<void>(hit);
+    static_cast<void>(footprint_m);
     return std::nullopt;
   }
   // RGB share of light that passes straight through here. For `camera`, `reflection`, `difference`

@@ -1,0 +1,237 @@
+// Billboards: what rays of every kind see of a keyed picture.
+#include "compositing/billboard.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "compositing/keyed_picture.h"
+#include "made_shot.h"
+#include "render/kept_transport.h"
+#include "render/reference.h"
+
+namespace compositing {
+namespace {
+
+using render::Vec3f;
+
+constexpr int width = 160, height = 120;
+
+// A picture of (height, width, 4) from a function of its pixels.
+template <class F>
+std::shared_ptr<const KeyedPicture> picture_from(int w, int h, F&& rgba_at) {
+  capture::Image image = capture::make_image(h, w, 4);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const std::array<float, 4> rgba = rgba_at(x, y);
+      for (int c = 0; c < 4; ++c) image.at(y, x, c) = rgba[static_cast<std::size_t>(c)];
+    }
+  }
+  return std::make_shared<KeyedPicture>(
+      std::make_shared<render::VideoTexture>(render::make_video_texture(image)));
+}
+
+// A soft-edged figure: a head and a body, of two colours.
+std::shared_ptr<const KeyedPicture> figure(float shift = 0) {
+  return picture_from(96, 192, [&](int x, int y) {
+    const float px = (static_cast<float>(x) + 0.5F) / 96 - 0.5F - shift;
+    const float py = (static_cast<float>(y) + 0.5F) / 192;
+    const float head = 0.13F - std::hypot(px, (py - 0.16F) * 2);
+    const float body = 0.22F - std::abs(px) - 0.1F * std::abs(py - 0.6F);
+    const float within = std::max(head, py > 0.25F && py < 0.98F ? body : -1.0F);
+    const float alpha = std::clamp(0.5F + within * 30, 0.0F, 1.0F);
+    const bool above = py < 0.27F;
+    return std::array{alpha * (above ? 0.7F : 0.1F), alpha * (above ? 0.5F : 0.2F),
+                      alpha * (above ? 0.4F : 0.6F), alpha};
+  });
+}
+
+std::array<float, 12> standing(Vec3f at, float wide, float high) {
+  return {wide, 0, 0, at.x, 0, 1, 0, at.y, 0, 0, high, at.z};
+}
+
+// A billboard 1 m wide and 2 m high at the set's origin, before a camera that looks along +y.
+MadeShot shot_of(render::SceneDescription scene, render::Scene::Pictures pictures) {
+  MadeShot shot;
+  shot.scene = std::make_unique<render::Scene>(std::move(scene), std::move(pictures));
+  const double f = width * 1.1;
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  shot.environment = made_sky(32, 0.1F, 1);
+  shot.plate = made_plate(height, width);
+  shot.job.cam_from_set = calibrate::look_at({0.3, -4, 1.6}, {0, 0, 0.9}, 0);
+  shot.job.lights = even_lights(64);
+  return shot;
+}
+
+render::SceneDescription scene_with(const render::Material& material) {
+  register_shaders();
+  render::SceneDescription scene;
+  scene.background = "plate";
+  scene.materials = {material};
+  scene.meshes = {std::make_shared<render::Mesh>(make_billboard_mesh(0))};
+  render::Instance& person = scene.instances.emplace_back();
+  person.name = "person";
+  person.set_from_object = standing({0, 0, 0}, 1, 2);
+  person.moves = true;
+  return scene;
+}
+
+capture::Image picture_of(const MadeShot& shot, render::KeptTransport* kept = nullptr) {
+  render::FrameResult result;
+  render::FrameInputs inputs = shot.inputs();
+  inputs.kept = kept;
+  render::render_frame(inputs, shot.job, shot.plate, result);
+  return capture::to_float(result.rgba);
+}
+
+// What is seen from the person's own camera is its picture, wherever the rectangle stands.
+TEST(Billboard, ShowsItsPictureToWithinATenthOfAPixelFromItsOwnCamera) {
+  const calibrate::Lens pinhole{"pinhole", width, height, {170, 171, 81.3, 57.9}};
+  const calibrate::Lens barrel{
+      "LENSMODEL_OPENCV4", width, height, {150, 151, 80.2, 58.7, -0.21, 0.05, 0.001, -0.002}};
+  const calibrate::Lens fish_eye{
+      "kannala_brandt", width, height, {110, 110, 79, 60, -0.02, 0.003, 0, 0}};
+  // Twice as large as the picture that the lens is for; each texel tells its place.
+  const auto places = picture_from(2 * width, 2 * height, [](int x, int y) {
+    return std::array{(static_cast<float>(x) + 0.5F) / (2 * width),
+                      (static_cast<float>(y) + 0.5F) / (2 * height), 0.0F, 1.0F};
+  });
+  for (const calibrate::Lens& lens : {pinhole, barrel, fish_eye}) {
+    for (const float away : {0.0F, 3.0F}) {
+      const calibrate::Pose cam_from_set = calibrate::look_at({0.7, -4, 1.4}, {0.1, 0, 1}, 0.05);
+      render::SceneDescription scene =
+          scene_with(make_billboard_material("person", {}, {lens, cam_from_set}));
+      scene.instances[0].set_from_object = standing({-30, away, -30}, 60, 60);
+      scene.instances[0].set_from_object[3] = 0;
+      MadeShot shot = shot_of(std::move(scene), {places});
+      shot.directions = calibrate::make_direction_table(lens);
+      shot.job.cam_from_set = cam_from_set;
+      shot.job.effort.aa_samples = 1;
+      const capture::Image seen = picture_of(shot);
+      double worst = 0;
+      for (int y = 2; y < height - 2; ++y) {
+        for (int x = 2; x < width - 2; ++x) {
+          ASSERT_GT(seen.at(y, x, 3), 0.99) << x << " " << y << " " << lens.model;
+          worst = std::max({worst, std::abs(double{seen.at(y, x, 0)} * width - 0.5 - x),
+                            std::abs(double{seen.at(y, x, 1)} * height - 0.5 - y)});
+        }
+      }
+      EXPECT_LT(worst, 0.1) << lens.model << " " << away;  // half floats: .04 at the far side
+    }
+  }
+}
+
+TEST(Billboard, LeavesThePlateItsBitsWhereItIsClear) {
+  const auto clear = picture_from(8, 8, [](int, int) { return std::array<float, 4>{}; });
+  const MadeShot shot = shot_of(scene_with(make_billboard_material("person", {})), {clear});
+  const capture::Image seen = picture_of(shot);
+  const capture::Image plate = capture::to_float(shot.plate);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(seen.at(y, x, c), plate.at(y, x, c));
+      ASSERT_EQ(seen.at(y, x, 3), 0);
+    }
+  }
+}
+
+// A person on a floor that catches the shadow, with a mirror behind and a glass ball in front.
+render::SceneDescription furnished() {
+  render::SceneDescription scene = scene_with(make_billboard_material("person", {}));
+  scene.materials.push_back(make_stand_in_material("floor", {}));
+  render::StandardParameters silver;
+  silver.metallic = 1;
+  silver.roughness = 0;
+  std::fill_n(silver.base_color, 3, 0.9F);
+  scene.materials.push_back(make_standard_material("mirror", silver));
+  scene.materials.push_back(render::make_glass_material("glass", {}));
+  auto mirror = std::make_shared<render::Mesh>();
+  mirror->positions = {{-1.6F, 0.9F, 0}, {1.6F, 1.4F, 0}, {1.6F, 1.4F, 2}, {-1.6F, 0.9F, 2}};
+  mirror->triangles = {{0, 1, 2}, {0, 2, 3}};
+  mirror->materials = {2};
+  scene.meshes.push_back(made_floor(20, 1));
+  scene.meshes.push_back(mirror);
+  scene.meshes.push_back(made_ball({0.55F, -0.6F, 0.6F}, 0.35F, 3));
+  for (std::uint32_t mesh = 1; mesh < 4; ++mesh) scene.instances.emplace_back().mesh = mesh;
+  scene.instances[1].kind = render::ObjectKind::stand_in;
+  scene.instances[1].blocks_light = false;
+  return scene;
+}
+
+TEST(Billboard, CastsShadowsAndIsMirroredAndRefractedAsTheReferenceHasIt) {
+  MadeShot shot = shot_of(furnished(), {figure()});
+  shot.job.effort.light_samples = 256;
+  shot.job.lights = even_lights(256);
+  shot.job.effort.accuracy = 0.99F;
+  shot.job.effort.aa_tolerance = 0.02F;
+  const capture::Image seen = picture_of(shot);
+  const capture::Image plate = capture::to_float(shot.plate);
+  render::ReferenceSettings settings;
+  settings.samples = 256;
+  const capture::Image truth = render_reference(shot.inputs(), shot.job, plate, settings);
+  const capture::Image mask = render::affected_mask(truth, plate);
+  EXPECT_LT(render::picture_error(seen, truth, mask).relative_rms, 0.01);
+}
+
+TEST(Billboard, IsTheSameWithWhatIsKeptFromOtherPictures) {
+  render::SceneDescription scene = furnished();
+  render::KeptTransport kept;
+  MadeShot shot = shot_of(scene, {figure()});
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> anywhere(-0.2F, 0.2F);
+  for (int i = 0; i < 6; ++i) {
+    const auto shown = figure(anywhere(random));
+    if (i % 2 == 1) scene.instances[0].set_from_object = standing({anywhere(random), 0, 0}, 1, 2);
+    shot.scene =
+        std::make_unique<render::Scene>(scene, *shot.scene, render::Scene::Pictures{shown});
+    const capture::Image warm = picture_of(shot, &kept);
+    const capture::Image cold = picture_of(shot);
+    ASSERT_EQ(warm.pixels, cold.pixels) << i;
+  }
+  // Where a picture stays, so does all that was found with it.
+  picture_of(shot, &kept);
+  const auto stages = kept.stages();
+  EXPECT_EQ(std::ranges::count(stages, render::KeptTransport::none), 0);
+}
+
+TEST(KeyedPicture, IsNothingBeyondItsRimAndHasNoNumbersThatAreNone) {
+  const auto white = picture_from(4, 2, [](int, int) { return std::array{1.F, 1.F, 1.F, 1.F}; });
+  for (const auto& [u, v] : {std::pair(-0.1F, 0.5F), {1.1F, 0.5F}, {0.5F, -0.2F}, {0.5F, 1.2F}}) {
+    EXPECT_EQ(white->look_up(u, v, 0)[3], 0) << u << " " << v;
+  }
+  EXPECT_NEAR(white->look_up(0, 0.5F, 0.1F)[3], 0.5, 1e-5);
+  EXPECT_NEAR(white->look_up(0.5F, 0.5F, 0.3F)[3], 1, 1e-5);
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  for (const float bad : {nan, std::numeric_limits<float>::infinity()}) {
+    for (const auto& rgba : {white->look_up(bad, 0.5F, 0), white->look_up(0.5F, bad, 0.1F),
+                             white->look_up(0.5F, 0.5F, bad)}) {
+      for (const float value : rgba) {
+        EXPECT_GE(value, 0);
+        EXPECT_LE(value, 1);
+      }
+    }
+  }
+  EXPECT_THROW(KeyedPicture(nullptr), std::invalid_argument);
+}
+
+TEST(Billboard, RefusesWhatCannotBeShown) {
+  const calibrate::Pose here = calibrate::look_at({0, -4, 1}, {0, 0, 1}, 0);
+  const calibrate::Lens wide{"equisolid", width, height, {50, 80, 60}};
+  EXPECT_THROW(make_billboard_material("p", {}, {wide, here}), std::invalid_argument);
+  BillboardSettings bright;
+  bright.gain[1] = std::numeric_limits<float>::infinity();
+  EXPECT_THROW(make_billboard_material("p", bright), std::invalid_argument);
+  render::SceneDescription scene = scene_with(make_billboard_material("p", {}));
+  EXPECT_THROW(render::Scene{scene}, std::invalid_argument);  // no picture
+  scene.instances[0].moves = false;
+  EXPECT_THROW(render::Scene(scene, {figure()}), std::invalid_argument);
+  scene.instances[0].moves = true;
+  scene.materials[0].parameters.resize(20);
+  EXPECT_THROW(render::Scene(scene, {figure()}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace compositing
