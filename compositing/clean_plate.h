@@ -1,0 +1,122 @@
+// The screen without anybody before it, and how it is lit in the frame at hand.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "capture/colour.h"
+#include "capture/image.h"
+#include "compositing/gap_filler.h"
+#include "compositing/key_lanes.h"
+#include "compositing/screen_colour.h"
+
+namespace compositing {
+
+// A frame as codes of 8 bits.
+struct CodedFrame {
+  int height = 0;
+  int width = 0;
+  std::span<const std::uint8_t> rgba;  // (height, width, 4); alpha is not read
+  capture::Transfer transfer = capture::Transfer::srgb;
+};
+
+// Scene-linear, as the frames are.
+struct CleanPlate {
+  capture::Image light;  // (height, width, 3); finite, not negative
+  ScreenColour colour = ScreenColour::green;
+  // Of one frame's pixel: variance = gain * light + floor.
+  float noise_gain = 1e-4F;
+  float noise_floor = 1e-6F;
+  float known = 1;  // share of the frame in which the screen itself was seen
+};
+
+// The mean of frames of the empty screen, of one size, at least one, blurred by a box of 5x5
+// pixels. Noise is measured if there are two or more. Values that are not finite, or below 0, count
+// as 0. The screen's colour is that of most of it. Throws std::invalid_argument if there are no
+// frames, sizes differ, or a frame is not (height, width, 3).
+CleanPlate average_plate(std::span<const capture::Image> frames);
+
+// The same from footage in which the person never leaves: for each pixel the median of those frames
+// that show the screen there, and where none does, what surrounds it. `known` tells the share that
+// was seen. `colour` as the footage's most saturated large colour if not given. Frames as above.
+CleanPlate plate_from_footage(std::span<const capture::Image> frames);
+CleanPlate plate_from_footage(std::span<const capture::Image> frames, ScreenColour colour);
+
+// How the last value of a plate's cell is to be read.
+enum class PlateUse : std::uint8_t {
+  screen,      // 1 / excess of the screen's colour; 0 where there is no screen
+  difference,  // 1 / noise of a pixel
+};
+
+// The plate as lit in one frame, on a grid of every step-th pixel: what keying needs of it. Cells
+// of (first, second, third, see PlateUse), channels in the keyer's order.
+struct LitPlate {
+  int height = 0;  // of the frame
+  int width = 0;
+  int step = 4;  // 4 for screens, which are smooth; 1 for other backgrounds
+  int rows = 0;
+  int columns = 0;
+  std::vector<float> cells;
+  ScreenColour colour = ScreenColour::green;
+  PlateUse use = PlateUse::screen;
+  float sigma = 0;  // noise of the screen's share at a pixel of bare screen
+
+  const float* cell(int row, int column) const {
+    return &cells[4 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                       static_cast<std::size_t>(column))];
+  }
+};
+
+// The plate at a pixel of the frame, bilinear between cells.
+std::array<float, 4> plate_at(const LitPlate& plate, int y, int x);
+
+// What following the light saw in a frame.
+struct PlateSight {
+  bool has_screen = false;  // whether the plate shows one
+  float screen = 0;         // share of it that is in sight
+  float gain = 1;           // mean of the frame's light over the plate's
+  float mismatch = 0;  // how far the screen in sight is from the plate as lit, as a share of it
+  float clipped = 0;   // share of the screen in sight whose primary is at display white
+};
+
+// Keeps a plate true under light that changes: by a gain on a grid of 8x8 pixels, from those cells
+// whose colour is the plate's. Behind the person it is taken from around; where nothing is in sight
+// from the frame before.
+class PlateLight {
+ public:
+  static constexpr int cell = 8;
+
+  // Throws std::invalid_argument for an empty plate.
+  explicit PlateLight(CleanPlate plate, PlateUse use = PlateUse::screen);
+
+  const CleanPlate& plate() const { return plate_; }
+  const LitPlate& lit() const { return lit_; }
+
+  // Follows a frame; `follow` false: the plate as it was taken. Allocates nothing. Throws
+  // std::invalid_argument naming both sizes if the frame's is not the plate's.
+  PlateSight update(const capture::Image& frame, bool follow);
+  PlateSight update(const CodedFrame& frame, bool follow);
+  void check_size(int height, int width) const;
+
+ private:
+  template <class Rows>
+  PlateSight update_from(const Rows& rows, bool follow);
+  template <class Rows>
+  PlateSight measure(const Rows& rows);
+  float cells_at(int y, int x, std::array<F8, 3>& p) const;
+  void light_up();
+
+  CleanPlate plate_;
+  LitPlate bare_;  // without gain
+  LitPlate lit_;
+  std::vector<float> raw_;    // gain of each cell, 0 = not in sight
+  std::vector<float> gains_;  // filled and smoothed
+  std::vector<float> blurred_;
+  GapFiller filler_;
+  float tolerance_ = 0;  // of colour, against the primary
+  float spread_ = 0;     // of the gain within a cell
+};
+
+}  // namespace compositing

@@ -1,0 +1,81 @@
+// The keyer's formula for one texel, or for eight.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "compositing/clean_plate.h"
+#include "compositing/key_table.h"
+
+namespace compositing {
+
+// How keyed alpha becomes the matte: what the settings come to.
+struct KeyDials {
+  const KeyTable* table = nullptr;  // null: the plain ratio
+  float black = 0.01F;              // alpha at which the screen ends
+  float scale = 1.02F;              // 1 / (alpha at which the person is whole - black)
+  float edge = 0;                   // -1 thinner .. 1 fuller
+  float despill = 1;                // share of the spill that is taken away
+};
+
+// Channels in the keyer's order.
+template <class V>
+struct KeyedTexel {
+  V first, second, third;  // premultiplied
+  V alpha;
+};
+
+// The matte of a texel before temporal smoothing: alpha, and the light of the screen on the person
+// as a share of the plate.
+template <class V>
+struct TexelMatte {
+  V alpha;
+  V spill;
+};
+
+// `c` and `p` are light of texel and plate, scene-linear, in the keyer's order; `over_excess` is
+// the last value of the plate's cell. Alpha is 1 where the plate shows no screen.
+template <bool two_primaries, class V>
+[[gnu::always_inline]] inline TexelMatte<V> matte_of(const std::array<V, 3>& c,
+                                                     const std::array<V, 3>& p,
+                                                     V over_excess,
+                                                     const KeyDials& dials) {
+  const V zero = lanes_like(over_excess, 0), one = lanes_like(over_excess, 1);
+  const V share = screen_excess<two_primaries>(c[0], c[1], c[2]) * over_excess;
+  V alpha = one - share;
+  V plate = least(most(share, zero), one);
+  if (dials.table != nullptr) {
+    // Of two primaries, the greater rest stands for the second channel.
+    V second = c[1] - share * p[1];
+    if constexpr (two_primaries) second = most(second, c[0] - share * p[0]);
+    const V third = c[2] - share * p[2];
+    const auto entry =
+        dials.table->at(place_in_table(share, second * over_excess, third * over_excess));
+    alpha = over_excess > 0.0F ? entry.alpha : one;
+    plate = over_excess > 0.0F ? entry.plate : zero;
+  }
+  const V spill = most(plate - (one - alpha), zero);
+  alpha = least(most((alpha - dials.black) * dials.scale, zero), one);
+  alpha = alpha + dials.edge * alpha * (one - alpha);
+  return {alpha, spill};
+}
+
+// The foreground that goes with a matte: what is left of the texel without the plate behind it and
+// its spill. Never below 0, and 0 where alpha is.
+template <bool two_primaries, class V>
+[[gnu::always_inline]] inline KeyedTexel<V> foreground_of(const std::array<V, 3>& c,
+                                                          const std::array<V, 3>& p,
+                                                          const TexelMatte<V>& matte,
+                                                          float despill) {
+  const V zero = lanes_like(matte.alpha, 0), one = lanes_like(matte.alpha, 1);
+  const V taken = one - matte.alpha + despill * matte.spill;
+  V f0 = most(c[0] - taken * p[0], zero), f1 = most(c[1] - taken * p[1], zero);
+  V f2 = most(c[2] - taken * p[2], zero);
+  if constexpr (!two_primaries) f0 = least(f0, most(f1, f2) + (1 - despill) * f0);
+  f0 = matte.alpha > 0.0F ? f0 : zero;
+  f1 = matte.alpha > 0.0F ? f1 : zero;
+  f2 = matte.alpha > 0.0F ? f2 : zero;
+  return {f0, f1, f2, matte.alpha};
+}
+
+}  // namespace compositing

@@ -1,0 +1,144 @@
+// Learning from made clips.
+#include "compositing/key_training.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "compositing/clean_plate.h"
+#include "compositing/made_clip.h"
+
+namespace compositing {
+namespace {
+
+constexpr std::array<int, 2> frames_of_a_clip{8, 25};
+constexpr float prior_pixels = 4;     // how many pixels the plain ratio counts for
+constexpr double share_of_any = 0.3;  // of a pixel whose person wears any colours
+
+class Learner {
+ public:
+  Learner() : sums_(places * 4) {}
+
+  void add(const TablePlace<float>& place, float share, float alpha, float plate, double pixels) {
+    const int k = std::min(static_cast<int>(place.share), table_shares - 2);
+    const int l = std::min(static_cast<int>(place.light), table_lights - 2);
+    const int h = std::min(static_cast<int>(place.hue), table_hues - 2);
+    const float u = place.share - static_cast<float>(k), v = place.light - static_cast<float>(l);
+    const float w = place.hue - static_cast<float>(h);
+    for (int corner = 0; corner < 8; ++corner) {
+      const bool a = corner & 1, b = corner & 2, c = corner & 4;
+      const double weight = pixels * (a ? u : 1 - u) * (b ? v : 1 - v) * (c ? w : 1 - w);
+      double* to = &sums_[4 * index(k + a, l + b, h + c)];
+      to[0] += weight;
+      to[1] += weight * alpha;
+      to[2] += weight * plate;
+      to[3] += weight * share;
+    }
+  }
+
+  // What no pixel has shown is as its neighbours are.
+  TableCodes codes() {
+    std::vector<std::array<double, 2>> values(places);
+    std::vector<char> known(places);
+    for (std::size_t i = 0; i < places; ++i) {
+      const double* sum = &sums_[4 * i];
+      if (sum[0] <= 0) continue;
+      const double plain = std::clamp(sum[3] / sum[0], 0.0, 1.0);
+      values[i] = {(sum[1] + prior_pixels * (1 - plain)) / (sum[0] + prior_pixels),
+                   (sum[2] + prior_pixels * plain) / (sum[0] + prior_pixels)};
+      known[i] = 1;
+    }
+    while (std::count(known.begin(), known.end(), 0) > 0) spread(values, known);
+    TableCodes codes{};
+    for (int h = 0; h < table_hues; ++h) {
+      for (int k = 0; k < table_shares; ++k) {
+        for (int l = 0; l < table_lights; ++l) {
+          for (std::size_t of = 0; of < 2; ++of) {
+            const double value = std::clamp(values[index(k, l, h)][of], 0.0, 1.0);
+            codes[code_at(k, l, h) + of] = static_cast<std::uint8_t>(std::lround(255 * value));
+          }
+        }
+      }
+    }
+    return codes;
+  }
+
+ private:
+  static constexpr std::size_t places =
+      static_cast<std::size_t>(table_shares) * table_lights * table_hues;
+  static std::size_t index(int k, int l, int h) { return code_at(k, l, h) / 2; }
+
+  static void spread(std::vector<std::array<double, 2>>& values, std::vector<char>& known) {
+    const auto before = values;
+    const auto knew = known;
+    for (int h = 0; h < table_hues; ++h) {
+      for (int k = 0; k < table_shares; ++k) {
+        for (int l = 0; l < table_lights; ++l) {
+          if (knew[index(k, l, h)]) continue;
+          double count = 0;
+          std::array<double, 2> sum{};
+          const auto take = [&](int kk, int ll, int hh) {
+            if (kk < 0 || ll < 0 || hh < 0 || kk >= table_shares || ll >= table_lights ||
+                hh >= table_hues || !knew[index(kk, ll, hh)]) {
+              return;
+            }
+            count += 1;
+            for (std::size_t of = 0; of < 2; ++of) sum[of] += before[index(kk, ll, hh)][of];
+          };
+          // Along light and hue first: the share says most.
+          take(k, l - 1, h), take(k, l + 1, h), take(k, l, h - 1), take(k, l, h + 1);
+          if (count <= 0) take(k - 1, l, h), take(k + 1, l, h);
+          if (count <= 0) continue;
+          for (std::size_t of = 0; of < 2; ++of) values[index(k, l, h)][of] = sum[of] / count;
+          known[index(k, l, h)] = 1;
+        }
+      }
+    }
+  }
+
+  std::vector<double> sums_;  // weight, and weighted alpha, plate, share
+};
+
+void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learner& learner) {
+  const capture::Image seen = light_of(made.seen);
+  light.update(seen, true);
+  const LitPlate& lit = light.lit();
+  const auto order = channels_of(lit.colour);
+  for (int y = 0; y < seen.height; ++y) {
+    for (int x = 0; x < seen.width; ++x) {
+      const std::array<float, 4> p = plate_at(lit, y, x);
+      if (p[3] <= 0) continue;
+      const auto c = [&](std::size_t i) { return seen.at(y, x, order[i]); };
+      double dot = 0, square = 0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        dot += (c(i) - made.truth.at(y, x, order[i])) * p[i];
+        square += p[i] * p[i];
+      }
+      const float share = screen_excess<false>(c(0), c(1), c(2)) * p[3];
+      const auto rest = [&](std::size_t i) { return (c(i) - share * p[i]) * p[3]; };
+      learner.add(place_in_table(share, rest(1), rest(2)), share, made.truth.at(y, x, 3),
+                  static_cast<float>(dot / square), pixels);
+    }
+  }
+}
+
+}  // namespace
+
+TableCodes train_key_table(std::span<const std::uint32_t> seeds) {
+  Learner learner;
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    for (MadeScene scene : made_scenes()) {
+      scene.actor.any_colours = i % 2 == 1;
+      const MadeClip clip(scene, seeds[i]);
+      std::vector<capture::Image> shots;
+      for (int s = 0; s < 8; ++s) shots.push_back(light_of(clip.plate_shot(s)));
+      PlateLight light(average_plate(shots));
+      const double pixels = scene.actor.any_colours ? share_of_any : 1;
+      for (const int frame : frames_of_a_clip)
+        learn_frame(clip.frame(frame), pixels, light, learner);
+    }
+  }
+  return learner.codes();
+}
+
+}  // namespace compositing

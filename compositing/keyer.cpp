@@ -1,0 +1,252 @@
+// Keying whole frames, and how sure that is.
+#include "compositing/keyer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "compositing/background_subtraction.h"
+#include "compositing/key_pass.h"
+
+namespace compositing {
+namespace {
+
+using capture::HalfImage;
+
+template <bool two_primaries>
+struct ScreenFormula {
+  KeyDials dials;
+  TexelMatte<F8> matte(const std::array<F8, 3>& c,
+                       const std::array<F8, 3>& p,
+                       F8 over_excess) const {
+    return matte_of<two_primaries>(c, p, over_excess, dials);
+  }
+  KeyedTexel<F8> foreground(const std::array<F8, 3>& c,
+                            const std::array<F8, 3>& p,
+                            const TexelMatte<F8>& matte) const {
+    return foreground_of<two_primaries>(c, p, matte, dials.despill);
+  }
+};
+
+struct DifferenceFormula {
+  KeyDials dials;
+  TexelMatte<F8> matte(const std::array<F8, 3>& c,
+                       const std::array<F8, 3>& p,
+                       F8 over_noise) const {
+    return difference_matte(c, p, over_noise, dials);
+  }
+  KeyedTexel<F8> foreground(const std::array<F8, 3>& c,
+                            const std::array<F8, 3>& p,
+                            const TexelMatte<F8>& matte) const {
+    return foreground_of<true>(c, p, matte, 0.0F);  // no colour to take out
+  }
+};
+
+// The least code that is at least as bright, of light 0..1.
+const std::array<std::uint8_t, 4096>& codes_of(capture::Transfer transfer) {
+  static const auto all = [] {
+    std::array<std::array<std::uint8_t, 4096>, 4> tables{};
+    for (std::size_t t = 0; t < tables.size(); ++t) {
+      for (std::size_t i = 0; i < tables[t].size(); ++i) {
+        const double light = static_cast<double>(i) / static_cast<double>(tables[t].size() - 1);
+        const double code = 255 * capture::encode(static_cast<capture::Transfer>(t), light);
+        tables[t][i] = static_cast<std::uint8_t>(std::clamp(std::ceil(code), 0.0, 255.0));
+      }
+    }
+    return tables;
+  }();
+  return all[static_cast<std::size_t>(transfer)];
+}
+
+// Codes within which eight pixels of a row are screen at a glance, for each 8x8 pixels: the
+// primary within a tenth of the plate, the others no brighter than it by more than noise. A thing
+// that covers less than `bare_share` of each of eight pixels is given up.
+void bound_screen(const LitPlate& lit,
+                  capture::Transfer transfer,
+                  std::vector<CodeBounds>& bounds) {
+  constexpr float darkest = 0.955F, brightest = 1.15F, more = 0.03F;
+  if (has_two_primaries(lit.colour)) return;
+  const auto order = channels_of(lit.colour);
+  const auto& codes = codes_of(transfer);
+  const auto code = [&](float light) {
+    return static_cast<std::uint32_t>(
+        codes[static_cast<std::size_t>(std::clamp(light, 0.0F, 1.0F) * 4095)]);
+  };
+  const int blocks = (lit.width + 7) / 8;
+  for (int row = 0; row < lit.rows; row += 2) {
+    for (int block = 0; block < blocks; ++block) {
+      std::array<float, 4> low{}, high{};
+      const float* first = lit.cell(row, std::min(2 * block, lit.columns - 1));
+      std::copy_n(first, 4, low.begin());
+      high = low;
+      for (int part = 1; part < 4; ++part) {
+        const float* cell = lit.cell(std::min(row + part / 2, lit.rows - 1),
+                                     std::min(2 * block + part % 2, lit.columns - 1));
+        for (std::size_t c = 0; c < 4; ++c) {
+          low[c] = std::min(low[c], cell[c]);
+          high[c] = std::max(high[c], cell[c]);
+        }
+      }
+      CodeBounds bound{0xFF000000U, 0};
+      if (low[3] > 0) {
+        const float slack = more / high[3];
+        const std::array<float, 3> top{low[0] * brightest, low[1] + slack, low[2] + slack};
+        for (std::size_t c = 0; c < 3; ++c) bound.most |= code(top[c]) << (8 * order[c]);
+        bound.least = code(high[0] * darkest) << (8 * order[0]);
+      }
+      bounds.push_back(bound);
+    }
+  }
+}
+
+const KeyTable& shipped_table() {
+  static const KeyTable table(shipped_key_table());
+  return table;
+}
+
+PlateUse use_of(KeyMethod method) {
+  return method == KeyMethod::screen ? PlateUse::screen : PlateUse::difference;
+}
+
+void check(const KeySettings& s) {
+  const auto within = [](float value, float low, float high, const char* name) {
+    if (value >= low && value <= high) return;
+    throw std::invalid_argument("key setting " + std::string(name) + " is " +
+                                std::to_string(value) + ", not " + std::to_string(low) + " to " +
+                                std::to_string(high));
+  };
+  within(s.screen, 0, 0.95F, "screen");
+  within(s.core, 0.05F, 1, "core");
+  if (!(s.core > s.screen)) throw std::invalid_argument("key setting core is not above screen");
+  within(s.edge, -1, 1, "edge");
+  within(s.despill, 0, 1, "despill");
+  within(s.smoothing, 0, 4, "smoothing");
+}
+
+// 1 up to `good`, 0 from `bad` on.
+float falling(float value, float good, float bad) {
+  return std::clamp((bad - value) / (bad - good), 0.0F, 1.0F);
+}
+
+}  // namespace
+
+std::string_view name_of(KeyStatus status) {
+  constexpr std::array<std::string_view, 7> names{"good",   "hidden", "clipped",  "noisy",
+                                                  "misfit", "unlit",  "no screen"};
+  return names[static_cast<std::size_t>(status)];
+}
+
+Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
+    : light_(std::move(plate), use_of(settings.method)),
+      settings_(settings),
+      masks_(std::move(masks)) {
+  check(settings);
+  const LitPlate& lit = light_.lit();
+  const std::size_t pixels =
+      static_cast<std::size_t>(lit.height) * static_cast<std::size_t>(lit.width);
+  for (const auto& [mask, name] :
+       {std::pair{&masks_.garbage, "garbage"}, std::pair{&masks_.core, "core"}}) {
+    if (mask->empty() || mask->size() == pixels) continue;
+    throw std::invalid_argument(std::string(name) + " mask has " + std::to_string(mask->size()) +
+                                " pixels, the clean plate " + std::to_string(lit.width) + "x" +
+                                std::to_string(lit.height));
+  }
+  dials_ = {settings.learned ? &shipped_table() : nullptr, settings.screen,
+            1 / (settings.core - settings.screen), settings.edge, settings.despill};
+}
+
+KeyReport Keyer::key(const capture::Image& frame, HalfImage& keyed) {
+  const PlateSight sight = light_.update(frame, settings_.follows_light);
+  const LightRows rows(frame, channels_of(light_.plate().colour));
+  scratch_.bare.clear();
+  return report(sight, key_rows(rows, keyed));
+}
+
+KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
+  const PlateSight sight = light_.update(frame, settings_.follows_light);
+  const CodeRows rows(frame.rgba.data(), frame.width, channels_of(light_.plate().colour),
+                      light_polynomial(frame.transfer));
+  scratch_.bare.clear();
+  if (masks_.core.empty() && settings_.method == KeyMethod::screen && settings_.learned) {
+    bound_screen(light_.lit(), frame.transfer, scratch_.bare);
+  }
+  return report(sight, key_rows(rows, keyed));
+}
+
+KeyReport Keyer::follow(const capture::Image& frame) {
+  return report(light_.update(frame, settings_.follows_light), 0);
+}
+
+// Returns the share of pixels that are neither screen nor person.
+template <class Source>
+float Keyer::key_rows(const Source& source, HalfImage& keyed) {
+  const LitPlate& lit = light_.lit();
+  const std::size_t pixels =
+      static_cast<std::size_t>(lit.height) * static_cast<std::size_t>(lit.width);
+  keyed.height = lit.height, keyed.width = lit.width, keyed.channels = 4;
+  keyed.pixels.resize(4 * pixels);
+  const auto run = [&](const auto& formula) {
+    using Pass = KeyPass<Source, std::decay_t<decltype(formula)>>;
+    const float noise = settings_.smoothing * lit.sigma;
+    Pass pass(source, formula, {lit, masks_.garbage, masks_.core, noise, scratch_.bare}, scratch_,
+              keyed);
+    return static_cast<float>(pass.run()) / static_cast<float>(pixels);
+  };
+  if (settings_.method == KeyMethod::difference) return run(DifferenceFormula{dials_});
+  if (has_two_primaries(lit.colour)) return run(ScreenFormula<true>{dials_});
+  return run(ScreenFormula<false>{dials_});
+}
+
+KeyReport Keyer::report(const PlateSight& sight, float soft) const {
+  KeyReport report;
+  report.sight = sight;
+  report.soft = soft;
+  const auto lower = [&](float by, KeyStatus status) {
+    if (by < 1 && (report.confidence >= 1 || by < report.confidence)) report.status = status;
+    report.confidence = std::min(report.confidence, by);
+  };
+  if (!sight.has_screen) {
+    lower(0, KeyStatus::no_screen);
+    return report;
+  }
+  lower(1 - falling(sight.screen, 0.03F, 0.25F), KeyStatus::hidden);
+  if (settings_.method == KeyMethod::screen) {
+    lower(0.2F + 0.8F * falling(sight.clipped, 0.05F, 0.6F), KeyStatus::clipped);
+    lower(falling(light_.lit().sigma, 0.06F, 0.25F), KeyStatus::noisy);
+  }
+  lower(falling(sight.mismatch, 0.06F, 0.16F), KeyStatus::misfit);
+  lower(falling(soft, 0.15F, 0.45F), KeyStatus::misfit);
+  lower(falling(sight.gain, 1.7F, 2.3F) * falling(-sight.gain, -0.45F, -0.2F), KeyStatus::unlit);
+  return report;
+}
+
+std::array<float, 4> key_texel(
+    const LitPlate& plate, const KeyDials& dials, int y, int x, const std::array<float, 3>& light) {
+  const float* cell = plate.cell(y / plate.step, x / plate.step);
+  const auto order = channels_of(plate.colour);
+  const auto at = [](int channel) { return static_cast<std::size_t>(channel); };
+  std::array<float, 3> c{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const float value = light[at(order[i])];
+    c[i] = value > 0 && value < 1e9F ? value : 0;
+  }
+  const std::array<float, 3> p{cell[0], cell[1], cell[2]};
+  KeyedTexel<float> keyed{};
+  if (plate.use == PlateUse::difference) {
+    keyed = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials), 0);
+  } else if (has_two_primaries(plate.colour)) {
+    keyed = foreground_of<true>(c, p, matte_of<true>(c, p, cell[3], dials), dials.despill);
+  } else {
+    keyed = foreground_of<false>(c, p, matte_of<false>(c, p, cell[3], dials), dials.despill);
+  }
+  std::array<float, 4> rgba{0, 0, 0, keyed.alpha};
+  rgba[at(order[0])] = keyed.first;
+  rgba[at(order[1])] = keyed.second;
+  rgba[at(order[2])] = keyed.third;
+  return rgba;
+}
+
+}  // namespace compositing

@@ -1,0 +1,96 @@
+// A person before a screen, frame by frame: foreground and alpha, and how sure they are.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "capture/image.h"
+#include "compositing/clean_plate.h"
+#include "compositing/key_scratch.h"
+#include "compositing/key_texel.h"
+
+namespace compositing {
+
+enum class KeyMethod : std::uint8_t {
+  screen,      // by the colour of a screen
+  difference,  // by the distance from a plate of any still background: background_subtraction.h
+};
+
+// One setting for all clips; the first two are what a difficult one may want.
+struct KeySettings {
+  KeyMethod method = KeyMethod::screen;
+  float screen = 0.01F;       // alpha below which the screen is clear
+  float core = 0.99F;         // alpha above which the person is whole
+  float edge = 0;             // -1 thinner .. 1 fuller
+  float despill = 1;          // 0 none .. 1 all of the spill that is likely
+  bool learned = true;        // the table; without it the plain ratio, for screens unlike any
+  bool follows_light = true;  // the plate's gain is measured in each frame
+  float smoothing = 1;        // of alpha over frames, in units of the noise; 0 = none
+};
+
+// Where the key holds. Each is (height, width) of 0..255, or empty.
+struct KeyMasks {
+  std::vector<std::uint8_t> garbage;  // 255 = never the person
+  std::vector<std::uint8_t> core;     // 255 = always the person
+};
+
+enum class KeyStatus : std::uint8_t {
+  good,
+  hidden,    // hardly any of the screen is in sight: light is the last that was known
+  clipped,   // the screen's colour is at the camera's limit: edges are guesses
+  noisy,     // the screen's share of a pixel is uncertain
+  misfit,    // what is in sight is not the plate: moved, stale, or not this screen
+  unlit,     // light has changed beyond what is followed
+  no_screen  // the plate shows none
+};
+std::string_view name_of(KeyStatus status);
+
+struct KeyReport {
+  float confidence = 1;                // 0..1; falls before the picture breaks
+  KeyStatus status = KeyStatus::good;  // what lowers it most
+  PlateSight sight;
+  float soft = 0;  // share of pixels that are neither screen nor person
+};
+
+// Keys the frames of one clip, in order. Not thread-safe; several may run side by side.
+class Keyer {
+ public:
+  // Throws std::invalid_argument for an empty plate, settings outside their ranges, and masks of
+  // another size.
+  Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks = {});
+
+  // (height, width, 4): premultiplied, scene-linear; alpha 0..1, foreground at least 0, all finite.
+  // `keyed` keeps its memory. Throws std::invalid_argument naming both sizes if the frame's is not
+  // the plate's.
+  KeyReport key(const capture::Image& frame, capture::HalfImage& keyed);
+  KeyReport key(const CodedFrame& frame, capture::HalfImage& keyed);
+
+  // For keying texels by themselves (key_texel.h): the plate as lit in the newest frame.
+  const LitPlate& lit() const { return light_.lit(); }
+  const KeyDials& dials() const { return dials_; }
+
+  // Follows the light without keying, for those who key texel by texel.
+  KeyReport follow(const capture::Image& frame);
+
+  // Forgets what alpha was, at a cut.
+  void restart() { scratch_.has_previous = false; }
+
+ private:
+  template <class Source>
+  float key_rows(const Source& source, capture::HalfImage& keyed);
+  KeyReport report(const PlateSight& sight, float soft) const;
+
+  PlateLight light_;
+  KeySettings settings_;
+  KeyMasks masks_;
+  KeyDials dials_;
+  KeyScratch scratch_;
+};
+
+// One texel of a frame whose plate is lit, by the nearest cell: premultiplied RGB and alpha.
+std::array<float, 4> key_texel(
+    const LitPlate& plate, const KeyDials& dials, int y, int x, const std::array<float, 3>& light);
+
+}  // namespace compositing

@@ -1,0 +1,20 @@
+// Makes compositing/key_table.inc anew: make-key-table > compositing/key_table.inc (a minute).
+#include <iostream>
+#include <string>
+
+#include "compositing/key_training.h"
+
+int main() {
+  const compositing::TableCodes codes = compositing::train_key_table(compositing::training_seeds);
+  std::cout << "// Alpha and plate codes by hue, share and light: written by make-key-table.\n";
+  std::string line;
+  for (const std::uint8_t code : codes) {
+    const std::string number = std::to_string(code) + ",";
+    if (line.size() + number.size() > 100) {
+      std::cout << line << '\n';
+      line.clear();
+    }
+    line += number;
+  }
+  std::cout << line << '\n';
+}

@@ -1,0 +1,313 @@
+// The keyer: laws of the formula, masks, dials, refusals.
+#include "compositing/keyer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include "capture/counter_random.h"
+#include "compositing/key_training.h"
+#include "compositing/made_clip.h"
+
+namespace compositing {
+namespace {
+
+using capture::HalfImage;
+using capture::Image;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr std::array<float, 3> green{0.035F, 0.40F, 0.06F};
+
+Image even_picture(int height, int width, std::array<float, 3> light) {
+  Image image = capture::make_image(height, width);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = light[i % 3];
+  return image;
+}
+
+CleanPlate even_plate(int height, int width, std::array<float, 3> light = green) {
+  const Image shot = even_picture(height, width, light);
+  return average_plate({&shot, 1});
+}
+
+float random(std::uint64_t seed, std::uint64_t of) {
+  return static_cast<float>(capture::uniform_high(capture::mixed_bits(seed, of)));
+}
+
+// The ratio alone: no table, no dead zones.
+KeyDials plain_dials() {
+  KeyDials dials;
+  dials.black = 0;
+  dials.scale = 1;
+  return dials;
+}
+
+LitPlate lit_plate(std::array<float, 3> light) {
+  PlateLight plate(even_plate(16, 16, light));
+  return plate.lit();
+}
+
+TEST(KeyTexel, UndoesTheMixtureOfGreyAndScreenExactly) {
+  const LitPlate plate = lit_plate(green);
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    const float alpha = random(1, i), grey = random(2, i);
+    std::array<float, 3> seen{};
+    for (std::size_t c = 0; c < 3; ++c) seen[c] = alpha * grey + (1 - alpha) * green[c];
+    const auto keyed = key_texel(plate, plain_dials(), 3, 3, seen);
+    ASSERT_NEAR(keyed[3], alpha, 2e-5F);
+    for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(keyed[c], alpha * grey, 2e-5F);
+  }
+}
+
+TEST(KeyTexel, OverThePlateGivesTheTexelBackUnlessSpillWasTaken) {
+  const LitPlate plate = lit_plate(green);
+  KeyDials dials = plain_dials();
+  dials.despill = 0;
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    const std::array<float, 3> seen{random(3, i), random(4, i) * 0.9F, random(5, i)};
+    const auto keyed = key_texel(plate, dials, 3, 3, seen);
+    if (keyed[3] <= 0 || *std::min_element(keyed.begin(), keyed.end() - 1) <= 0) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      ASSERT_NEAR(keyed[c] + (1 - keyed[3]) * green[c], seen[c], 2e-5F);
+    }
+  }
+}
+
+TEST(KeyTexel, KeysAnyScreenAsGreenWithItsChannelsExchanged) {
+  const LitPlate plate = lit_plate(green);
+  Keyer keyer(even_plate(16, 16), {});
+  const std::array<std::array<std::size_t, 3>, 2> orders{{{0, 2, 1}, {1, 0, 2}}};  // blue, red
+  for (const auto& order : orders) {
+    std::array<float, 3> screen{};
+    for (std::size_t c = 0; c < 3; ++c) screen[order[c]] = green[c];
+    const LitPlate other = lit_plate(screen);
+    for (std::uint64_t i = 0; i < 200; ++i) {
+      const std::array<float, 3> seen{random(6, i), random(7, i), random(8, i)};
+      std::array<float, 3> turned{};
+      for (std::size_t c = 0; c < 3; ++c) turned[order[c]] = seen[c];
+      // Which of the two other channels comes second makes no difference to the plain ratio.
+      const auto a = key_texel(plate, plain_dials(), 3, 3, seen);
+      const auto b = key_texel(other, plain_dials(), 3, 3, turned);
+      ASSERT_NEAR(a[3], b[3], 1e-5F);
+      for (std::size_t c = 0; c < 3; ++c) ASSERT_NEAR(a[c], b[order[c]], 1e-5F);
+    }
+  }
+}
+
+TEST(KeyTexel, FilteredFirstOrLastIsTheSameAwayFromClamps) {
+  const LitPlate plate = lit_plate(green);
+  for (std::uint64_t i = 0; i < 300; ++i) {
+    std::array<float, 3> mean{};
+    std::array<float, 4> of_means{};
+    for (std::uint64_t k = 0; k < 4; ++k) {
+      const float alpha = 0.2F + 0.6F * random(9, 4 * i + k),
+                  grey = 0.3F + 0.5F * random(10, 4 * i + k);
+      std::array<float, 3> seen{};
+      for (std::size_t c = 0; c < 3; ++c) {
+        seen[c] = alpha * grey + (1 - alpha) * green[c];
+        mean[c] += seen[c] / 4;
+      }
+      const auto keyed = key_texel(plate, plain_dials(), 3, 3, seen);
+      for (std::size_t c = 0; c < 4; ++c) of_means[c] += keyed[c] / 4;
+    }
+    const auto keyed = key_texel(plate, plain_dials(), 3, 3, mean);
+    for (std::size_t c = 0; c < 4; ++c) ASSERT_NEAR(keyed[c], of_means[c], 1e-5F);
+  }
+}
+
+TEST(KeyTexel, OfEightAtATimeIsTheOneOfEach) {
+  Keyer keyer(even_plate(16, 16), {});
+  const LitPlate& plate = keyer.lit();
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    std::array<F8, 3> c{}, p{};
+    for (int lane = 0; lane < key_lanes; ++lane) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        c[k][lane] = random(20 + k, 8 * i + static_cast<std::uint64_t>(lane));
+        p[k][lane] = plate.cell(0, 0)[k];
+      }
+    }
+    const auto matte = matte_of<false>(c, p, all_of(plate.cell(0, 0)[3]), keyer.dials());
+    const auto eight = foreground_of<false>(c, p, matte, 1.0F);
+    for (int lane = 0; lane < key_lanes; ++lane) {
+      const auto one = key_texel(plate, keyer.dials(), 0, 0, {c[1][lane], c[0][lane], c[2][lane]});
+      ASSERT_NEAR(eight.alpha[lane], one[3], 1e-6F);
+      ASSERT_NEAR(eight.first[lane], one[1], 1e-6F);
+      ASSERT_NEAR(eight.second[lane], one[0], 1e-6F);
+      ASSERT_NEAR(eight.third[lane], one[2], 1e-6F);
+    }
+  }
+}
+
+TEST(KeyTexel, IsOpaqueWhereThePlateShowsNoScreen) {
+  const LitPlate plate = lit_plate({0.3F, 0.3F, 0.3F});
+  const auto keyed = key_texel(plate, {}, 3, 3, {0.1F, 0.5F, 0.2F});
+  EXPECT_EQ(keyed[3], 1);
+  EXPECT_FLOAT_EQ(keyed[1], 0.5F);
+}
+
+Image keyed_picture(Keyer& keyer, const Image& frame) {
+  HalfImage keyed;
+  keyer.key(frame, keyed);
+  return to_float(keyed);
+}
+
+TEST(Keyer, ClearsTheEmptyScreenOfAnySizeAndKeepsAGreyPerson) {
+  for (const int width : {16, 17, 23, 31, 96}) {
+    Keyer keyer(even_plate(19, width), {});
+    for (const float value : keyed_picture(keyer, even_picture(19, width, green)).pixels) {
+      ASSERT_EQ(value, 0);
+    }
+    const Image grey = keyed_picture(keyer, even_picture(19, width, {0.25F, 0.25F, 0.25F}));
+    for (std::size_t i = 3; i < grey.pixels.size(); i += 4)
+      ASSERT_GT(grey.pixels[i], 0.7F) << width;
+  }
+}
+
+TEST(Keyer, OfCodesIsTheOneOfTheirLight) {
+  const MadeClip clip(made_scene("plain"), 4, 101, 163);
+  const MadeFrame made = clip.frame(9);
+  const Image shot = light_of(clip.plate_shot(0));
+  std::vector<std::uint8_t> rgba;
+  for (std::size_t i = 0; i < made.seen.codes.size(); i += 3) {
+    rgba.insert(rgba.end(),
+                {made.seen.codes[i], made.seen.codes[i + 1], made.seen.codes[i + 2], 9});
+  }
+  Keyer a(average_plate({&shot, 1}), {}), b(average_plate({&shot, 1}), {});
+  HalfImage keyed;
+  a.key(CodedFrame{101, 163, rgba, capture::Transfer::srgb}, keyed);
+  const Image of_codes = to_float(keyed);
+  const Image of_light = keyed_picture(b, light_of(made.seen));
+  double off = 0;
+  for (std::size_t i = 0; i < of_codes.pixels.size(); ++i) {
+    // A block that is screen at a glance loses what is next to nothing.
+    ASSERT_NEAR(of_codes.pixels[i], of_light.pixels[i], 0.13F) << i;
+    off += std::abs(of_codes.pixels[i] - of_light.pixels[i]);
+  }
+  EXPECT_LT(off / static_cast<double>(of_codes.pixels.size()), 1e-3);
+}
+
+TEST(Keyer, NeverGivesThePersonWhatGarbageMasksCoverAndAlwaysWhatCoreMasksDo) {
+  const Image grey = even_picture(16, 24, {0.4F, 0.4F, 0.4F});
+  KeyMasks masks;
+  masks.garbage.assign(16 * 24, 0);
+  masks.core.assign(16 * 24, 0);
+  masks.garbage[5] = 255;
+  masks.core[300] = 255;
+  Keyer keyer(even_plate(16, 24), {}, masks);
+  EXPECT_EQ(keyed_picture(keyer, grey).pixels[4 * 5 + 3], 0);
+  keyer.restart();
+  EXPECT_EQ(keyed_picture(keyer, even_picture(16, 24, green)).pixels[4 * 300 + 3], 1);
+}
+
+TEST(Keyer, GrowsAndShrinksEdgesByItsDial) {
+  const Image half = even_picture(16, 16, {0.2F, 0.36F, 0.2F});
+  std::vector<float> alphas;
+  for (const float edge : {-1.0F, 0.0F, 1.0F}) {
+    KeySettings settings;
+    settings.edge = edge;
+    Keyer keyer(even_plate(16, 16), settings);
+    alphas.push_back(keyed_picture(keyer, half).pixels[3]);
+  }
+  EXPECT_LT(alphas[0], alphas[1] - 0.05F);
+  EXPECT_LT(alphas[1], alphas[2] - 0.05F);
+}
+
+TEST(Keyer, SmoothsNoiseAndLeavesNoTrail) {
+  const MadeClip clip(made_scene("walking"), 6, 135, 240);
+  const Image shot = light_of(clip.plate_shot(0));
+  KeySettings settings;
+  Keyer smoothed(average_plate({&shot, 1}), settings);
+  settings.smoothing = 0;
+  Keyer plain(average_plate({&shot, 1}), settings);
+  double trail = 0, bare = 0;
+  for (int i = 0; i < 24; ++i) {
+    const MadeFrame made = clip.frame(i);
+    const Image a = keyed_picture(smoothed, light_of(made.seen)),
+                b = keyed_picture(plain, light_of(made.seen));
+    for (std::size_t p = 3; p < a.pixels.size(); p += 4) {
+      if (made.truth.pixels[p] > 0) continue;
+      trail += std::max(0.0F, a.pixels[p] - b.pixels[p]);
+      bare += 1;
+    }
+  }
+  EXPECT_LT(trail / bare, 1e-3);
+}
+
+TEST(Keyer, TakesAPersonFromAStillRoomByDifference) {
+  // A room of soft patches; the person of a made clip is put before it.
+  const MadeClip clip(made_scene("plain"), 6, 135, 240);
+  Image room = capture::make_image(135, 240);
+  for (int y = 0; y < 135; ++y) {
+    for (int x = 0; x < 240; ++x) {
+      const float patch = 0.25F + 0.2F * std::sin(0.13F * static_cast<float>(x)) *
+                                      std::cos(0.17F * static_cast<float>(y));
+      for (int c = 0; c < 3; ++c) room.at(y, x, c) = patch * (1.1F - 0.2F * static_cast<float>(c));
+    }
+  }
+  const auto noisy = [&](const Image& image, std::uint64_t seed) {
+    Image out = image;
+    for (std::size_t i = 0; i < out.pixels.size(); ++i) {
+      out.pixels[i] +=
+          0.005F * static_cast<float>(capture::normal_deviate(capture::mixed_bits(seed, i)));
+    }
+    return out;
+  };
+  const std::vector<Image> shots{noisy(room, 1), noisy(room, 2), noisy(room, 3), noisy(room, 4)};
+  KeySettings settings;
+  settings.method = KeyMethod::difference;
+  CleanPlate plate = average_plate(shots);
+  Keyer keyer(plate, settings);
+  const MadeFrame made = clip.frame(10);
+  Image seen = room;
+  for (std::size_t i = 0; i < seen.pixels.size(); ++i) {
+    const float* t = &made.truth.pixels[4 * (i / 3)];
+    seen.pixels[i] = t[i % 3] + (1 - t[3]) * room.pixels[i];
+  }
+  HalfImage half;
+  const KeyReport report = keyer.key(noisy(seen, 9), half);
+  const Image keyed = to_float(half);
+  double wrong = 0, sure = 0;
+  for (std::size_t p = 3; p < keyed.pixels.size(); p += 4) {
+    const float truth = made.truth.pixels[p];
+    if (truth > 0.01F && truth < 0.99F) continue;
+    wrong += std::abs(keyed.pixels[p] - truth) > 0.5F ? 1 : 0;
+    sure += 1;
+  }
+  EXPECT_LT(wrong / sure, 0.05);
+  EXPECT_GT(report.confidence, 0.5F);
+}
+
+TEST(KeyTable, IsWhatItsMakerLearnsFromTheSameClips) {
+  if (!PLATELIGHT_FULL_TESTS) GTEST_SKIP() << "takes a minute: tests/run.sh --full";
+  const TableCodes learned = train_key_table(training_seeds);
+  for (std::size_t i = 0; i < learned.size(); ++i)
+    ASSERT_NEAR(learned[i], shipped_key_table()[i], 2) << i;
+}
+
+TEST(Keyer, RefusesWhatDoesNotFitNamingBoth) {
+  Keyer keyer(even_plate(16, 24), {});
+  HalfImage keyed;
+  EXPECT_THAT([&] { keyer.key(even_picture(20, 30, green), keyed); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("24x16, the frame 30x20")));
+  const std::vector<std::uint8_t> few(8);
+  EXPECT_THROW(keyer.key(CodedFrame{16, 24, few, capture::Transfer::srgb}, keyed),
+               std::invalid_argument);
+  KeyMasks masks;
+  masks.garbage.resize(7);
+  EXPECT_THROW(Keyer(even_plate(16, 24), {}, masks), std::invalid_argument);
+  EXPECT_THROW(Keyer(CleanPlate{}, {}), std::invalid_argument);
+  KeySettings settings;
+  settings.core = 0.005F;
+  EXPECT_THROW(Keyer(even_plate(16, 24), settings), std::invalid_argument);
+  settings = {};
+  settings.edge = std::nanf("");
+  EXPECT_THROW(Keyer(even_plate(16, 24), settings), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace compositing
