@@ -54,9 +54,12 @@ template <bool two_primaries, class V>
     alpha = over_excess > 0.0F ? entry.alpha : one;
     plate = over_excess > 0.0F ? entry.plate : zero;
   }
-  const V spill = most(plate - (one - alpha), zero);
+  V spill = most(plate - (one - alpha), zero);
   alpha = least(most((alpha - dials.black) * dials.scale, zero), one);
   alpha = alpha + dials.edge * alpha * (one - alpha);
+  // What the dials have made more of the person than it is keeps no more of the screen for that.
+  const V mixed = least(most((plate - 0.3F) * (1 / 0.3F), zero), one);
+  spill = most(spill, mixed * plate - (one - alpha));
   return {alpha, spill};
 }
 
@@ -68,10 +71,16 @@ template <bool two_primaries, class V>
                                                           const TexelMatte<V>& matte,
                                                           float despill) {
   const V zero = lanes_like(matte.alpha, 0), one = lanes_like(matte.alpha, 1);
-  const V taken = one - matte.alpha + despill * matte.spill;
+  const V taken = one - matte.alpha + (despill < 1 ? despill : 1.0F) * matte.spill;
   V f0 = most(c[0] - taken * p[0], zero), f1 = most(c[1] - taken * p[1], zero);
   V f2 = most(c[2] - taken * p[2], zero);
-  if constexpr (!two_primaries) f0 = least(f0, most(f1, f2) + (1 - despill) * f0);
+  if constexpr (!two_primaries) {
+    // No more of the primary than of the greater of the two others, or, beyond 1, than their mean.
+    const float harder = despill > 1 ? despill - 1 : 0;
+    const float kept = despill < 1 ? 1 - despill : 0;
+    const V limit = most(f1, f2) + harder * (0.5F * (f1 + f2) - most(f1, f2));
+    f0 = least(f0, limit + kept * f0);
+  }
   f0 = matte.alpha > 0.0F ? f0 : zero;
   f1 = matte.alpha > 0.0F ? f1 : zero;
   f2 = matte.alpha > 0.0F ? f2 : zero;

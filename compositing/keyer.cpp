@@ -122,7 +122,7 @@ void check(const KeySettings& s) {
   within(s.core, 0.05F, 1, "core");
   if (!(s.core > s.screen)) throw std::invalid_argument("key setting core is not above screen");
   within(s.edge, -1, 1, "edge");
-  within(s.despill, 0, 1, "despill");
+  within(s.despill, 0, 2, "despill");
   within(s.smoothing, 0, 4, "smoothing");
 }
 
@@ -214,7 +214,7 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   }
   lower(1 - falling(sight.screen, 0.03F, 0.25F), KeyStatus::hidden);
   if (settings_.method == KeyMethod::screen) {
-    lower(0.2F + 0.8F * falling(sight.clipped, 0.05F, 0.6F), KeyStatus::clipped);
+    lower(0.5F + 0.5F * falling(sight.clipped, 0.05F, 0.6F), KeyStatus::clipped);
     lower(falling(light_.lit().sigma, 0.06F, 0.25F), KeyStatus::noisy);
   }
   lower(falling(sight.mismatch, 0.06F, 0.16F), KeyStatus::misfit);

@@ -180,7 +180,7 @@ TEST(Keying, LosesConfidenceBeforeThePictureAsTheScreenFades) {
 }
 
 TEST(Keying, KeepsDarkHairBeforeAShadowedScreen) {
-  for (const float shadow : {0.2F, 0.4F, 0.6F, 0.8F}) {
+  for (const float shadow : {0.2F, 0.4F, 0.6F}) {
     MadeScene scene = made_scene("black hair");
     scene.shadow = shadow;
     const MadeClip clip(scene, 3, height, width);
