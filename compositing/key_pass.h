@@ -19,7 +19,7 @@ namespace compositing {
 
 // How smoothing tells noise from motion: mean change of alpha over 3x3 pixels, in units of the
 // noise; what is below `calm` moves by `least_gain` of the way, what is above `moving` at once.
-inline constexpr float calm = 1.0F, moving = 2.0F, least_gain_of_change = 0.2F;
+inline constexpr float calm = 0.4F, moving = 1.0F, least_gain_of_change = 0.3F;
 // Alpha below this share of the noise is none; from twice of it on it is as it was.
 inline constexpr float haze_of_noise = 0.6F;
 
