@@ -19,7 +19,7 @@ namespace compositing {
 
 // How smoothing tells noise from motion: mean change of alpha over 3x3 pixels, in units of the
 // noise; what is below `calm` moves by `least_gain` of the way, what is above `moving` at once.
-inline constexpr float calm = 0.4F, moving = 1.0F, least_gain_of_change = 0.3F;
+inline constexpr float calm = 1.0F, moving = 2.0F, least_gain_of_change = 0.2F;
 // Alpha below this share of the noise is none; from twice of it on it is as it was.
 inline constexpr float haze_of_noise = 0.6F;
 
@@ -222,7 +222,7 @@ class KeyPass {
       const int count = count_at(x);
       if (clear_[static_cast<std::size_t>(y) % 2 * (padded_ / key_lanes) +
                  static_cast<std::size_t>(x / key_lanes)]) {
-        std::memset(to, 0, 4 * sizeof *to * static_cast<std::size_t>(count));
+        write_clear(count, to);
         continue;
       }
       TexelMatte<F8> matte{load_lanes(alpha + x), load_lanes(spill + x)};
@@ -247,7 +247,7 @@ class KeyPass {
         matte.alpha = least(matte.alpha, most(2 * (matte.alpha - haze), F8{}));
       }
       if (!any_of(matte.alpha > 0.0F)) {
-        std::memset(to, 0, 4 * sizeof *to * static_cast<std::size_t>(count));
+        write_clear(count, to);
         continue;
       }
       std::array<F8, 3> c;
@@ -276,6 +276,14 @@ class KeyPass {
     for (int i = 0; i < count; ++i) {
       soft_ -= soft[i];
       for (std::size_t c = 0; c < 4; ++c) *to++ = capture::half_from_float(rgba[c][i]);
+    }
+  }
+
+  static void write_clear(int count, capture::Half* to) {
+    if (count == key_lanes) {
+      std::memset(to, 0, 4 * sizeof *to * key_lanes);  // of known size: two stores
+    } else {
+      std::fill_n(to, 4 * count, capture::Half{0});
     }
   }
 

@@ -138,11 +138,11 @@ void paint_hairs(Canvas& canvas,
   const float pi = std::numbers::pi_v<float>;
   const ActorColour colour = hair_colour(actor, seed);
   for (int i = 0; i < count; ++i) {
-    const bool wild = around && draws.next() < 0.35F;
+    const bool wild = around && draws.next() < 0.25F;
     const float angle = pi * (wild ? 0.8F + 1.4F * draws.next() : 1.02F + 0.96F * draws.next());
     const float out = around ? 0.86F + 0.2F * draws.next() : 0.5F + 0.5F * draws.next();
     const float length =
-        at.unit * (around ? 0.09F + 0.23F * draws.next() : 0.05F + 0.1F * draws.next());
+        at.unit * (around ? 0.09F + 0.19F * draws.next() : 0.05F + 0.1F * draws.next());
     const float thin = draws.next();
     const Hair hair{at.head_x + std::cos(angle) * at.head_rx * out,
                     at.head_y + std::sin(angle) * at.head_ry * out - 0.06F * at.head_ry,
