@@ -1,0 +1,39 @@
+// Where a person's billboard stands, which way it turns, and how large it is.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "calibrate/lens.h"
+#include "calibrate/pose.h"
+
+namespace compositing {
+
+struct BillboardPlace {
+  // 3 x 4, row by row, of make_billboard_mesh(): unit square x -0.5..0.5, z 0..1, y = 0, front to
+  // -y. Vertical.
+  std::array<float, 12> set_from_object{};
+  bool shallow = false;       // the view is further round than asked for
+  double view_angle_rad = 0;  // between both views, about the vertical, 0..pi
+};
+
+// A vertical rectangle through `standing` (on the floor), turned about the vertical towards
+// `viewer`, but at most `turn_rad` (0..1.3) away from facing the person's camera, just large enough
+// that the part `box` (left, top, right, bottom in pixels of the lens's picture) of that camera's
+// picture falls on it, never below the floor. What falls further away than 20 times the camera's
+// distance is left out. A viewer straight above counts as the person's camera.
+// Nothing if the box is empty or falls wholly below the floor or behind, if the camera is straight
+// above, or anything is not finite.
+std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
+                                              const calibrate::Pose& cam_from_set,
+                                              calibrate::Vec3 standing,
+                                              const std::array<float, 4>& box,
+                                              calibrate::Vec3 viewer,
+                                              double turn_rad);
+
+// How far a point that stands `depth_m` off the plane is displaced, in metres at the person across
+// the view, for a view `view_angle_rad` away from the person's camera's: depth |sin(angle)|, for
+// views from afar and a plane that faces the person's camera.
+double parallax_m(double depth_m, double view_angle_rad);
+
+}  // namespace compositing

@@ -1,0 +1,326 @@
+// Feet in a matte: the lowest end of the person's body that stands under it.
+#include "compositing/feet.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+namespace compositing {
+
+namespace {
+
+constexpr float solid = 0.5F;          // alpha of what counts as the person
+constexpr float faint = 0.1F;          // alpha of what the box holds
+constexpr int least_area = 24;         // pixels; smaller things are specks
+constexpr double second_person = 0.4;  // of the largest thing's area
+// Shares of the silhouette's height H, and of the torso's half width R. Ankles are 0.04 H thick.
+constexpr double thin_h = 0.012, thin_r = 0.22;  // half of what legs are thicker than
+constexpr double end_h = 0.04;                   // a foot sticks out by more than that
+constexpr double beside_h = 0.12;                // what hangs further from the axis is doubted
+constexpr double nearer = 0.55, perhaps_nearer = 0.68;  // than that, is another end that stands
+constexpr double deep = 0.6;  // of the lowest end's depth under the torso: hands end higher
+
+// A number for each pixel of the matte.
+struct Field {
+  int height = 0, width = 0;
+  std::vector<float> of;
+
+  float& at(int y, int x) { return of[index(y, x)]; }
+  float at(int y, int x) const { return of[index(y, x)]; }
+  std::size_t index(int y, int x) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  }
+};
+
+struct Part {
+  int left = 0, top = 0, right = 0, bottom = 0;
+  std::vector<int> places;  // indices
+  std::size_t area() const { return places.size(); }
+};
+
+// Connected parts (by sides and corners) of what is at least `level`.
+std::vector<Part> parts_of(const Field& field, float level) {
+  std::vector<Part> parts;
+  std::vector<bool> taken(field.of.size());
+  for (std::size_t first = 0; first < field.of.size(); ++first) {
+    if (taken[first] || field.of[first] < level) continue;
+    Part part{field.width, field.height, -1, -1, {static_cast<int>(first)}};
+    taken[first] = true;
+    for (std::size_t next = 0; next < part.places.size(); ++next) {
+      const int x = part.places[next] % field.width, y = part.places[next] / field.width;
+      part.left = std::min(part.left, x);
+      part.right = std::max(part.right, x);
+      part.top = std::min(part.top, y);
+      part.bottom = std::max(part.bottom, y);
+      for (int v = std::max(0, y - 1); v <= std::min(field.height - 1, y + 1); ++v) {
+        for (int u = std::max(0, x - 1); u <= std::min(field.width - 1, x + 1); ++u) {
+          const std::size_t i = field.index(v, u);
+          if (taken[i] || field.of[i] < level) continue;
+          taken[i] = true;
+          part.places.push_back(static_cast<int>(i));
+        }
+      }
+    }
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+const Part* largest(const std::vector<Part>& parts) {
+  const auto it = std::ranges::max_element(parts, {}, &Part::area);
+  return it == parts.end() ? nullptr : &*it;
+}
+
+Field only(const Part& part, int height, int width) {
+  Field field{
+      height, width,
+      std::vector<float>(static_cast<std::size_t>(height) * static_cast<std::size_t>(width))};
+  for (const int i : part.places) field.of[static_cast<std::size_t>(i)] = 1;
+  return field;
+}
+
+// Distance in pixels to the nearest pixel that is `of` (0 or 1). Beyond the picture is nothing, so
+// that what its edges cut does not get thinner there. Chamfers of 3 and 4: Borgefors, "Distance
+// Transformations in Digital Images", CVGIP 34, 1986, section 3.
+Field distance_to(const Field& field, float of) {
+  Field d = field;
+  for (float& v : d.of) v = v == of ? 0.0F : 1e6F;
+  const auto relax = [&](int y, int x, int v, int u, float step) {
+    if (v >= 0 && v < d.height && u >= 0 && u < d.width)
+      d.at(y, x) = std::min(d.at(y, x), d.at(v, u) + step);
+  };
+  constexpr float diagonal = 4.0F / 3;
+  for (int y = 0; y < d.height; ++y) {
+    for (int x = 0; x < d.width; ++x) {
+      relax(y, x, y, x - 1, 1);
+      relax(y, x, y - 1, x - 1, diagonal);
+      relax(y, x, y - 1, x, 1);
+      relax(y, x, y - 1, x + 1, diagonal);
+    }
+  }
+  for (int y = d.height - 1; y >= 0; --y) {
+    for (int x = d.width - 1; x >= 0; --x) {
+      relax(y, x, y, x + 1, 1);
+      relax(y, x, y + 1, x + 1, diagonal);
+      relax(y, x, y + 1, x, 1);
+      relax(y, x, y + 1, x - 1, diagonal);
+    }
+  }
+  return d;
+}
+
+// One of the places where the body ends downwards.
+struct End {
+  int y = 0, left = 0, right = 0;  // its lowest run of pixels
+  int length = 0;                  // rows from there up to where it joins a lower one
+  double x() const { return 0.5 * (left + right); }
+};
+
+// The downward ends that are longer than `least` rows, lowest first: rows are joined from below;
+// where two branches meet, the one that hangs less low ends. (The merge tree of the height:
+// Edelsbrunner and Harer, "Computational Topology", AMS 2010, section VII.1.)
+std::vector<End> ends_of(const Field& body, double least) {
+  struct Run {
+    int left, right;
+    std::size_t end;
+  };
+  std::vector<End> ends;
+  std::vector<std::size_t> joined;  // by which end each goes on
+  const auto root = [&](std::size_t i) {
+    while (joined[i] != i) i = joined[i];
+    return i;
+  };
+  std::vector<Run> below, runs;
+  for (int y = body.height - 1; y >= 0; --y) {
+    runs.clear();
+    for (int x = 0; x < body.width; ++x) {
+      if (body.at(y, x) == 0) continue;
+      const std::size_t none = ends.size();
+      Run run{x, x, none};
+      while (run.right + 1 < body.width && body.at(y, run.right + 1) != 0) ++run.right;
+      x = run.right;
+      for (const Run& under : below) {
+        if (under.right < run.left - 1 || under.left > run.right + 1) continue;
+        std::size_t high = root(under.end);
+        std::size_t low = run.end == none ? high : root(run.end);
+        if (ends[low].y < ends[high].y) std::swap(low, high);
+        run.end = low;
+        if (low == high) continue;
+        ends[high].length = ends[high].y - y;
+        joined[high] = low;
+      }
+      if (run.end == none) {
+        joined.push_back(none);
+        ends.push_back({y, run.left, run.right, 0});
+      }
+      runs.push_back(run);
+    }
+    below.swap(runs);
+  }
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    if (joined[i] == i) ends[i].length = body.height;  // the lowest of all
+  std::erase_if(ends, [&](const End& end) { return end.length < least; });
+  std::ranges::stable_sort(ends, std::greater<>(), &End::y);
+  return ends;
+}
+
+// Where an end's outline is lowest, to parts of a pixel: alpha down each column is how far the
+// foot reaches.
+void refine(Feet& feet, const Field& alpha, const Field& body, const End& end, double tall) {
+  constexpr int rows = 3;
+  const int wide = std::max(1, static_cast<int>(std::lround(0.004 * tall)));
+  const int first = std::max(0, end.left - 2 * wide),
+            last = std::min(alpha.width - 1, end.right + 2 * wide);
+  const int top = std::max(0, end.y - rows);
+  std::vector<double> edges, soft;
+  for (int x = first; x <= last; ++x) {
+    double edge = top - 0.5, partly = 0;
+    for (int y = top; y <= std::min(alpha.height - 1, end.y + rows); ++y) {
+      const double a = alpha.at(y, x);
+      edge += a;
+      partly += 4 * a * (1 - a);
+    }
+    edges.push_back(body.at(top, x) != 0 ? edge : -1);
+    soft.push_back(partly);
+  }
+  feet.q = {end.x(), end.y + 0.5};
+  feet.sigma_px = 0.5;
+  double lowest = -1;
+  for (int x = first; x <= last; ++x) {
+    double sum = 0, partly = 0;
+    int n = 0;
+    for (int u = std::max(first, x - wide); u <= std::min(last, x + wide); ++u) {
+      const double edge = edges[static_cast<std::size_t>(u - first)];
+      if (edge < 0) continue;
+      sum += edge;
+      partly += soft[static_cast<std::size_t>(u - first)];
+      ++n;
+    }
+    if (n < 2 || !(sum / n > lowest)) continue;
+    lowest = sum / n;
+    feet.q = {static_cast<double>(x), lowest};
+    feet.sigma_px = 0.2 + 0.2 * partly / n;
+  }
+}
+
+std::array<float, 4> box_of(const Field& alpha, std::size_t person) {
+  std::array<float, 4> box{1e9F, 1e9F, -1, -1};
+  for (const Part& part : parts_of(alpha, faint)) {
+    const auto full = static_cast<double>(std::ranges::count_if(
+        part.places, [&](int i) { return alpha.of[static_cast<std::size_t>(i)] >= solid; }));
+    if (full < 3 || full < 0.005 * static_cast<double>(person)) continue;
+    box[0] = std::min(box[0], static_cast<float>(part.left) - 1.5F);
+    box[1] = std::min(box[1], static_cast<float>(part.top) - 1.5F);
+    box[2] = std::max(box[2], static_cast<float>(part.right) + 1.5F);
+    box[3] = std::max(box[3], static_cast<float>(part.bottom) + 1.5F);
+  }
+  return {std::max(box[0], -0.5F), std::max(box[1], -0.5F),
+          std::min(box[2], static_cast<float>(alpha.width) - 0.5F),
+          std::min(box[3], static_cast<float>(alpha.height) - 0.5F)};
+}
+
+// The thick part of the person, and the middle of its upper half.
+struct Body {
+  Field mask;
+  double axis_x = 0, torso_y = 0;
+};
+
+Body body_of(const Part& person, int height, int width) {
+  const double tall = person.bottom - person.top + 1;
+  Body body{only(person, height, width)};
+  const Field inside = distance_to(body.mask, 0);
+  const float thickest = *std::ranges::max_element(inside.of);
+  const auto thin = static_cast<float>(std::min(thin_h * tall, thin_r * thickest));
+  Field core = inside;
+  for (float& v : core.of) v = v > thin ? 1.0F : 0.0F;
+  const auto cores = parts_of(core, solid);
+  const Part& trunk = *largest(cores);
+  const Field from_trunk = distance_to(only(trunk, height, width), 1);
+  for (std::size_t i = 0; i < body.mask.of.size(); ++i)
+    if (from_trunk.of[i] > thin + 1) body.mask.of[i] = 0;
+  double weight = 0;
+  for (const int i : trunk.places) {
+    const int y = i / width;
+    if (y > 0.5 * (trunk.top + trunk.bottom)) continue;
+    const double d = inside.of[static_cast<std::size_t>(i)], w = d * d;
+    weight += w;
+    body.axis_x += w * (i % width);
+    body.torso_y += w * y;
+  }
+  body.axis_x /= weight;
+  body.torso_y /= weight;
+  return body;
+}
+
+}  // namespace
+
+std::string_view name_of(FeetStatus status) {
+  switch (status) {
+    case FeetStatus::seen:
+      return "seen";
+    case FeetStatus::cut_off:
+      return "cut off";
+    case FeetStatus::uncertain:
+      return "uncertain";
+    case FeetStatus::absent:
+      break;
+  }
+  return "absent";
+}
+
+Feet find_feet(const capture::Image& image) {
+  if (image.channels != 1 || image.height < 0 || image.width < 0 ||
+      image.pixels.size() !=
+          static_cast<std::size_t>(image.height) * static_cast<std::size_t>(image.width)) {
+    throw std::invalid_argument("find_feet: the matte must be (height, width, 1)");
+  }
+  Field alpha{image.height, image.width, image.pixels};
+  for (float& a : alpha.of) a = std::isfinite(a) ? std::clamp(a, 0.0F, 1.0F) : 0.0F;
+  const auto parts = parts_of(alpha, solid);
+  const Part* person = largest(parts);
+  Feet feet;
+  if (person == nullptr || person->area() < least_area) return feet;
+  feet.box = box_of(alpha, person->area());
+  const double tall = person->bottom - person->top + 1;
+
+  const Body body = body_of(*person, alpha.height, alpha.width);
+  std::vector<End> ends = ends_of(body.mask, end_h * tall);
+  feet.status = FeetStatus::uncertain;
+  feet.q = {0.5 * (person->left + person->right), person->bottom + 0.5};
+  feet.sigma_px = 0.1 * tall;
+  if (ends.empty()) return feet;
+  const double least_y = body.torso_y + deep * (ends.front().y - body.torso_y);
+  std::erase_if(ends, [&](const End& end) { return end.y < least_y; });
+
+  // The body's weight rests between its feet: an end far from the axis stands only if no other is
+  // much nearer.
+  const auto beside = [&](const End& end) { return std::abs(end.x() - body.axis_x); };
+  std::size_t chosen = 0;
+  bool sure = true;
+  for (std::size_t i = 1; i < ends.size(); ++i) {
+    const double far = beside(ends[chosen]);
+    if (far < beside_h * tall) break;
+    if (beside(ends[i]) < nearer * far) {
+      chosen = i;
+      sure = true;
+    } else if (beside(ends[i]) < perhaps_nearer * far) {
+      sure = false;
+    }
+  }
+  const End& end = ends[chosen];
+  refine(feet, alpha, body.mask, end, tall);
+  const auto persons = std::ranges::count_if(parts, [&](const Part& part) {
+    return static_cast<double>(part.area()) >= second_person * static_cast<double>(person->area());
+  });
+  if (end.y >= alpha.height - 1) {
+    feet.status = FeetStatus::cut_off;
+    feet.q.y = alpha.height - 0.5;
+  } else if (sure && persons == 1) {
+    feet.status = FeetStatus::seen;
+  }
+  return feet;
+}
+
+}  // namespace compositing
