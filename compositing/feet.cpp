@@ -18,8 +18,11 @@ constexpr double second_person = 0.4;  // of the largest thing's area
 constexpr double thin_h = 0.012, thin_r = 0.22;  // half of what legs are thicker than
 constexpr double end_h = 0.04;                   // a foot sticks out by more than that
 constexpr double beside_h = 0.12;                // what hangs further from the axis is doubted
-constexpr double nearer = 0.55, perhaps_nearer = 0.68;  // than that, is another end that stands
-constexpr double deep = 0.6;  // of the lowest end's depth under the torso: hands end higher
+constexpr double nearer = 0.8;                   // than that, is another end that stands instead
+constexpr double leg_h = 0.25;                   // legs are longer
+constexpr double ankle_h = 0.06;                 // above it a foot does not turn the leg aside
+constexpr double straight = 0.14;  // how far a leg's middle leaves the line, as part of its length
+constexpr double deep = 0.6;       // of the lowest end's depth under the torso: hands end higher
 
 // A number for each pixel of the matte.
 struct Field {
@@ -115,6 +118,8 @@ Field distance_to(const Field& field, float of) {
 struct End {
   int y = 0, left = 0, right = 0;  // its lowest run of pixels
   int length = 0;                  // rows from there up to where it joins a lower one
+  int free = 0;                    // rows up to where it meets any other that is longer than least
+  std::vector<double> middles = {};  // of its runs, going up
   double x() const { return 0.5 * (left + right); }
 };
 
@@ -150,12 +155,20 @@ std::vector<End> ends_of(const Field& body, double least) {
         if (low == high) continue;
         ends[high].length = ends[high].y - y;
         joined[high] = low;
+        if (ends[high].length < least) continue;
+        for (const std::size_t i : {high, low})
+          if (ends[i].free == 0) ends[i].free = ends[i].y - y;
       }
       if (run.end == none) {
         joined.push_back(none);
-        ends.push_back({y, run.left, run.right, 0});
+        ends.push_back({y, run.left, run.right});
       }
       runs.push_back(run);
+    }
+    for (const Run& run : runs) {
+      End& end = ends[root(run.end)];
+      const auto row = static_cast<std::size_t>(end.y - y);
+      end.middles.resize(row + 1, 0.5 * (run.left + run.right));
     }
     below.swap(runs);
   }
@@ -164,6 +177,23 @@ std::vector<End> ends_of(const Field& body, double least) {
   std::erase_if(ends, [&](const End& end) { return end.length < least; });
   std::ranges::stable_sort(ends, std::greater<>(), &End::y);
   return ends;
+}
+
+// Whether it leads up straight and far enough for a leg.
+bool is_leg(const End& end, double tall) {
+  if (end.free == 0) return true;
+  if (end.free < leg_h * tall) return false;
+  const auto first = static_cast<std::size_t>(ankle_h * tall);
+  const auto last = std::min(static_cast<std::size_t>(end.free), end.middles.size()) - 1;
+  if (last <= first) return false;
+  const auto rows = static_cast<double>(last - first);
+  double most = 0;
+  for (std::size_t i = first; i <= last; ++i) {
+    const double s = static_cast<double>(i - first) / rows;
+    const double line = (1 - s) * end.middles[first] + s * end.middles[last];
+    most = std::max(most, std::abs(end.middles[i] - line));
+  }
+  return most < straight * rows;
 }
 
 // Where an end's outline is lowest, to parts of a pixel: alpha down each column is how far the
@@ -294,21 +324,16 @@ Feet find_feet(const capture::Image& image) {
   const double least_y = body.torso_y + deep * (ends.front().y - body.torso_y);
   std::erase_if(ends, [&](const End& end) { return end.y < least_y; });
 
-  // The body's weight rests between its feet: an end far from the axis stands only if no other is
-  // much nearer.
+  // The body's weight rests between its feet: what ends far from its axis, and does not lead up
+  // there as legs do, gives way to an end that is nearer.
   const auto beside = [&](const End& end) { return std::abs(end.x() - body.axis_x); };
+  const auto doubted = [&](const End& end) {
+    return beside(end) > beside_h * tall && !is_leg(end, tall);
+  };
   std::size_t chosen = 0;
-  bool sure = true;
-  for (std::size_t i = 1; i < ends.size(); ++i) {
-    const double far = beside(ends[chosen]);
-    if (far < beside_h * tall) break;
-    if (beside(ends[i]) < nearer * far) {
-      chosen = i;
-      sure = true;
-    } else if (beside(ends[i]) < perhaps_nearer * far) {
-      sure = false;
-    }
-  }
+  for (std::size_t i = 1; i < ends.size() && doubted(ends[chosen]); ++i)
+    if (beside(ends[i]) < nearer * beside(ends[chosen])) chosen = i;
+  const bool sure = !doubted(ends[chosen]);
   const End& end = ends[chosen];
   refine(feet, alpha, body.mask, end, tall);
   const auto persons = std::ranges::count_if(parts, [&](const Part& part) {

@@ -12,7 +12,7 @@ using calibrate::Vec3;
 
 namespace {
 
-constexpr double acceleration_m_s2 = 30;  // of feet that land
+constexpr double acceleration_m_s2 = 60;  // of feet that land
 constexpr double stride_m = 1.2;          // between two feet, sideways in the picture
 constexpr double gate = 4;                // standard deviations
 constexpr double strange_s = 0.3;         // so long a place out of reach is not believed
