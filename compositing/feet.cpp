@@ -17,10 +17,12 @@ constexpr double second_person = 0.4;  // of the largest thing's area
 // Shares of the silhouette's height H, and of the torso's half width R. Ankles are 0.04 H thick.
 constexpr double thin_h = 0.012, thin_r = 0.22;  // half of what legs are thicker than
 constexpr double end_h = 0.04;                   // a foot sticks out by more than that
-constexpr double beside_h = 0.12;                // what hangs further from the axis is doubted
+constexpr double beside_h = 0.06;                // what hangs further from the axis is doubted
+constexpr double far_h = 0.12;                   // further out legs do not hide each other
 constexpr double nearer = 0.8;                   // than that, is another end that stands instead
-constexpr double leg_h = 0.25;                   // legs are longer
-constexpr double ankle_h = 0.06;                 // above it a foot does not turn the leg aside
+constexpr double tapers = 1.15;    // a leg's lowest third is not wider than its highest by this
+constexpr double leg_h = 0.25;     // legs are longer
+constexpr double ankle_h = 0.06;   // above it a foot does not turn the leg aside
 constexpr double straight = 0.14;  // how far a leg's middle leaves the line, as part of its length
 constexpr double deep = 0.6;       // of the lowest end's depth under the torso: hands end higher
 
@@ -119,7 +121,7 @@ struct End {
   int y = 0, left = 0, right = 0;  // its lowest run of pixels
   int length = 0;                  // rows from there up to where it joins a lower one
   int free = 0;                    // rows up to where it meets any other that is longer than least
-  std::vector<double> middles = {};  // of its runs, going up
+  std::vector<double> middles = {}, widths = {};  // of its runs, going up
   double x() const { return 0.5 * (left + right); }
 };
 
@@ -169,6 +171,7 @@ std::vector<End> ends_of(const Field& body, double least) {
       End& end = ends[root(run.end)];
       const auto row = static_cast<std::size_t>(end.y - y);
       end.middles.resize(row + 1, 0.5 * (run.left + run.right));
+      end.widths.resize(row + 1, run.right - run.left + 1);
     }
     below.swap(runs);
   }
@@ -179,10 +182,10 @@ std::vector<End> ends_of(const Field& body, double least) {
   return ends;
 }
 
-// Whether it leads up straight and far enough for a leg.
-bool is_leg(const End& end, double tall) {
+// Whether it leads up as a leg does: straight, not thinner than below, and, if `whole`, far enough.
+bool is_leg(const End& end, double tall, bool whole) {
   if (end.free == 0) return true;
-  if (end.free < leg_h * tall) return false;
+  if (end.free < leg_h * tall) return !whole;
   const auto first = static_cast<std::size_t>(ankle_h * tall);
   const auto last = std::min(static_cast<std::size_t>(end.free), end.middles.size()) - 1;
   if (last <= first) return false;
@@ -193,7 +196,16 @@ bool is_leg(const End& end, double tall) {
     const double line = (1 - s) * end.middles[first] + s * end.middles[last];
     most = std::max(most, std::abs(end.middles[i] - line));
   }
-  return most < straight * rows;
+  const auto width = [&](std::size_t from, std::size_t to) {
+    std::vector<double> widths(end.widths.begin() + static_cast<std::ptrdiff_t>(from),
+                               end.widths.begin() + static_cast<std::ptrdiff_t>(to));
+    std::ranges::nth_element(widths,
+                             widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2));
+    return widths[widths.size() / 2];
+  };
+  const std::size_t third = (last - first) / 3;
+  if (third < 1) return false;
+  return most < straight * rows && width(first, first + third) < tapers * width(last - third, last);
 }
 
 // Where an end's outline is lowest, to parts of a pixel: alpha down each column is how far the
@@ -324,15 +336,19 @@ Feet find_feet(const capture::Image& image) {
   const double least_y = body.torso_y + deep * (ends.front().y - body.torso_y);
   std::erase_if(ends, [&](const End& end) { return end.y < least_y; });
 
-  // The body's weight rests between its feet: what ends far from its axis, and does not lead up
-  // there as legs do, gives way to an end that is nearer.
+  // The body's weight rests on its legs, at or between their feet: what ends far from its axis, and
+  // does not lead up as legs do, gives way to a leg, or to what is nearer.
   const auto beside = [&](const End& end) { return std::abs(end.x() - body.axis_x); };
   const auto doubted = [&](const End& end) {
-    return beside(end) > beside_h * tall && !is_leg(end, tall);
+    return beside(end) > beside_h * tall && !is_leg(end, tall, beside(end) > far_h * tall);
   };
   std::size_t chosen = 0;
-  for (std::size_t i = 1; i < ends.size() && doubted(ends[chosen]); ++i)
-    if (beside(ends[i]) < nearer * beside(ends[chosen])) chosen = i;
+  if (doubted(ends[0])) {
+    for (std::size_t i = 1; i < ends.size() && chosen == 0; ++i) {
+      const bool near = beside(ends[i]) < nearer * beside(ends[0]);
+      if (near ? !doubted(ends[i]) : is_leg(ends[i], tall, true)) chosen = i;
+    }
+  }
   const bool sure = !doubted(ends[chosen]);
   const End& end = ends[chosen];
   refine(feet, alpha, body.mask, end, tall);
