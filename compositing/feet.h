@@ -50,7 +50,7 @@ struct Standing {
 // Kalman filter with white-noise acceleration: Bar-Shalom, Li and Kirubarajan, "Estimation with
 // Applications to Tracking and Navigation", Wiley 2001, section 6.3.2, on both axes of the floor,
 // with measurement noise from each picture's geometry. Departures: the step to the other foot is
-// taken at once sideways; places that cannot be reached are held, until they are seen for a while.
+// taken at once; places that cannot be reached are held, until they are seen for a while.
 class FeetTracker {
  public:
   // Throws std::invalid_argument as calibrate::check, or if pose or floor are not finite.

@@ -12,14 +12,15 @@ using calibrate::Vec3;
 
 namespace {
 
-constexpr double acceleration_m_s2 = 60;  // of feet that land
+constexpr double acceleration_m_s2 = 30;  // of feet that land
 constexpr double stride_m = 1.2;          // between two feet, sideways in the picture
-constexpr double gate = 4;                // standard deviations
-constexpr double strange_s = 0.3;         // so long a place out of reach is not believed
-constexpr double strange_m = 0.6;         // apart, they are not one place
-constexpr double longest_gap_s = 1;       // after it nothing is known of the speed
-constexpr double worst_m = 0.5;           // standard deviation of places worth following
-constexpr double away_m_s = 1;            // how fast what is held becomes uncertain
+constexpr double step_m = 0.45;      // and along the view: that of a foot that overtakes the other
+constexpr double gate = 4;           // standard deviations
+constexpr double strange_s = 0.3;    // so long a place out of reach is not believed
+constexpr double strange_m = 0.6;    // apart, they are not one place
+constexpr double longest_gap_s = 1;  // after it nothing is known of the speed
+constexpr double worst_m = 0.5;      // standard deviation of places worth following
+constexpr double away_m_s = 1;       // how fast what is held becomes uncertain
 constexpr double largest_sigma_m = 100;
 constexpr double furthest_m = 1e4;
 
@@ -116,13 +117,14 @@ bool FeetTracker::correct(const Seen& seen) {
   const auto off = [&](Vec2 v) {
     return v.x * (seen.at.x - state_[0]) + v.y * (seen.at.y - state_[1]);
   };
-  const double far = gate * std::sqrt(variance(along) + seen.sigma_along * seen.sigma_along);
-  if (std::abs(off(along)) > far || std::abs(off(across)) > stride_m) return false;
+  if (std::abs(off(along)) > step_m || std::abs(off(across)) > stride_m) return false;
   // The other foot: nobody slid there.
-  if (const double step = off(across);
-      std::abs(step) > gate * std::sqrt(variance(across) + seen.sigma_across * seen.sigma_across)) {
-    state_[0] += step * across.x;
-    state_[1] += step * across.y;
+  for (const auto& [v, sigma] :
+       {std::pair(along, seen.sigma_along), std::pair(across, seen.sigma_across)}) {
+    const double step = off(v);
+    if (std::abs(step) < gate * std::sqrt(variance(v) + sigma * sigma)) continue;
+    state_[0] += step * v.x;
+    state_[1] += step * v.y;
   }
   for (const auto& [v, sigma] :
        {std::pair(along, seen.sigma_along), std::pair(across, seen.sigma_across)}) {

@@ -47,8 +47,8 @@ struct MadeWalker {
       lift = 0.06 * std::sin(3.14159265358979 * u);
     }
     const Vec3 left{-way.y, way.x, 0};
-    const Vec3 ankle = start + along * way + (side == 0 ? 0.09 : -0.09) * left +
-                       Vec3{0, 0, foot_radius_m + lift};
+    const Vec3 ankle =
+        start + along * way + (side == 0 ? 0.09 : -0.09) * left + Vec3{0, 0, foot_radius_m + lift};
     return {ankle - 0.07 * way, ankle + 0.14 * way, !(over > 0)};
   }
 
