@@ -12,6 +12,7 @@ namespace {
 
 constexpr float solid = 0.5F;          // alpha of what counts as the person
 constexpr float faint = 0.1F;          // alpha of what the box holds
+constexpr int margin = 8;              // pixels round the person
 constexpr int least_area = 24;         // pixels; smaller things are specks
 constexpr double second_person = 0.4;  // of the largest thing's area
 // Shares of the silhouette's height H, and of the torso's half width R. Ankles are 0.04 H thick.
@@ -76,6 +77,16 @@ std::vector<Part> parts_of(const Field& field, float level) {
 const Part* largest(const std::vector<Part>& parts) {
   const auto it = std::ranges::max_element(parts, {}, &Part::area);
   return it == parts.end() ? nullptr : &*it;
+}
+
+// Rows and columns from the first ones given to before the last ones.
+Field cut(const Field& field, int from_y, int from_x, int to_y, int to_x) {
+  Field part{to_y - from_y, to_x - from_x, {}};
+  for (int y = from_y; y < to_y; ++y) {
+    const auto row = field.of.begin() + static_cast<std::ptrdiff_t>(field.index(y, 0));
+    part.of.insert(part.of.end(), row + from_x, row + to_x);
+  }
+  return part;
 }
 
 Field only(const Part& part, int height, int width) {
@@ -313,24 +324,35 @@ std::string_view name_of(FeetStatus status) {
 }
 
 Feet find_feet(const capture::Image& image) {
+  if (image.empty()) return {};
   if (image.channels != 1 || image.height < 0 || image.width < 0 ||
       image.pixels.size() !=
           static_cast<std::size_t>(image.height) * static_cast<std::size_t>(image.width)) {
     throw std::invalid_argument("find_feet: the matte must be (height, width, 1)");
   }
-  Field alpha{image.height, image.width, image.pixels};
-  for (float& a : alpha.of) a = std::isfinite(a) ? std::clamp(a, 0.0F, 1.0F) : 0.0F;
-  const auto parts = parts_of(alpha, solid);
-  const Part* person = largest(parts);
+  Field whole{image.height, image.width, image.pixels};
+  for (float& a : whole.of) a = std::isfinite(a) ? std::clamp(a, 0.0F, 1.0F) : 0.0F;
+  const auto parts = parts_of(whole, solid);
+  const Part* found = largest(parts);
   Feet feet;
-  if (person == nullptr || person->area() < least_area) return feet;
-  feet.box = box_of(alpha, person->area());
+  if (found == nullptr || found->area() < least_area) return feet;
+  feet.box = box_of(whole, found->area());
+  const auto persons = std::ranges::count_if(parts, [&](const Part& part) {
+    return static_cast<double>(part.area()) >= second_person * static_cast<double>(found->area());
+  });
+
+  // What follows looks at no more than the person.
+  const int from_x = std::max(0, found->left - margin), from_y = std::max(0, found->top - margin);
+  const Field alpha = cut(whole, from_y, from_x, std::min(whole.height, found->bottom + 1 + margin),
+                          std::min(whole.width, found->right + 1 + margin));
+  const auto near_parts = parts_of(alpha, solid);
+  const Part* person = largest(near_parts);
   const double tall = person->bottom - person->top + 1;
 
   const Body body = body_of(*person, alpha.height, alpha.width);
   std::vector<End> ends = ends_of(body.mask, end_h * tall);
   feet.status = FeetStatus::uncertain;
-  feet.q = {0.5 * (person->left + person->right), person->bottom + 0.5};
+  feet.q = {0.5 * (found->left + found->right), found->bottom + 0.5};
   feet.sigma_px = 0.1 * tall;
   if (ends.empty()) return feet;
   const double least_y = body.torso_y + deep * (ends.front().y - body.torso_y);
@@ -352,12 +374,10 @@ Feet find_feet(const capture::Image& image) {
   const bool sure = !doubted(ends[chosen]);
   const End& end = ends[chosen];
   refine(feet, alpha, body.mask, end, tall);
-  const auto persons = std::ranges::count_if(parts, [&](const Part& part) {
-    return static_cast<double>(part.area()) >= second_person * static_cast<double>(person->area());
-  });
-  if (end.y >= alpha.height - 1) {
+  feet.q = {feet.q.x + from_x, feet.q.y + from_y};
+  if (end.y + from_y >= whole.height - 1) {
     feet.status = FeetStatus::cut_off;
-    feet.q.y = alpha.height - 0.5;
+    feet.q.y = whole.height - 0.5;
   } else if (sure && persons == 1) {
     feet.status = FeetStatus::seen;
   }

@@ -33,7 +33,7 @@ struct Feet {
 // Finds the feet in a matte: alpha (height, width, 1), may be smaller than the video. The person
 // is the largest connected thing; its feet are the ends that the body stands over, so that what
 // hangs lower beside it is none (billboards.md). If the feet are not whole in the picture, q is
-// still the lowest place. Values that are not finite count as 0.
+// still the lowest place. An empty image shows nobody. Values that are not finite count as 0.
 // Throws std::invalid_argument if the channels are not one or the pixels do not match the size.
 Feet find_feet(const capture::Image& alpha);
 

@@ -39,14 +39,16 @@ Walk walk(const MadeView& view, const MadeWalker& walker, double seconds, double
     const Feet feet = find_feet(matte);
     const auto standing = tracker.update(t, feet);
     ++result.frames;
+    const Lowest lowest = lowest_of(view, walker, t);
+    if (standing) {
+      result.drawn_m =
+          std::max(result.drawn_m, std::abs(drawn_height_m(view, standing->p_set, lowest)));
+    }
     if (feet.status != FeetStatus::seen || !standing || standing->held) {
       ++result.unseen;
       stood_on = -1;
       continue;
     }
-    const Lowest lowest = lowest_of(view, walker, t);
-    result.drawn_m =
-        std::max(result.drawn_m, std::abs(drawn_height_m(view, standing->p_set, lowest)));
     if (lowest.planted) {
       ++result.planted;
       const Vec3 off = standing->p_set - lowest.centre;
@@ -97,7 +99,8 @@ TEST(Feet, StayOnTheFloorWalkingAwayAndInNoise) {
   }
 }
 
-// Seen from the side both feet are at nearly one depth, and which is lowest may be the lifted one.
+// Seen from the side both feet are at nearly one depth. Where the lifted one is lowest, the other
+// is drawn above the floor: by less than the lift.
 TEST(Feet, StayOnTheFloorWalkingAcrossThePicture) {
   const MadeView view = made_view(pinhole_lens());
   const Walk across = walk(view, {{-1.8, 4.5, 0}, {1, 0, 0}}, 3);
@@ -105,7 +108,7 @@ TEST(Feet, StayOnTheFloorWalkingAcrossThePicture) {
   const Walk aslant = walk(view, {{1, 6.5, 0}, {-0.6, -0.8, 0}}, 3);
   report("aslant", aslant);
   for (const Walk& w : {across, aslant}) {
-    EXPECT_LT(w.drawn_m, 0.05);
+    EXPECT_LT(w.drawn_m, 0.06);
     EXPECT_LE(w.unseen, 3);
   }
 }
