@@ -24,24 +24,29 @@ float share_inside(float u, float v, float footprint_uv, float aspect) {
   return inside(u, footprint_uv * root) * inside(v, footprint_uv / root);
 }
 
-KeyedPicture::KeyedPicture(std::shared_ptr<const render::VideoTexture> texture)
-    : texture_(std::move(texture)) {
-  if (!texture_ || texture_->levels.empty() || texture_->levels.front().empty()) {
+namespace {
+
+float aspect_of(const render::VideoTexture& texture) {
+  return static_cast<float>(texture.height()) / static_cast<float>(texture.width());
+}
+
+void check_frame(const std::shared_ptr<const render::VideoTexture>& texture) {
+  if (!texture || texture->levels.empty() || texture->levels.front().empty()) {
     throw std::invalid_argument("a keyed picture needs a frame");
   }
 }
 
-std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv) const {
-  const float aspect =
-      static_cast<float>(texture_->height()) / static_cast<float>(texture_->width());
-  const float inside = share_inside(u, v, footprint_uv, aspect);
+// Of 3 channels, the fourth is the share of the picture.
+std::array<float, 4> filtered(const render::VideoTexture& texture,
+                              float u,
+                              float v,
+                              float footprint_uv) {
   std::array<float, 4> sum{};
-  if (!(inside > 0)) return sum;
   std::array<render::VideoSample, render::most_video_samples> places;
-  const std::size_t count = render::find_video_samples(texture_->width(), texture_->height(), u, v,
-                                                       footprint_uv, 0, places);
+  const std::size_t count =
+      render::find_video_samples(texture.width(), texture.height(), u, v, footprint_uv, 0, places);
   for (const render::VideoSample& place : std::span(places).first(count)) {
-    const capture::Image& level = texture_->levels[place.level];
+    const capture::Image& level = texture.levels[place.level];
     const auto channels = static_cast<std::size_t>(level.channels);
     const float x = std::clamp(place.x, 0.0F, static_cast<float>(level.width - 1));
     const float y = std::clamp(place.y, 0.0F, static_cast<float>(level.height - 1));
@@ -58,9 +63,47 @@ std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv)
     add(x0, y1, place.share * (1 - fx) * fy);
     add(x1, y1, place.share * fx * fy);
   }
-  for (float& value : sum) value = std::max(value * inside, 0.0F);
-  sum[3] = std::min(sum[3], 1.0F);
   return sum;
+}
+
+}  // namespace
+
+KeyedPicture::KeyedPicture(std::shared_ptr<const render::VideoTexture> texture)
+    : texture_(std::move(texture)) {
+  check_frame(texture_);
+}
+
+std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv) const {
+  const float inside = share_inside(u, v, footprint_uv, aspect_of(*texture_));
+  if (!(inside > 0)) return {};
+  std::array<float, 4> rgba = filtered(*texture_, u, v, footprint_uv);
+  for (float& value : rgba) value = std::max(value * inside, 0.0F);
+  rgba[3] = std::min(rgba[3], 1.0F);
+  return rgba;
+}
+
+TexelKeyedPicture::TexelKeyedPicture(std::shared_ptr<const render::VideoTexture> texture,
+                                     LitPlate plate,
+                                     const KeyDials& dials)
+    : texture_(std::move(texture)), plate_(std::move(plate)), dials_(dials) {
+  check_frame(texture_);
+  if (texture_->levels.front().channels != 3 || texture_->width() != plate_.width ||
+      texture_->height() != plate_.height) {
+    throw std::invalid_argument("a frame that is keyed by its texels must be of its plate's size");
+  }
+}
+
+std::array<float, 4> TexelKeyedPicture::look_up(float u, float v, float footprint_uv) const {
+  const float inside = share_inside(u, v, footprint_uv, aspect_of(*texture_));
+  if (!(inside > 0)) return {};
+  const std::array<float, 4> light = filtered(*texture_, u, v, footprint_uv);
+  const auto texel = [](float place, int size) {
+    return std::clamp(static_cast<int>(place * static_cast<float>(size)), 0, size - 1);
+  };
+  std::array<float, 4> rgba = key_texel(plate_, dials_, texel(v, plate_.height),
+                                        texel(u, plate_.width), {light[0], light[1], light[2]});
+  for (float& value : rgba) value *= inside;
+  return rgba;
 }
 
 }  // namespace compositing

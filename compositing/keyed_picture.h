@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "compositing/keyer.h"
 #include "render/live_picture.h"
 #include "render/video_texture.h"
 
@@ -19,6 +20,25 @@ class KeyedPicture final : public render::LivePicture {
 
  private:
   std::shared_ptr<const render::VideoTexture> texture_;
+};
+
+// The same of a frame that is not keyed yet: filtered first, then keyed once. For persons that few
+// rays see; their alpha is not smoothed over frames.
+class TexelKeyedPicture final : public render::LivePicture {
+ public:
+  // `plate` and `dials` as the keyer has them for this frame (Keyer::lit, Keyer::dials); what the
+  // dials point to must outlive the picture. Throws std::invalid_argument if there is no texture,
+  // it has no 3 channels, or its size is not the plate's.
+  TexelKeyedPicture(std::shared_ptr<const render::VideoTexture> texture,
+                    LitPlate plate,
+                    const KeyDials& dials);
+
+  std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
+
+ private:
+  std::shared_ptr<const render::VideoTexture> texture_;
+  LitPlate plate_;
+  KeyDials dials_;
 };
 
 // Share that lies in the picture, of the square of look_up(). `aspect` is its height over width.

@@ -6,7 +6,8 @@
 
 int main() {
   const compositing::TableCodes codes = compositing::train_key_table(compositing::training_seeds);
-  std::cout << "// Alpha and plate codes by hue, share and light: written by make-key-table.\n";
+  std::cout << "// Alpha and plate codes by hue, share and light: written by make-key-table.\n"
+            << "// clang-format off\n";
   std::string line;
   for (const std::uint8_t code : codes) {
     const std::string number = std::to_string(code) + ",";

@@ -63,6 +63,7 @@ std::span<const Command> commands() {
       still_command(),
       hdr_command(),
       capture_command(),
+      key_command(),
       demo_command(),
       chart_command(),
       bench_command(),

@@ -51,6 +51,22 @@ Json probe_json(const ShowStatus& s) {
       {"missing", share_of(capture::MergeStatus::missing)}};
 }
 
+Json persons_json(const std::vector<PersonStatus>& persons) {
+  Json rows = Json::array();
+  for (const PersonStatus& p : persons) {
+    rows.push_back({{"name", p.name},
+                    {"confidence", p.confidence},
+                    {"key", p.key},
+                    {"feet", p.feet},
+                    {"held", p.held},
+                    {"position", {p.position.x, p.position.y, p.position.z}},
+                    {"sigma_m", p.sigma_m},
+                    {"view_angle_deg", p.view_angle_deg},
+                    {"shallow", p.shallow}});
+  }
+  return rows;
+}
+
 Json record_json(const compositing::RecorderStatus& recorder) {
   Json json{{"written", recorder.written},
             {"dropped", recorder.dropped},
@@ -93,6 +109,7 @@ std::string show_figures(const Set& set,
             {"delay_frames", s.delay_frames},
             {"delay_frames_p99", s.delay_frames_p99},
             {"probe", probe_json(s)},
+            {"persons", persons_json(s.persons)},
             {"match", s.match.gain},
             {"match_exposure", s.match.exposure},
             {"match_note", s.match.note},

@@ -38,10 +38,13 @@ class StageTimer {
   throw SetError({{set.path, place.line, place.column, message}});
 }
 
-std::shared_ptr<render::Scene> compile(const Set& set, SetScene& described, std::uint64_t version) {
+std::shared_ptr<render::Scene> compile(const Set& set,
+                                       const PersonFeed& persons,
+                                       SetScene& described,
+                                       std::uint64_t version) {
   described.description.version = version;
   try {
-    return std::make_shared<render::Scene>(described.description);
+    return std::make_shared<render::Scene>(described.description, persons.nothing_yet());
   } catch (const std::invalid_argument& error) {
     fail(set, {}, error.what());
   }
@@ -146,8 +149,9 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
     rate_ = plate_rate;
   }
   videos_ = std::make_unique<VideoFeed>(set_, plate_->first().time, plate_->is_live());
+  persons_ = std::make_unique<PersonFeed>(set_, plate_->first().time, plate_->is_live());
   set_scene_ = describe_scene(set_);
-  scene_ = compile(set_, set_scene_, ++scene_version_);
+  scene_ = compile(set_, *persons_, set_scene_, ++scene_version_);
   videos_->place(set_, set_scene_);
   lamps_ = describe_lamps(set_);
   light_ = light.get();
@@ -239,6 +243,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     const StageTimer timer(prepared, Stage::job);
     job.frame = number;
     job.time = time;
+    stand_persons(time, prepared);
     job.scene_version = scene_version_;
     job.effort = set_.effort;
     job.textures = {{0, frame->time}, {1, light.time}};
@@ -263,6 +268,22 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   return prepared;
 }
 
+// Lets the persons of the frame's time stand in its scene.
+void FrameMaker::stand_persons(capture::Time time, PreparedFrame& frame) {
+  if (persons_->empty()) return;
+  render::Scene::Pictures pictures;
+  render::SceneDescription& description = set_scene_.description;
+  std::size_t instance = set_scene_.first_person;
+  for (PersonFrame& person : persons_->at(time, frame.job.cam_from_set)) {
+    description.instances[instance++].set_from_object = person.set_from_object;
+    pictures.push_back(std::move(person.picture));
+    frame.persons.push_back(std::move(person.status));
+  }
+  std::ranges::move(persons_->take_notes(), std::back_inserter(frame.notes));
+  description.version = ++scene_version_;
+  scene_ = std::make_shared<render::Scene>(description, *scene_, std::move(pictures));
+}
+
 void FrameMaker::move_object(const std::string& name, const PlacementSettings& pose) {
   finish_change();
   const auto index_of = [&](std::string_view wanted) {
@@ -281,7 +302,7 @@ void FrameMaker::move_object(const std::string& name, const PlacementSettings& p
   }
   set_scene_.description.version = ++scene_version_;
   videos_->place(set_, set_scene_);
-  scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_);
+  scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_, scene_->pictures());
 }
 
 void FrameMaker::change_video(const std::string& name, const std::string& uri) {
@@ -291,14 +312,15 @@ void FrameMaker::change_video(const std::string& name, const std::string& uri) {
   if (video != set_.videos.end()) video->source = uri;
 }
 
-FrameMaker::Change FrameMaker::prepare(Set set, std::uint64_t scene_version) {
+FrameMaker::Change FrameMaker::prepare(Set set, std::uint64_t scene_version, bool live) {
   Change change;
+  change.persons = std::make_unique<PersonFeed>(set, std::nullopt, live);
   change.light = std::make_unique<LightFeed>(set);
   change.track = track_of(set);
   change.directions = directions_of(set);
   change.lens = std::make_shared<calibrate::Lens>(lens_of(set));
   change.set_scene = describe_scene(set);
-  change.scene = compile(set, change.set_scene, scene_version);
+  change.scene = compile(set, *change.persons, change.set_scene, scene_version);
   change.set = std::move(set);
   return change;
 }
@@ -325,6 +347,7 @@ void FrameMaker::take_over(Change change) {
   }
   set_ = std::move(change.set);
   videos_ = std::move(videos);
+  persons_ = std::move(change.persons);
   set_scene_ = std::move(change.set_scene);
   scene_ = std::move(change.scene);
   lamps_ = describe_lamps(set_);
@@ -337,13 +360,14 @@ void FrameMaker::take_over(Change change) {
 void FrameMaker::change_set(Set set) {
   check_change(set);
   finish_change();
-  take_over(prepare(std::move(set), ++scene_version_));
+  take_over(prepare(std::move(set), ++scene_version_, plate_->is_live()));
 }
 
 void FrameMaker::change_set_beside(Set set) {
   check_change(set);
   finish_change();
-  change_ = std::async(std::launch::async, prepare, std::move(set), ++scene_version_);
+  change_ =
+      std::async(std::launch::async, prepare, std::move(set), ++scene_version_, plate_->is_live());
 }
 
 // Waits for the change that is on its way.

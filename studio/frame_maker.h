@@ -15,6 +15,7 @@
 #include "capture/image.h"
 #include "render/renderer.h"
 #include "studio/light_feed.h"
+#include "studio/person_feed.h"
 #include "studio/set.h"
 #include "studio/set_scene.h"
 #include "studio/source.h"
@@ -38,6 +39,7 @@ struct PreparedFrame {
   std::shared_ptr<const calibrate::Lens> lens;
   std::vector<std::shared_ptr<const render::VideoTexture>> videos;
   std::vector<const render::VideoTexture*> video_frames;  // the same, for inputs()
+  std::vector<PersonStatus> persons;                      // of the set, in its order
   std::vector<std::string> notes;                         // what went wrong while it was made
   std::vector<capture::Sound> sound;
   std::chrono::steady_clock::time_point arrived;  // of the plate
@@ -114,11 +116,13 @@ class FrameMaker {
     SetScene set_scene;
     std::shared_ptr<render::Scene> scene;
     std::unique_ptr<LightFeed> light;
+    std::unique_ptr<PersonFeed> persons;
     std::optional<calibrate::Track> track;
     std::shared_ptr<const calibrate::DirectionTable> directions;
     std::shared_ptr<const calibrate::Lens> lens;
   };
-  static Change prepare(Set set, std::uint64_t scene_version);
+  static Change prepare(Set set, std::uint64_t scene_version, bool live);
+  void stand_persons(capture::Time time, PreparedFrame& frame);
   void check_change(const Set& set) const;
   void take_over(Change change);
   void finish_change();
@@ -129,6 +133,7 @@ class FrameMaker {
   std::unique_ptr<Source> plate_;
   std::unique_ptr<LightFeed> light_;
   std::unique_ptr<VideoFeed> videos_;
+  std::unique_ptr<PersonFeed> persons_;
   std::optional<calibrate::Track> track_;
   std::shared_ptr<const render::Scene> scene_;
   SetScene set_scene_;

@@ -183,7 +183,10 @@ Set read_set(const std::string& path) {
     set.videos.push_back(read_video_section(section, context, true));
   }
   name_videos(set.videos, faults);
-  context.has_scene = !set.objects.empty() || !set.stand_ins.empty();
+  for (const Section& section : root.tables("billboard")) {
+    set.persons.push_back(read_billboard_section(section, context));
+  }
+  context.has_scene = !set.objects.empty() || !set.stand_ins.empty() || !set.persons.empty();
 
   if (auto section = root.table("rig")) context.rig = read_rig_section(*section, context.base);
   root.need("camera", "every set has [camera] with a source");

@@ -13,6 +13,7 @@
 #include "calibrate/pose.h"
 #include "capture/colour.h"
 #include "capture/frame.h"
+#include "compositing/keyer.h"
 #include "render/colour_matrix.h"
 #include "render/environment.h"
 #include "render/frame_job.h"
@@ -108,7 +109,7 @@ struct PlacementSettings {
 struct ObjectSettings {
   std::string name;
   std::string mesh;  // file; "" = made
-  std::string made;  // "car", "headlight", "lamp"
+  std::string made;  // "car", "headlight", "stage", ...: see set_file.md
   Place place;       // of `mesh` or `made`
   PlacementSettings pose;
   std::vector<std::string> hide;  // parts left out, by node name
@@ -166,6 +167,37 @@ struct VideoSettings {
   float ambient = 0;                 // and by a share of its mean from everywhere
 };
 
+// How a person is cut out of a video.
+struct KeyChoice {
+  std::string plate;                   // file of the empty screen; "" = from the footage alone:
+  std::array<int, 2> footage{0, 479};  // these of its frames, first and last
+  std::string garbage;                 // picture: white is never the person; "" = none
+  bool by_texel = false;  // filtered, then keyed where rays see it; else whole frames are keyed
+  compositing::KeySettings settings;
+  Place place;
+};
+
+// A person in a video, who stands in the set on a billboard.
+struct PersonSettings {
+  std::string name;
+  std::string source;  // URI
+  Place place;
+  bool loop = false;
+  std::int64_t first = 0;  // frame of the video that it begins with
+  capture::Transfer colour = capture::Transfer::rec1886;
+  std::optional<KeyChoice> key;         // nothing = the source has alpha, or shows all
+  std::optional<calibrate::Lens> lens;  // of the camera that filmed the person, with its pose
+  calibrate::Pose cam_from_set;
+  bool by_feet = false;  // stands where its feet meet the floor
+  double floor_z = 0;
+  calibrate::Vec3 position;  // else here: its feet, or without a lens the lower edge's middle
+  double height_m = 0;       // without a lens: of the whole picture
+  double yaw_rad = 0;        // without a lens: where it faces; 0 = to -y
+  double turn_rad = 0;       // how far it turns to the show's camera
+  std::array<float, 3> gain{1, 1, 1};
+  bool lit = false;
+};
+
 struct DisplayChoice {
   std::string display;  // "" = compositing's default
   std::string view;
@@ -191,6 +223,7 @@ struct Set {
   std::vector<StandInSettings> stand_ins;
   std::vector<LampSettings> lamps;
   std::vector<VideoSettings> videos;
+  std::vector<PersonSettings> persons;
   render::Effort effort;
   DisplayChoice display;
   RecordSettings record;

@@ -60,7 +60,8 @@ ObjectSettings read_object_section(Section section, const SetContext& context) {
   }
   object.place = section.place_of(section.has("mesh") ? "mesh" : "made");
   section.file("mesh", context.base, object.mesh);
-  section.word("made", object.made, {"car", "headlight", "lamp"});
+  section.word("made", object.made,
+               {"car", "headlight", "lamp", "stage", "glass_sphere", "tv_room", "tv", "desk"});
   if (auto table = section.table("pose")) object.pose = read_placement(*table);
   section.texts("hide", object.hide);
   section.number("emission_gain", object.emission_gain, {0, 1e9});

@@ -14,6 +14,8 @@
 #include "render/made_car.h"
 #include "render/made_headlight.h"
 #include "render/made_lamp.h"
+#include "render/made_stage.h"
+#include "render/made_tv_room.h"
 #include "render/standard.h"
 
 namespace studio {
@@ -51,24 +53,53 @@ SceneDescription load_file(const std::string& file,
   return std::move(model.scene);
 }
 
+// Only the parts whose names `wanted` knows.
+template <class Wanted>
+SceneDescription parts_of(SceneDescription scene, const Wanted& wanted) {
+  std::erase_if(scene.instances, [&](const Instance& part) { return !wanted(part.name); });
+  return scene;
+}
+
+// A made thing by its name in the set, as it is.
+SceneDescription make_thing(const std::string& made) {
+  const auto one_of = [](std::initializer_list<std::string_view> names) {
+    return [names = std::vector<std::string_view>(names)](const std::string& name) {
+      return std::ranges::find(names, name) != names.end();
+    };
+  };
+  if (made == "headlight") return render::make_headlight();
+  if (made == "glass_sphere") return render::make_glass_sphere();
+  if (made == "stage") {
+    return parts_of(render::make_stage(),
+                    [](const std::string& name) { return !name.starts_with("person_"); });
+  }
+  if (made == "tv_room") return render::make_tv_room(false);
+  if (made == "tv") {
+    return parts_of(render::make_tv_room(false),
+                    one_of({"tv", "tv set", "tv foot", "tv light", "lowboard", "doors", "knobs",
+                            "lowboard feet"}));
+  }
+  return parts_of(render::make_tv_room(false), one_of({"table", "table legs"}));  // "desk"
+}
+
 SceneDescription load_object(const ObjectSettings& object, std::vector<std::string>& notes) {
+  if (object.made.empty()) return load_file(object.mesh, load_options(object), notes);
   if (object.made == "car") {
     render::MadeCarSettings car;
     car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
     return render::made_car(car);
   }
-  if (object.made == "headlight") {
-    SceneDescription headlight = render::make_headlight();
-    for (render::Material& material : headlight.materials) {
-      if (material.shader != "standard") continue;
-      render::StandardParameters p = standard_parameters(material, headlight.textures.size());
-      p.emission_gain *= static_cast<float>(object.emission_gain);
-      material = make_standard_material(material.name, p);
-    }
-    return headlight;
-  }
   if (object.made == "lamp") return render::made_lamp(static_cast<float>(object.emission_gain));
-  return load_file(object.mesh, load_options(object), notes);
+  SceneDescription thing = parts_of(make_thing(object.made), [&](const std::string& name) {
+    return std::ranges::find(object.hide, name) == object.hide.end();
+  });
+  for (render::Material& material : thing.materials) {
+    if (material.shader != "standard") continue;
+    render::StandardParameters p = standard_parameters(material, thing.textures.size());
+    p.emission_gain *= static_cast<float>(object.emission_gain);
+    material = make_standard_material(material.name, p);
+  }
+  return thing;
 }
 
 // What people call it, or else its kind and number.
@@ -233,6 +264,7 @@ SetScene describe_scene(const Set& set) {
   }
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
   show_videos(set, result, faults);
+  add_persons(set, result, faults);
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
   if (scene.instances.size() > static_cast<std::size_t>(most_instances)) {
     faults.add({}, fmt::format("{} instances of parts, but a set holds at most {}",

@@ -26,6 +26,7 @@ struct ObjectPart {
 struct SetScene {
   render::SceneDescription description;
   std::vector<ObjectPart> parts;   // its first instances, in order
+  std::size_t first_person = 0;    // instance of the set's first person; the others follow
   std::vector<std::string> notes;  // what was not understood of its models, with their files
 };
 
@@ -63,6 +64,10 @@ std::array<float, 12> matrix_of(const PlacementSettings& placement);
 // Lets the set's videos be shown where it says, and names them in the scene, in the set's order.
 // What describe_scene ends with; adds a fault for each that is shown nowhere.
 void show_videos(const Set& set, SetScene& scene, Faults& faults);
+
+// Adds the set's persons, each a billboard that shows the live picture of its number. Places them
+// nowhere yet.
+void add_persons(const Set& set, SetScene& scene, Faults& faults);
 
 // The surfaces that show a video of the scene, as lights. Throws std::invalid_argument as
 // render::sample_area_light.

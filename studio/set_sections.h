@@ -45,6 +45,7 @@ ObjectSettings read_object_section(Section section, const SetContext& context);
 StandInSettings read_stand_in_section(Section section, const SetContext& context);
 LampSettings read_lamp_section(Section section);
 VideoSettings read_video_section(Section section, const SetContext& context, bool lights);
+PersonSettings read_billboard_section(Section section, const SetContext& context);
 // Names those that have none, with faults for names that there are twice.
 void name_videos(std::vector<VideoSettings>& videos, Faults& faults);
 render::Effort read_effort_section(Section section);

@@ -74,7 +74,8 @@ struct ShowStatus {
   render::RenderStatistics statistics;  // sums over all frames
   render::MatchResult match;
   ProbeStatus probe;
-  double light_age_frames = 0;  // of the newest shot in the light when it is used: median
+  std::vector<PersonStatus> persons;  // of the last frame
+  double light_age_frames = 0;        // of the newest shot in the light when it is used: median
   double light_age_frames_p99 = 0;
   std::int64_t kept_light_frames = 0;  // shown with a light that was kept since the probe failed
   float unseen_share = 0;

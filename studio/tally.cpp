@@ -32,6 +32,7 @@ void Tally::add(const ShownFrame& shown, Clock::time_point displayed) {
   }
   s.kept_light_frames += frame.probe.kept_because.empty() ? 0 : 1;
   s.probe = frame.probe;
+  s.persons = frame.persons;
   const double period_ms = period_ms_ > 0 ? period_ms_ : interval_ms_.mean();
   if (period_ms > 0) {
     s.delay_frames = delay_ms_.at(0.5) / period_ms;

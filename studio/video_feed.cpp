@@ -8,15 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "capture/live_reader.h"
-
 namespace studio {
 namespace {
-
-using namespace std::chrono_literals;
-
-// A live source without a new frame for so long stalls.
-constexpr capture::Time patience = 1s;
 
 bool same_source(const VideoSettings& a, const VideoSettings& b) {
   return a.source == b.source && a.loop == b.loop && a.colour == b.colour;
@@ -55,14 +48,10 @@ std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings
       if (channel.player && same_source(channel.player->settings, settings)) return channel.player;
     }
   }
-  capture::CameraOptions options;
-  options.colour.transfer = settings.colour;
-  options.loop = settings.loop;
-  options.base_dir = base_dir_;
   auto player = std::make_shared<Player>();
   player->settings = settings;
-  player->source = std::make_unique<Source>(capture::open_camera(settings.source, options));
-  player->start = start_;
+  player->source = std::make_unique<TimedSource>(
+      VideoSource{settings.source, base_dir_, settings.loop, 0, settings.colour}, start_, live_);
   return player;
 }
 
@@ -89,32 +78,13 @@ void VideoFeed::place(const Set& set, const SetScene& scene) {
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
 }
 
-// Notes once when a source ceases to give frames, and when it does so again.
-void VideoFeed::note_state(Player& player, const capture::Frame* frame, capture::Time asked) {
-  const bool stalls =
-      frame != nullptr && player.source->is_live() && asked - frame->time > patience;
-  const bool lost = frame != nullptr && frame->status == capture::FrameStatus::lost;
-  const bool holds = frame == nullptr || stalls || lost;
-  if (holds && !player.holds) {
-    notes_.push_back(fmt::format("video {} {}: its last picture stays", player.settings.source,
-                                 frame == nullptr ? "has ended"
-                                 : lost           ? "lost a frame"
-                                                  : "stalls"));
-  }
-  player.holds = holds;
-}
-
 void VideoFeed::update(Player& player, capture::Time time) {
-  Source& source = *player.source;
-  capture::Time asked = time;
-  if (!source.is_live()) {
-    if (!player.start) player.start = time;
-    asked = source.first().time + (time - *player.start);
-  } else if (!live_) {
-    asked = capture::monotonic_now();
+  TimedSource& source = *player.source;
+  const std::optional<capture::Frame> frame = source.at(time);
+  if (const auto note = source.take_note()) {
+    notes_.push_back(
+        fmt::format("video {} {}: its last picture stays", player.settings.source, *note));
   }
-  const std::optional<capture::Frame> frame = source.at(asked);
-  note_state(player, frame ? &*frame : nullptr, asked);
   if (player.frame.texture != nullptr && (!frame || frame->image == player.image)) return;
   auto texture = textures_.lend();
   const capture::Frame& shown = frame ? *frame : source.first();

@@ -10,7 +10,7 @@
 #include "render/area_light.h"
 #include "render/video_texture.h"
 #include "studio/set_scene.h"
-#include "studio/source.h"
+#include "studio/timed_source.h"
 
 namespace studio {
 
@@ -51,11 +51,9 @@ class VideoFeed {
   // An open source, with the texture of its newest frame.
   struct Player {
     VideoSettings settings;
-    std::unique_ptr<Source> source;
-    std::optional<capture::Time> start;           // of the show, that the first frame is due at
+    std::unique_ptr<TimedSource> source;
     std::shared_ptr<const capture::Image> image;  // that `frame` was made from
     VideoFrame frame;
-    bool holds = false;     // its last frame, for it stalls or has ended
     bool reported = false;  // numbers that are none
   };
   struct Channel {
@@ -66,7 +64,6 @@ class VideoFeed {
 
   std::shared_ptr<Player> open(const VideoSettings& settings, const VideoFeed* before);
   void update(Player& player, capture::Time time);
-  void note_state(Player& player, const capture::Frame* frame, capture::Time asked);
 
   std::string base_dir_;
   bool live_ = false;

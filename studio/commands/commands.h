@@ -6,6 +6,7 @@
 namespace studio {
 
 Command bench_command();
+Command key_command();
 Command calibrate_board_command();
 Command calibrate_light_command();
 Command calibrate_lines_command();

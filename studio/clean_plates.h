@@ -1,0 +1,23 @@
+// Clean plates for keying: from files, or from footage.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "capture/camera.h"
+#include "compositing/clean_plate.h"
+#include "studio/timed_source.h"
+
+namespace studio {
+
+// One picture as scene-linear light; EXR and HDR as they are, others by the transfer curve. Throws
+// std::runtime_error if there is none.
+capture::Image read_picture(const std::string& path, capture::Transfer transfer);
+
+// The plate in a file; with no path, from the source's own frames from first to last. Throws
+// std::runtime_error if it cannot be read, or the source is live and has no file.
+compositing::CleanPlate read_clean_plate(const std::string& path,
+                                         const VideoSource& source,
+                                         std::array<int, 2> footage = {0, 479});
+
+}  // namespace studio

@@ -1,0 +1,185 @@
+// platelight key: clean plates, and clips keyed to EXR.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "capture/camera.h"
+#include "capture/exr.h"
+#include "compositing/exr_sequence.h"
+#include "compositing/keyer.h"
+#include "studio/clean_plates.h"
+#include "studio/commands/commands.h"
+
+namespace studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::int64_t plate_frames = 50;
+
+struct KeyOptions {
+  std::vector<std::string> what;
+  std::string out, plate, colour = "Rec.1886", method = "screen";
+  bool person = false;
+  std::optional<std::int64_t> frames, first;
+  std::optional<double> screen, core, edge, despill, smoothing;
+};
+
+VideoSource source_of(const KeyOptions& options, const std::string& uri) {
+  VideoSource source;
+  source.uri = uri.find(':') == std::string::npos ? "file:" + uri : uri;
+  source.base_dir = std::filesystem::current_path().string();
+  source.colour = capture::transfer_from_name(options.colour);
+  source.first = options.first.value_or(0);
+  return source;
+}
+
+void make_plate(const KeyOptions& options, Console& console) {
+  const VideoSource source = source_of(options, options.what.back());
+  const auto camera = open_video(source);
+  std::vector<capture::Image> frames;
+  const std::int64_t wanted = options.frames.value_or(plate_frames);
+  while (static_cast<std::int64_t>(frames.size()) < wanted) {
+    const auto frame = camera->next();
+    if (!frame) break;
+    if (frame->image) frames.push_back(*frame->image);
+  }
+  if (frames.empty()) throw std::runtime_error(source.uri + " gives no picture");
+  const compositing::CleanPlate plate =
+      options.person ? compositing::plate_from_footage(frames) : compositing::average_plate(frames);
+  capture::write_exr(options.out, plate.light);
+  const std::string_view colour = compositing::name_of(plate.colour);
+  const double noise = std::sqrt(plate.noise_floor);
+  console.figures(Json{{"frames", frames.size()},
+                       {"width", plate.light.width},
+                       {"height", plate.light.height},
+                       {"colour", colour},
+                       {"noise_gain", plate.noise_gain},
+                       {"noise_floor", plate.noise_floor}}
+                      .dump(2));
+  console.say(fmt::format("{}: {}x{}, mean of {} frames, a {} screen, noise in black {:.4f}",
+                          options.out, plate.light.width, plate.light.height, frames.size(), colour,
+                          noise));
+}
+
+compositing::KeySettings settings_of(const KeyOptions& options) {
+  compositing::KeySettings settings;
+  if (options.method == "difference") settings.method = compositing::KeyMethod::difference;
+  const auto take = [](const std::optional<double>& from, float& to) {
+    if (from) to = static_cast<float>(*from);
+  };
+  take(options.screen, settings.screen);
+  take(options.core, settings.core);
+  take(options.edge, settings.edge);
+  take(options.despill, settings.despill);
+  take(options.smoothing, settings.smoothing);
+  return settings;
+}
+
+void key_clip(const KeyOptions& options, Console& console) {
+  const VideoSource source = source_of(options, options.what.front());
+  compositing::CleanPlate plate = read_clean_plate(options.plate, source);
+  const double known = plate.known;
+  const std::string colour(compositing::name_of(plate.colour));
+  compositing::Keyer keyer(std::move(plate), settings_of(options));
+  const auto camera = open_video(source);
+  compositing::ExrSequenceSettings take;
+  take.dir = options.out;
+  take.rate = camera->info().rate.num > 0 ? camera->info().rate : capture::Rational{25, 1};
+  const compositing::ExrSequence sequence(take);
+  capture::HalfImage keyed, matte;
+  Json rows = Json::array();
+  double least = 1, sum = 0, key_ms = 0;
+  std::int64_t number = 0;
+  for (; number < options.frames.value_or(INT64_MAX); ++number) {
+    const auto frame = camera->next();
+    if (!frame) break;
+    if (!frame->image) continue;
+    const auto start = std::chrono::steady_clock::now();
+    const compositing::KeyReport report = keyer.key(*frame->image, keyed);
+    key_ms +=
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    matte = {keyed.height, keyed.width, {}, 1};
+    matte.pixels.reserve(keyed.pixels.size() / 4);
+    for (std::size_t i = 3; i < keyed.pixels.size(); i += 4) {
+      matte.pixels.push_back(keyed.pixels[i]);
+    }
+    sequence.write(number, keyed, matte, {});
+    least = std::min(least, double{report.confidence});
+    sum += report.confidence;
+    rows.push_back({{"frame", number + options.first.value_or(0)},
+                    {"confidence", report.confidence},
+                    {"status", compositing::name_of(report.status)},
+                    {"screen_in_sight", report.sight.screen},
+                    {"gain", report.sight.gain},
+                    {"mismatch", report.sight.mismatch},
+                    {"clipped", report.sight.clipped},
+                    {"soft", report.soft}});
+  }
+  if (number == 0) throw std::runtime_error(source.uri + " gives no picture");
+  const auto count = static_cast<double>(number);
+  console.figures(Json{
+      {"frames", number},
+      {"colour", colour},
+      {"plate_known", known},
+      {"confidence_mean", sum / count},
+      {"confidence_least", least},
+      {"key_ms", key_ms / count},
+      {"rows", rows}}.dump(2));
+  console.say(
+      fmt::format("{}: {} frames before a {} screen, confidence {:.2f} in the mean, {:.2f} at "
+                  "least; {:.1f} ms a "
+                  "frame",
+                  options.out, number, colour, sum / count, least, key_ms / count));
+}
+
+void key(const KeyOptions& options, Console& console) {
+  if (options.what.size() == 2 && options.what.front() == "plate")
+    return make_plate(options, console);
+  if (options.what.size() != 1) throw UsageError("give a clip, or: plate CAMERA");
+  key_clip(options, console);
+}
+
+}  // namespace
+
+Command key_command() {
+  return {
+      "key", "Cut persons out of a clip, or take the clean plate that this needs",
+      "platelight key plate v4l2:/dev/video0 -o plate.exr && platelight key take.mkv --plate "
+      "plate.exr -o keyed/",
+      [](Arguments& arguments) -> std::function<void(Console&)> {
+        auto o = std::make_shared<KeyOptions>();
+        arguments.positionals("WHAT", o->what,
+                              "a clip (file or camera URI) to key; or the word plate and the "
+                              "camera that sees the empty screen");
+        arguments.option("-o,--out", o->out,
+                         "of a clip: directory for EXR files (premultiplied R, G, B, A, and "
+                         "matte); of a plate: EXR file");
+        arguments.required("--out");
+        arguments.option("--plate", o->plate,
+                         "picture of the empty screen; without it, from the footage alone");
+        arguments.choice("--method", o->method, {"screen", "difference"},
+                         "by the screen's colour, or by the distance from any still background");
+        arguments.option("--colour", o->colour, "the clip's transfer curve, as in a set");
+        arguments.option("--first", o->first, 0, 1'000'000'000, "begin at this frame");
+        arguments.option("--frames", o->frames, 1, 1'000'000'000,
+                         "at most so many (of a plate: 50)");
+        arguments.option("--screen", o->screen, 0, 0.9, "alpha below which the screen is clear");
+        arguments.option("--core", o->core, 0.1, 1, "alpha above which the person is whole");
+        arguments.option("--edge", o->edge, -1, 1, "thinner to fuller");
+        arguments.option("--despill", o->despill, 0, 4, "none, 1 all of the likely spill, up to 4");
+        arguments.option("--smoothing", o->smoothing, 0, 10, "of alpha over frames");
+        return [o](Console& console) { key(*o, console); };
+      }};
+}
+
+}  // namespace studio

@@ -1,0 +1,49 @@
+// Videos by the show's time.
+#include "studio/timed_source.h"
+
+#include <utility>
+
+#include "capture/live_reader.h"
+
+namespace studio {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A live source without a new frame for so long stalls.
+constexpr capture::Time patience = 1s;
+
+}  // namespace
+
+std::unique_ptr<capture::Camera> open_video(const VideoSource& source) {
+  capture::CameraOptions options;
+  options.colour.transfer = source.colour;
+  options.loop = source.loop;
+  options.base_dir = source.base_dir;
+  if (source.first > 0) options.frame = source.first;
+  return capture::open_camera(source.uri, options);
+}
+
+TimedSource::TimedSource(const VideoSource& source, std::optional<capture::Time> start, bool live)
+    : source_(open_video(source)), start_(start), live_(live) {}
+
+std::optional<capture::Frame> TimedSource::at(capture::Time time) {
+  capture::Time asked = time;
+  if (!source_.is_live()) {
+    if (!start_) start_ = time;
+    asked = source_.first().time + (time - *start_);
+  } else if (!live_) {
+    asked = capture::monotonic_now();
+  }
+  std::optional<capture::Frame> frame = source_.at(asked);
+  const bool stalls = frame && source_.is_live() && asked - frame->time > patience;
+  const bool lost = frame && frame->status == capture::FrameStatus::lost;
+  const bool holds = !frame || stalls || lost;
+  if (holds && !holds_) note_ = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
+  holds_ = holds;
+  return frame;
+}
+
+std::optional<std::string> TimedSource::take_note() { return std::exchange(note_, std::nullopt); }
+
+}  // namespace studio

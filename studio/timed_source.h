@@ -1,0 +1,52 @@
+// A video that runs with the show: its newest picture at the show's time, and its last for ever.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "capture/colour.h"
+#include "studio/source.h"
+
+namespace studio {
+
+struct VideoSource {
+  std::string uri;
+  std::string base_dir;  // of relative paths in it
+  bool loop = false;
+  std::int64_t first = 0;  // frame that it begins with
+  capture::Transfer colour = capture::Transfer::rec1886;
+};
+
+// Opens it. Throws as capture::open_camera.
+std::unique_ptr<capture::Camera> open_video(const VideoSource& source);
+
+// One thread uses it.
+class TimedSource {
+ public:
+  // A file's first frame is due at `start` of the show's time, or, without one, at the next time
+  // that is asked for. `live`: the show's time is the monotonic clock. Throws std::runtime_error,
+  // std::invalid_argument if the source cannot be opened.
+  TimedSource(const VideoSource& source, std::optional<capture::Time> start, bool live);
+
+  // The newest frame whose time is not after the show's. Times must not fall. Nothing where the
+  // last one holds, because there is no newer one.
+  std::optional<capture::Frame> at(capture::Time time);
+  const capture::Frame& first() const { return source_.first(); }
+  const capture::CameraInfo& info() const { return source_.info(); }
+  bool is_live() const { return source_.is_live(); }
+
+  // Once each time that the source stops giving frames: what to tell, after its name.
+  std::optional<std::string> take_note();
+
+ private:
+  Source source_;
+  std::optional<capture::Time> start_;
+  bool live_;
+  bool holds_ = false;  // its last frame, for it stalls or has ended
+  std::optional<std::string> note_;
+};
+
+}  // namespace studio

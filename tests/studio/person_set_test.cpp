@@ -1,0 +1,200 @@
+// Sets in which persons stand: keyed, placed by their feet, seen by the show's camera.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "calibrate/lens.h"
+#include "studio/show.h"
+#include "tests/studio/made_show.h"
+
+namespace studio {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int video_width = 480, video_height = 360;
+constexpr double video_focal_px = 500;
+const calibrate::Lens video_lens{
+    "pinhole",
+    video_width,
+    video_height,
+    {video_focal_px, video_focal_px, (video_width - 1) / 2.0, (video_height - 1) / 2.0}};
+const calibrate::Vec3 video_position{0, -6, 1.5};
+constexpr std::array screen{0.05F, 0.45F, 0.08F};
+constexpr std::array cloth{0.45F, 0.12F, 0.10F};
+
+// Where the walker's feet are in frame n, before the set's cube: towards the camera, and a little
+// to the side.
+calibrate::Vec3 feet_at(std::int64_t n) {
+  const auto t = static_cast<double>(n) / 25;
+  return {-0.4 + 0.3 * t, -1.4 - 1.1 * t, 0};
+}
+
+// The walker's shape, cut out of a board: legs, body and head.
+bool is_body(double aside, double up) {
+  if (up < 0 || up > 1.7) return false;
+  if (up < 0.8) return aside > 0.03 && aside < 0.18;
+  return up < 1.42 ? aside < 0.23 : aside < 0.10;
+}
+
+// An upright board of 1.7 m that walks before a green screen, as its camera sees it.
+class Walker final : public capture::Camera {
+ public:
+  explicit Walker(std::int64_t frames) : frames_(frames) {
+    info_.width = video_width;
+    info_.height = video_height;
+    info_.rate = {25, 1};
+    info_.frames = frames;
+  }
+  const capture::CameraInfo& info() const override { return info_; }
+  capture::CameraStatistics statistics() const override { return {}; }
+
+  std::optional<capture::Frame> next() override {
+    if (number_ == frames_) return std::nullopt;
+    const calibrate::Pose cam_from_set = calibrate::look_at(video_position, {0, 0, 1}, 0);
+    const calibrate::Pose set_from_cam = inverse(cam_from_set);
+    const calibrate::Vec3 feet = feet_at(number_);
+    auto image = std::make_shared<capture::Image>(capture::make_image(video_height, video_width));
+    constexpr int parts = 3;
+    for (int y = 0; y < video_height; ++y) {
+      for (int x = 0; x < video_width; ++x) {
+        int met = 0;
+        for (int i = 0; i < parts * parts; ++i) {
+          const auto v = calibrate::unproject(video_lens, {x + (i % parts + 0.5) / parts - 0.5,
+                                                           y + (i / parts + 0.5) / parts - 0.5});
+          const calibrate::Vec3 d = set_from_cam.R * *v;
+          const double k = (feet.y - video_position.y) / d.y;
+          const double px = video_position.x + k * d.x, pz = video_position.z + k * d.z;
+          met += is_body(std::abs(px - feet.x), pz);
+        }
+        const float alpha = static_cast<float>(met) / (parts * parts);
+        for (int c = 0; c < 3; ++c) {
+          const auto i = static_cast<std::size_t>(c);
+          image->at(y, x, c) = alpha * cloth[i] + (1 - alpha) * screen[i];
+        }
+      }
+    }
+    capture::Frame frame;
+    frame.number = number_;
+    frame.time = capture::time_of_frame(number_, info_.rate);
+    frame.image = std::move(image);
+    ++number_;
+    return frame;
+  }
+
+ private:
+  capture::CameraInfo info_;
+  std::int64_t frames_, number_ = 0;
+};
+
+constexpr const char* walker = R"([[billboard]]
+name = "walker"
+source = "walker:20"
+lens = { model = "pinhole", focal_px = 500, size = [480, 360] }
+pose = { position = [0, -6, 1.5], look_at = [0, 0, 1] }
+feet = "auto"
+key = { plate = "plate.exr" }
+)";
+
+class PersonSetTest : public MadeShowTest {
+ protected:
+  static void SetUpTestSuite() {
+    MadeShowTest::SetUpTestSuite();
+    capture::register_camera("walker", [](std::string_view rest, const capture::CameraOptions&) {
+      return std::make_unique<Walker>(std::stol(std::string(rest)));
+    });
+  }
+  void SetUp() override {
+    MadeShowTest::SetUp();
+    write_plate(video_width, video_height);
+  }
+  void write_plate(int width, int height) const {
+    capture::Image plate = capture::make_image(height, width);
+    for (std::size_t i = 0; i < plate.pixels.size(); ++i) plate.pixels[i] = screen[i % 3];
+    capture::write_exr((dir_ / "plate.exr").string(), plate);
+  }
+};
+
+TEST_F(PersonSetTest, StandsWhereItsFeetAreAndIsSeenThere) {
+  Show show(made_set("grey:20,25,0", walker));
+  int frame = 0;
+  show.run([&](const ShownFrame& shown) {
+    ASSERT_EQ(shown.prepared.persons.size(), 1U);
+    const PersonStatus& person = shown.prepared.persons[0];
+    EXPECT_EQ(person.feet, "seen") << frame;
+    EXPECT_GT(person.confidence, 0.7) << frame;
+    const calibrate::Vec3 truth = feet_at(frame);
+    EXPECT_NEAR(person.position.x, truth.x, 0.18) << frame << ": one of both feet";
+    EXPECT_NEAR(person.position.y, truth.y, 0.04) << frame;
+    EXPECT_EQ(person.position.z, 0);
+    // The middle of the body, in the show's picture of 64x48 from (0, -8, 4).
+    const calibrate::Pose cam_from_set = shown.prepared.job.cam_from_set;
+    const auto q = calibrate::project(*shown.prepared.lens,
+                                      cam_from_set * calibrate::Vec3{truth.x, truth.y, 1.0});
+    ASSERT_TRUE(q);
+    const capture::HalfImage& rgba = shown.result->rgba;
+    const std::size_t at =
+        rgba.index(static_cast<int>(std::lround(q->y)), static_cast<int>(std::lround(q->x)));
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(capture::float_from_half(rgba.pixels[at + c]), cloth[c], 0.03) << frame;
+    }
+    EXPECT_NEAR(capture::float_from_half(rgba.pixels[at + 3]), 1, 0.02) << frame;
+    ++frame;
+  });
+  EXPECT_EQ(frame, 20);
+  EXPECT_TRUE(show.status()->notes.empty()) << show.status()->notes.front();
+}
+
+TEST_F(PersonSetTest, GivesTheSameBitsWhateverTheTiming) {
+  const Set set = made_set("grey:8,25,0", walker);
+  const auto pictures_of = [&](int slow_ms) {
+    Show show(set);
+    std::vector<std::vector<capture::Half>> pictures;
+    show.run([&](const ShownFrame& shown) {
+      pictures.push_back(shown.result->rgba.pixels);
+      std::this_thread::sleep_for(std::chrono::milliseconds(slow_ms));
+    });
+    return pictures;
+  };
+  EXPECT_EQ(pictures_of(0), pictures_of(20));
+}
+
+TEST_F(PersonSetTest, HoldsItsLastPictureAfterTheEndAndSaysSo) {
+  std::string shorter = walker;
+  shorter.replace(shorter.find("walker:20"), 9, "walker:4");
+  Show show(made_set("grey:12,25,0", shorter));
+  calibrate::Vec3 last;
+  show.run([&](const ShownFrame& shown) { last = shown.prepared.persons[0].position; });
+  EXPECT_NEAR(last.y, feet_at(3).y, 0.06);
+  EXPECT_THAT(show.status()->notes, testing::Contains(HasSubstr("has ended")));
+}
+
+TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
+  const auto expect_refusal = [&](const std::string& from, const std::string& to,
+                                  const std::string& words) {
+    std::string section = walker;
+    const std::size_t at = section.find(from);
+    ASSERT_NE(at, std::string::npos);
+    section.replace(at, from.size(), to);
+    try {
+      Show show(made_set("grey:4,25,0", section));
+      ADD_FAILURE() << to << " was accepted";
+    } catch (const SetError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(words));
+    }
+  };
+  expect_refusal("size = [480, 360]", "size = [320, 240]", "480x360, but its lens is for 320x240");
+  expect_refusal("feet = \"auto\"", "", "either feet = \"auto\" or position");
+  expect_refusal("feet = \"auto\"", "feet = \"auto\"\nposition = [0, 0, 0]", "either feet");
+  expect_refusal("pose = { position = [0, -6, 1.5], look_at = [0, 0, 1] }", "", "come together");
+  expect_refusal("feet = \"auto\"", "feet = \"auto\"\nheight = 2", "told by the camera's lens");
+  expect_refusal("plate.exr", "missing.exr", "missing.exr");
+  expect_refusal("key = {", "key = { core = 0.2, screen = 0.4, ", "must be more than screen");
+  write_plate(64, 48);
+  expect_refusal("walker\"", "walker\"", "64x48");
+  expect_refusal("walker\"", "walker\"", "480x360");
+}
+
+}  // namespace
+}  // namespace studio
