@@ -179,15 +179,16 @@ class BillboardShader final : public render::Shader {
     return Layer{block.lit != 0 ? Vec3f{} : foreground(block, rgba), grey(1 - rgba[3])};
   }
 
-  // Where it is clear anywhere about a texel it is a hole for rays of all kinds.
+  // A hole is where the camera does not see; how clear a place is within its picture depends on how
+  // wide the ray is, and is left to shade().
   Vec3f transmittance(const ShadeContext& context,
                       const Material& material,
                       const HitPoint& hit,
                       Vec3f,
                       RayKind kind) const override {
-    const std::array<float, 4> rgba = seen(context, material, block_of(material), hit, 0);
-    if (kind == RayKind::shadow) return grey(1 - rgba[3]);
-    return find(material, block_of(material), hit) ? Vec3f{} : grey(1);
+    const Block block = block_of(material);
+    if (kind == RayKind::shadow) return grey(1 - seen(context, material, block, hit, 0)[3]);
+    return find(material, block, hit) ? Vec3f{} : grey(1);
   }
 };
 
@@ -291,16 +292,6 @@ Material make_billboard_material(std::string name,
   block.uv_per_tangent =
       static_cast<float>(1 / std::sqrt((window.x1 - window.x0) * (window.y1 - window.y0)));
   return material_of(std::move(name), block, grid);
-}
-
-std::optional<std::array<float, 2>> billboard_place(const Material& material, Vec3f p_set) {
-  const Block block = block_of(material);
-  if (block.columns == 0) return std::nullopt;
-  const auto at = seen_by_camera(material, block, p_set);
-  if (!at || !(at->place.u >= 0 && at->place.u <= 1 && at->place.v >= 0 && at->place.v <= 1)) {
-    return std::nullopt;
-  }
-  return std::array{at->place.u, at->place.v};
 }
 
 render::Mesh make_billboard_mesh(std::uint32_t material) {

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
 
 #include "calibrate/lens.h"
@@ -45,11 +44,6 @@ render::Material make_billboard_material(std::string name,
                                          const BillboardSettings& settings,
                                          const BillboardCamera& camera,
                                          int steps = 96);
-
-// Where a billboard with that material shows its picture: (u, v) of a place in the set; nothing
-// outside of the camera's picture. As rays see it.
-std::optional<std::array<float, 2>> billboard_place(const render::Material& material,
-                                                    render::Vec3f p_set);
 
 // The unit square that billboards are placed by: x -0.5..0.5, z 0..1, at y 0, facing -y; (u, v) =
 // (0, 0) is its left upper corner as seen from there.

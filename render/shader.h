@@ -134,7 +134,8 @@ class Shader {
     return std::nullopt;
   }
   // Of shaders that only glow and let light pass straight on: what shade() gives, for the
-  // reference's paths. `footprint_m`: width of the square of surface whose mean is wanted.
+  // reference's paths, which do not light such surfaces. `footprint_m`: width of the square of
+  // surface whose mean is wanted.
   virtual std::optional<Layer> layer(const ShadeContext& context,
                                      const Material& material,
                                      const HitPoint& hit,

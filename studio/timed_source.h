@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "capture/colour.h"
 #include "studio/source.h"
@@ -36,7 +35,6 @@ class TimedSource {
   std::optional<capture::Frame> at(capture::Time time);
   const capture::Frame& first() const { return source_.first(); }
   const capture::CameraInfo& info() const { return source_.info(); }
-  bool is_live() const { return source_.is_live(); }
 
   // Once each time that the source stops giving frames: what to tell, after its name.
   std::optional<std::string> take_note();
