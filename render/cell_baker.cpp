@@ -109,6 +109,8 @@ void CellBaker::trace(int count, bool coherent, RayKind kind) {
   rays.hit.instID[0] = s.inst.data();
   rtcIntersectNp(frame_->inputs.scene->embree(), &context.context, &rays,
                  static_cast<unsigned>(count));
+  frame_->inputs.scene->fetch_hits(s.geom.data(), s.prim.data(), s.inst.data(),
+                                   static_cast<std::size_t>(count));
 }
 
 void CellBaker::set_camera_ray(int index, Vec3f v) {

@@ -294,6 +294,33 @@ HitPoint Scene::hit_point(
     unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
   return impl_->hit_point(geom_id, prim_id, inst_id, u, v, incoming);
 }
+void Scene::fetch_hits(const unsigned* geom_ids,
+                       const unsigned* prim_ids,
+                       const unsigned* inst_ids,
+                       std::size_t count) const {
+  const auto fetch = [](const void* place) { __builtin_prefetch(place); };
+  // First the triangles, then what they point to.
+  for (const bool corners : {false, true}) {
+    for (std::size_t i = 0; i < count; ++i) {
+      if (geom_ids[i] == RTC_INVALID_GEOMETRY_ID) continue;
+      std::uint32_t instance = 0;
+      const Part& part = impl_->part(geom_ids[i], inst_ids[i], instance);
+      const Mesh& mesh = *impl_->description.meshes[part.mesh];
+      const std::uint32_t t =
+          part.triangle_of_prim.empty() ? prim_ids[i] : part.triangle_of_prim[prim_ids[i]];
+      if (!corners) {
+        fetch(&mesh.triangles[t]);
+        continue;
+      }
+      const auto& normals = part.instance != Part::none ? part.normals : mesh.normals;
+      for (const std::uint32_t corner : mesh.triangles[t]) {
+        fetch(&part.positions[corner]);
+        if (!normals.empty()) fetch(&normals[corner]);
+      }
+    }
+  }
+}
+
 Scene::Surface Scene::surface_of(unsigned geom_id, unsigned prim_id, unsigned inst_id) const {
   Surface surface;
   const Part& part = impl_->part(geom_id, inst_id, surface.instance);

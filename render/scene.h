@@ -112,6 +112,12 @@ class Scene {
   // The point that Embree's ids and barycentric u, v name. `incoming` is the ray's direction.
   HitPoint hit_point(
       unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const;
+  // Begins to fetch from memory what hit_point() will read for `count` hits; those that are none
+  // are left out.
+  void fetch_hits(const unsigned* geom_ids,
+                  const unsigned* prim_ids,
+                  const unsigned* inst_ids,
+                  std::size_t count) const;
   // Instance and material that Embree's ids name, without the rest.
   struct Surface {
     std::uint32_t instance = 0, material = 0;
