@@ -23,13 +23,19 @@ class Key {
   void mix(float value) { mix(std::uint64_t{std::bit_cast<std::uint32_t>(value)}); }
   void mix(int value) { mix(static_cast<std::uint64_t>(value)); }
   void mix(Vec3f v) { mix(v.x), mix(v.y), mix(v.z); }
+  // In several chains, for each step waits for the one before.
   void mix(const std::vector<float>& values) {
+    constexpr std::size_t chains = 4, step = 2 * chains;
+    std::array<Key, chains> parts;
     std::size_t i = 0;
-    for (; i + 1 < values.size(); i += 2) {
-      mix(std::uint64_t{std::bit_cast<std::uint32_t>(values[i])} << 32 |
-          std::bit_cast<std::uint32_t>(values[i + 1]));
+    for (; i + step <= values.size(); i += step) {
+      for (std::size_t c = 0; c < chains; ++c) {
+        parts[c].mix(std::uint64_t{std::bit_cast<std::uint32_t>(values[i + 2 * c])} << 32 |
+                     std::bit_cast<std::uint32_t>(values[i + 2 * c + 1]));
+      }
     }
-    if (i < values.size()) mix(values[i]);
+    for (; i < values.size(); ++i) mix(values[i]);
+    for (const Key& part : parts) mix(part.value_);
   }
   std::uint64_t value() const { return value_; }
 
@@ -70,6 +76,24 @@ std::uint64_t transport_key(const FrameContext& context) {
   key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
   key.mix(e.max_rays);
   key.mix(std::uint64_t{e.dark_cuts});
+  return key.value();
+}
+
+// Changes whenever a kept cell may be lit differently, but for live textures and the plate.
+std::uint64_t light_key(const FrameContext& context) {
+  Key key;
+  for (const DirectionalLight& light : context.job->lights.lights) {
+    key.mix(light.direction), key.mix(light.irradiance);
+  }
+  for (const LocalLight& lamp : context.job->lights.lamps) key.mix(lamp.intensity);
+  for (std::size_t i = 0; i < context.first_plate_level; ++i) key.mix(context.levels[i]->pixels);
+  key.mix(context.inputs.directions->sensitivity);
+  return key.value();
+}
+
+std::uint64_t plate_levels_key(const FrameContext& context) {
+  Key key;
+  if (!context.plate_levels.empty()) key.mix(context.plate_levels.front().pixels);
   return key.value();
 }
 
@@ -249,7 +273,10 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.rows = (d.height + cell_size - 1) / cell_size;
   context.efforts = efforts_of(e);
   check_stages(context);
-  if (inputs.kept) inputs.kept->begin_frame(transport_key(context), context);
+  if (inputs.kept) {
+    inputs.kept->begin_frame(
+        {transport_key(context), light_key(context), plate_levels_key(context)}, context);
+  }
   return context;
 }
 

@@ -1,32 +1,61 @@
 // The cells' transport, kept from frame to frame while nothing moves there: a pure cache.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "capture/half.h"
 #include "render/cell_transport.h"
 
 namespace render {
 
 struct FrameContext;
 
+// A cell as it was lit last, and by what.
+struct LitCell {
+  std::uint64_t light = 0, plate_levels = 0;  // FrameKeys
+  bool shows_plate = true;                    // its own pixels' one, anywhere
+  std::array<capture::Half, cell_pixels * 3> plate;
+  std::array<capture::Half, cell_pixels * 4> rgba;
+  std::array<capture::Half, cell_pixels> matte;
+  RenderStatistics statistics;  // of lighting it
+};
+
+// Numbers that differ where what they stand for does.
+struct FrameKeys {
+  std::uint64_t transport = 0;     // all that cells' transport depends on, but things that move
+  std::uint64_t light = 0;         // what lights it, but live textures and the plate
+  std::uint64_t plate_levels = 0;  // the plate as clear bodies show it
+};
+
 // While camera, lens, light directions and effort stay, a frame under other light takes no ray; and
-// where things move, only those cells do whose rays may meet them. A frame rendered with it has the
-// same bits as one rendered without.
+// where things move, only those cells do whose rays may meet them. A cell whose light and plate did
+// not change either is shown again as it is. A frame rendered with it has the same bits as one
+// rendered without.
 //
 // One thread calls begin_frame; then many threads use cells, each cell by one thread at a time.
 class KeptTransport {
  public:
-  // Forgets what another key has left behind, and cells that what moved may have changed.
-  void begin_frame(std::uint64_t key, const FrameContext& frame);
+  // Forgets what another transport's key has left behind, and cells that what moved may have
+  // changed.
+  void begin_frame(const FrameKeys& keys, const FrameContext& frame);
 
   // A cell's transport at a stage, or null if it is not kept.
   const CellTransport* find(int column, int row, int stage) const;
   // Where to put it, or null if the memory is used up; keep() makes it count.
   CellTransport* place(int column, int row);
   void keep(int column, int row, int stage);
+
+  // A kept cell as it was lit last: valid where find() finds it, `light` is the frame's, and so are
+  // `plate_levels` and `plate` where it shows them. Null if it was not kept lit.
+  const LitCell* lit(int column, int row) const { return cells_[index(column, row)].lit.get(); }
+  // Where to keep it lit; null while the light changes from frame to frame, which makes it useless,
+  // where the cell is not kept, or if the memory is used up.
+  LitCell* place_lit(int column, int row);
+  const FrameKeys& keys() const { return keys_; }
 
   // Of all cells, row by row: the stage that they are kept at, or `none`.
   static constexpr int none = -1;
@@ -44,7 +73,8 @@ class KeptTransport {
  private:
   struct Cell {
     std::unique_ptr<CellTransport> transport;
-    std::size_t bytes = 0;  // counted in bytes_
+    std::unique_ptr<LitCell> lit;  // of that transport
+    std::size_t bytes = 0;         // counted in bytes_
     int stage = none;
   };
   std::size_t index(int column, int row) const {
@@ -54,7 +84,8 @@ class KeptTransport {
   void forget_all(const Scene& scene);
   void forget(std::vector<Scene::Bounds> moved, const FrameContext& frame);
 
-  std::uint64_t key_ = 0;
+  FrameKeys keys_;
+  bool light_stays_ = false;  // the same as in the frame before
   Scene::Places places_;
   SpaceGrid grid_;
   int columns_ = 0, rows_ = 0;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <utility>
 
 #include "render/cell_baker.h"
 #include "render/kept_transport.h"
@@ -24,6 +26,8 @@ struct TileWorkspace::Impl {
   void light(const FrameContext& frame, const CellTransport& cell, RenderStatistics& statistics);
   void write(
       const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) const;
+  void write_kept(
+      const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result);
   static void write_counts(
       const CellTransport& cell, const TileJob& tile, int x0, int y0, TileResult& result);
 };
@@ -114,19 +118,98 @@ void TileWorkspace::Impl::write_counts(
   }
 }
 
+// A row of a cell, as far as it lies in the tile: in images of the tile's width and `channels`
+// values a pixel, and in the cell's own.
+struct CellRow {
+  std::size_t in_image, in_cell, length;
+};
+template <class Visit>
+void for_rows(
+    const Rect& image, const Rect& tile, int x0, int y0, std::size_t channels, Visit visit) {
+  const int columns = std::min(cell_size, tile.x + tile.width - x0);
+  const int rows = std::min(cell_size, tile.y + tile.height - y0);
+  for (int y = 0; y < rows; ++y) {
+    const int at = (y0 + y - image.y) * image.width + x0 - image.x;
+    visit(CellRow{static_cast<std::size_t>(at) * channels,
+                  static_cast<std::size_t>(y * cell_size) * channels,
+                  static_cast<std::size_t>(columns) * channels});
+  }
+}
+
+bool has_plate_of(const LitCell& lit, const TileJob& tile, int x0, int y0) {
+  bool same = true;
+  for_rows(tile.background_rect, tile.rect, x0, y0, 3, [&](const CellRow& row) {
+    same = same && std::memcmp(&lit.plate[row.in_cell], &tile.background[row.in_image],
+                               row.length * sizeof(capture::Half)) == 0;
+  });
+  return same;
+}
+
+void copy_lit(const LitCell& lit, const TileJob& tile, int x0, int y0, TileResult& result) {
+  for_rows(tile.rect, tile.rect, x0, y0, 4, [&](const CellRow& row) {
+    std::copy_n(&lit.rgba[row.in_cell], row.length, &result.rgba[row.in_image]);
+  });
+  for_rows(tile.rect, tile.rect, x0, y0, 1, [&](const CellRow& row) {
+    std::copy_n(&lit.matte[row.in_cell], row.length, &result.matte[row.in_image]);
+  });
+  result.statistics += lit.statistics;
+}
+
+void keep_lit(const TileResult& result, const TileJob& tile, int x0, int y0, LitCell& lit) {
+  for_rows(tile.background_rect, tile.rect, x0, y0, 3, [&](const CellRow& row) {
+    std::copy_n(&tile.background[row.in_image], row.length, &lit.plate[row.in_cell]);
+  });
+  for_rows(tile.rect, tile.rect, x0, y0, 4, [&](const CellRow& row) {
+    std::copy_n(&result.rgba[row.in_image], row.length, &lit.rgba[row.in_cell]);
+  });
+  for_rows(tile.rect, tile.rect, x0, y0, 1, [&](const CellRow& row) {
+    std::copy_n(&result.matte[row.in_image], row.length, &lit.matte[row.in_cell]);
+  });
+}
+
+// A cell whose transport is kept: as it was lit last, if nothing that lights it has changed.
+void TileWorkspace::Impl::write_kept(
+    const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) {
+  KeptTransport& memory = *frame.inputs.kept;
+  const int column = x0 / cell_size, row = y0 / cell_size;
+  const CellTransport& cell = *memory.find(column, row, frame.stage_of(column, row));
+  const FrameKeys& keys = memory.keys();
+  const LitCell* lit = memory.lit(column, row);
+  if (lit && lit->light == keys.light &&
+      (cell.bent.empty() || lit->plate_levels == keys.plate_levels) &&
+      (!lit->shows_plate || has_plate_of(*lit, tile, x0, y0))) {
+    copy_lit(*lit, tile, x0, y0, result);
+    return;
+  }
+  load_plate(tile, x0, y0);
+  const RenderStatistics before = std::exchange(result.statistics, {});
+  light(frame, cell, result.statistics);
+  write(frame, tile, x0, y0, result);
+  if (LitCell* room = cell.video.empty() ? memory.place_lit(column, row) : nullptr) {
+    keep_lit(result, tile, x0, y0, *room);
+    room->light = keys.light;
+    room->plate_levels = keys.plate_levels;
+    room->shows_plate =
+        !cell.catchers.empty() ||
+        std::ranges::any_of(picture.share, [](Vec3f share) { return share != Vec3f{}; });
+    room->statistics = result.statistics;
+  }
+  result.statistics += before;
+}
+
 void TileWorkspace::Impl::render_cell(
     const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) {
-  load_plate(tile, x0, y0);
   KeptTransport* memory = frame.inputs.kept;
   const int column = x0 / cell_size, row = y0 / cell_size;
   const int stage = frame.stage_of(column, row);
   const CellTransport* kept = memory ? memory->find(column, row, stage) : nullptr;
   const bool counts = frame.inputs.count_rays;
   if (kept && (!counts || !kept->counts.empty())) {
-    light(frame, *kept, result.statistics);
+    write_kept(frame, tile, x0, y0, result);
     result.statistics.kept_rays += kept->rays;
     if (counts) write_counts(*kept, tile, x0, y0, result);
   } else {
+    load_plate(tile, x0, y0);
     baker.bake(frame, stage, x0, y0, transport, result.statistics);
     light(frame, transport, result.statistics);
     if (counts) write_counts(transport, tile, x0, y0, result);
@@ -135,8 +218,25 @@ void TileWorkspace::Impl::render_cell(
       *room = transport;
       memory->keep(column, row, stage);
     }
+    write(frame, tile, x0, y0, result);
   }
-  write(frame, tile, x0, y0, result);
+}
+
+bool find_cell(const FrameContext& context,
+               int column,
+               int row,
+               int stage,
+               TileWorkspace& workspace,
+               RenderStatistics& statistics) {
+  prepare_thread();
+  KeptTransport& memory = *context.inputs.kept;
+  CellTransport* room = memory.place(column, row);
+  if (!room) return false;
+  TileWorkspace::Impl& impl = workspace.impl();
+  impl.baker.bake(context, stage, column * cell_size, row * cell_size, impl.transport, statistics);
+  *room = impl.transport;
+  memory.keep(column, row, stage);
+  return memory.find(column, row, stage) != nullptr;
 }
 
 void render_tile(const FrameContext& context,

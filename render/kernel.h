@@ -75,6 +75,14 @@ void render_tile(const FrameContext& context,
                  const TileJob& tile,
                  TileWorkspace& workspace,
                  TileResult& result);
+// Finds the transport of a cell and keeps it in the frame's inputs.kept. False if it has no room.
+bool find_cell(const FrameContext& context,
+               int column,
+               int row,
+               int stage,
+               TileWorkspace& workspace,
+               RenderStatistics& statistics);
+
 void size_result(const Rect& rect, TileResult& result, bool count_rays = false);
 
 }  // namespace render

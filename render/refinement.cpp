@@ -7,7 +7,7 @@ namespace render {
 
 namespace {
 
-constexpr float block_accuracy = 0.8F, coarse_accuracy = 0.95F, coarse_contrast = 0.4F;
+constexpr float block_accuracy = 0.8F, coarse_accuracy = 0.8F, coarse_contrast = 0.4F;
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -92,6 +93,39 @@ std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
                                 std::to_string(width) + "x" + std::to_string(height));
   }
   return context;
+}
+
+std::size_t refine_cells(const FrameContext& context,
+                         std::span<const Refinement> cells,
+                         std::chrono::steady_clock::time_point deadline,
+                         FrameJob& job,
+                         RenderStatistics& statistics) {
+  if (cells.empty()) return 0;
+  std::atomic<std::size_t> next = 0;
+  std::atomic<bool> full = false;
+  std::mutex statistics_mutex;
+  const auto columns = static_cast<std::size_t>(context.columns);
+  // Each thread takes the next cell as long as there is time: cells differ by a hundred times in
+  // what they take, so that no share of them given out before would keep all threads at work.
+  const auto work = [&](int) {
+    TileWorkspace& workspace = workers().local().workspace;
+    RenderStatistics taken;
+    while (!full && std::chrono::steady_clock::now() < deadline) {
+      const std::size_t i = next++;
+      if (i >= cells.size()) break;
+      const auto& [cell, stage] = cells[i];
+      if (find_cell(context, static_cast<int>(cell % columns), static_cast<int>(cell / columns),
+                    stage, workspace, taken)) {
+        job.stages[cell] = stage;
+      } else {
+        full = true;
+      }
+    }
+    const std::lock_guard lock(statistics_mutex);
+    statistics += taken;
+  };
+  tbb::parallel_for(0, tbb::this_task_arena::max_concurrency(), work, tbb::simple_partitioner());
+  return std::min<std::size_t>(next, cells.size());
 }
 
 void render_frame(const FrameInputs& inputs,

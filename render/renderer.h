@@ -1,6 +1,7 @@
 // One frame, tile by tile, on this machine's threads.
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <span>
 
@@ -53,6 +54,22 @@ std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
 void render_frame(const FrameContext& context,
                   const capture::HalfImage& plate,
                   FrameResult& result);
+
+// A cell of a frame, by rows, and the stage that it goes on to.
+struct Refinement {
+  std::size_t cell = 0;
+  std::uint8_t stage = 0;
+};
+
+// Between the two: finds cells' transport ahead of the frame, in their order, until the deadline,
+// and changes their stages in `job`, which is the frame's own. Each cell occurs once. Returns how
+// many were begun before the deadline, all of which are done; the rays that it took are added to
+// `statistics`. Only for inputs with `kept`; where its memory is used up, it ends.
+std::size_t refine_cells(const FrameContext& context,
+                         std::span<const Refinement> cells,
+                         std::chrono::steady_clock::time_point deadline,
+                         FrameJob& job,
+                         RenderStatistics& statistics);
 
 // Renders a frame with oneTBB over tiles. `plate` is (height, width, 3) of the picture's size,
 // linear. `result` keeps its buffers from frame to frame. Throws std::invalid_argument if sizes

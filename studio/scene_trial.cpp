@@ -73,9 +73,13 @@ TriedEffort SceneTrial::measure(const render::Effort& effort, int runs) const {
   render::KeptTransport kept;
   inputs.kept = &kept;
   render_frame(inputs, job, scene.half_plate, result);
-  tried.still_ms = time_ms(inputs, job, scene.half_plate, result);
+  const auto still = [&] {
+    drift(job);
+    return time_ms(inputs, job, scene.half_plate, result);
+  };
+  tried.still_ms = still();
   const int still_again = tried.still_ms > slow_ms ? 0 : 2 * runs;
-  for (int i = 0; i < still_again; ++i) faster(tried.still_ms, inputs);
+  for (int i = 0; i < still_again; ++i) tried.still_ms = std::min(tried.still_ms, still());
   tried.kept_mb = static_cast<double>(kept.bytes()) / (1 << 20);
   return tried;
 }

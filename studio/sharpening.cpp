@@ -2,6 +2,7 @@
 #include "studio/sharpening.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <numeric>
@@ -21,10 +22,12 @@ constexpr double followed = 0.3;        // of what was measured last, in running
 constexpr std::array<double, render::refinement_stages> expected_cost{1, 2, 6, 14, 18, 60};
 // Of the cells, as many are found in a frame with a ray a pixel however long they take.
 constexpr double least = 0.01;
-// By how much more a stage that was never timed is taken to cost, until it was.
-constexpr double caution = 4;
 // A stage that takes less than this times the one before takes its place.
 constexpr double worth_a_stage = 2;
+// A few rays at edges, which is to be there within a second: where it can, only those stages come
+// first that take a small part of its time.
+constexpr std::size_t anti_aliased = one_ray_stage + 1;
+constexpr double small_part = 0.125;
 
 // The step through all cells in which they take their turns, spread over the picture: by the golden
 // section (Knuth, "The Art of Computer Programming" 3, 6.4).
@@ -42,93 +45,141 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
       live_(live),
       cost_(expected_cost) {}
 
-// What a frame may spend.
-double Sharpening::budget(std::size_t cells, bool at_rest) const {
-  const auto all = static_cast<double>(cells);
-  if (!live_) {
-    const double rest = cost_[one_ray_stage + 1] + cost_[finished_stage];
-    return all * rest / std::max(frames_a_second_ - 1, 1.0);
-  }
+// What a live frame may spend on cells.
+double Sharpening::rest_ms(bool at_rest) const {
   if (std::ranges::none_of(timed_, std::identity())) return 0;
   const double share = at_rest ? share_at_rest : share_of_frame;
-  const double ms = std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
-  return std::max(ms, least * all * cost_[one_ray_stage]);
+  return std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
 }
 
-// Where a cell goes on to from a stage.
-std::size_t Sharpening::after(std::size_t stage) const {
+// What is found anew is as fine at once as there is time for.
+std::size_t Sharpening::stage_of_lost(std::size_t lost) const {
+  if (!live_) return one_ray_stage;
+  const auto cells = static_cast<double>(plan_.stages.size());
+  const double ms = std::max(rest_ms(lost == 0), least * cells * cost_[one_ray_stage]);
+  std::size_t stage = 0;
+  while (stage < finished_stage && static_cast<double>(lost) * cost_[stage + 1] <= ms) ++stage;
+  return stage;
+}
+
+// Where a cell goes on to from a stage, while so many have no rays at edges yet.
+std::size_t Sharpening::after(std::size_t stage, std::size_t coarse) const {
   std::size_t next = stage + 1;
+  if (live_ && stage < anti_aliased &&
+      static_cast<double>(coarse) * cost_[anti_aliased] <= frames_a_second_ * rest_ms(true)) {
+    next = anti_aliased;
+    for (std::size_t s = stage + 1; s < anti_aliased; ++s) {
+      if (cost_[s] <= small_part * cost_[anti_aliased]) next = s;
+    }
+    return next;
+  }
   while (next < finished_stage && cost_[next + 1] < worth_a_stage * cost_[next]) ++next;
   return next;
 }
 
-std::vector<std::uint8_t> Sharpening::next(std::span<const int> kept) {
-  const std::size_t cells = kept.size();
-  std::vector<std::uint8_t> stages(cells);
-  std::vector<std::uint8_t> anew(cells);
-  std::size_t lost = 0;
-  for (std::size_t i = 0; i < cells; ++i) {
-    anew[i] = kept[i] == render::KeptTransport::none;
-    lost += anew[i];
-    stages[i] = static_cast<std::uint8_t>(std::max(kept[i], 0));
-  }
-  if (!full_) stopped_ = false;
-  double left = budget(cells, lost == 0);
-  // What is found anew is as fine at once as there is time for.
-  std::size_t first = one_ray_stage;
-  if (live_) {
-    first = 0;
-    while (first < finished_stage && static_cast<double>(lost) * cost_[first + 1] <= left) ++first;
-  }
-  found_.fill(0);
-  found_[first] = lost;
-  left -= static_cast<double>(lost) * cost_[first];
-  for (std::size_t i = 0; i < cells; ++i) {
-    if (anew[i]) stages[i] = static_cast<std::uint8_t>(first);
-  }
-  promoted_ = 0;
-  const std::size_t stride = stride_of(cells);
-  for (std::size_t stage = 0; stage < finished_stage && !stopped_; ++stage) {
-    const std::size_t to = after(stage);
-    // A stage is timed the first time by itself.
-    const bool untimed = live_ && !timed_[to];
-    if (untimed && lost + promoted_ > 0) break;
-    for (std::size_t turn = 0; turn < cells; ++turn) {
-      if (!(left > 0)) break;
-      const std::size_t i = turn * stride % cells;
-      if (stages[i] != stage || anew[i]) continue;
-      stages[i] = static_cast<std::uint8_t>(to);
-      anew[i] = 1;
-      ++promoted_;
-      ++found_[to];
-      left -= cost_[to] * (untimed ? caution : 1);
+// Lists the cells that go on, the coarsest first: in a live show all of them, for it is seen how
+// far the time goes; otherwise as many as `left` is the cost of.
+void Sharpening::go_on(double left) {
+  const std::vector<std::uint8_t>& stages = plan_.stages;
+  const auto coarse = static_cast<std::size_t>(
+      std::ranges::count_if(stages, [](std::uint8_t stage) { return stage < anti_aliased; }));
+  const std::size_t stride = stride_of(stages.size());
+  for (std::size_t stage = 0; stage < finished_stage; ++stage) {
+    const std::size_t to = after(stage, coarse);
+    for (std::size_t turn = 0; turn < stages.size() && left > 0; ++turn) {
+      const std::size_t i = turn * stride % stages.size();
+      if (stages[i] != stage) continue;
+      plan_.ahead.push_back({i, static_cast<std::uint8_t>(to)});
+      if (!live_) left -= cost_[to];
     }
   }
-  const double reached = std::accumulate(stages.begin(), stages.end(), 0.0);
-  share_ = reached / static_cast<double>(std::max<std::size_t>(cells, 1) * finished_stage);
-  return stages;
+}
+
+const SharpeningPlan& Sharpening::next(std::span<const int> kept) {
+  constexpr int none = render::KeptTransport::none;
+  plan_.stages.resize(kept.size());
+  plan_.ahead.clear();
+  const auto lost = static_cast<std::size_t>(std::ranges::count(kept, none));
+  const std::size_t first = stage_of_lost(lost);
+  lost_.fill(0);
+  lost_[first] = lost;
+  double left = 0;
+  if (live_) {
+    left = rest_ms(lost == 0);
+  } else {
+    const double rest = cost_[one_ray_stage + 1] + cost_[finished_stage];
+    left = static_cast<double>(kept.size()) * rest / std::max(frames_a_second_ - 1, 1.0);
+  }
+  left -= static_cast<double>(lost) * cost_[first];
+  // Lost cells have their turn in the frames after.
+  std::ranges::transform(kept, plan_.stages.begin(), [](int stage) {
+    return static_cast<std::uint8_t>(stage == none ? finished_stage : stage);
+  });
+  if (!full_) stopped_ = false;
+  if (!stopped_) go_on(left);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (kept[i] == none) plan_.stages[i] = static_cast<std::uint8_t>(first);
+  }
+  reached_ = std::accumulate(plan_.stages.begin(), plan_.stages.end(), std::size_t{0});
+  went_on_ = !live_ && !plan_.ahead.empty();
+  if (!live_) {
+    for (const auto& [cell, stage] : plan_.ahead) {
+      reached_ += stage - std::size_t{plan_.stages[cell]};
+      plan_.stages[cell] = stage;
+    }
+    plan_.ahead.clear();
+  }
+  plan_.ahead_ms = std::max(left, 0.0);
+  return plan_;
+}
+
+void Sharpening::found_ahead(std::size_t count, double ms) {
+  if (count == 0) return;
+  ByStage<std::size_t> found{};
+  for (const auto& [cell, stage] : std::span(plan_.ahead).first(count)) {
+    ++found[stage];
+    reached_ += stage - std::size_t{plan_.stages[cell]};
+  }
+  went_on_ = true;
+  learn(found, ms);
 }
 
 void Sharpening::took(double render_ms, bool full) {
   full_ = full;
-  stopped_ = stopped_ || (full && promoted_ > 0);
-  double foreseen = 0;
-  for (std::size_t s = 0; s < found_.size(); ++s) {
-    foreseen += static_cast<double>(found_[s]) * cost_[s];
-  }
-  if (!(foreseen > 0)) {
-    relight_ms_ = relight_ms_ > 0 ? relight_ms_ + (render_ms - relight_ms_) * followed : render_ms;
-    return;
-  }
+  stopped_ = stopped_ || (full && went_on_);
   if (!live_) return;
-  const double ratio = std::max(render_ms - relight_ms_, 0.05 * render_ms) / foreseen;
+  if (std::ranges::all_of(lost_, [](std::size_t count) { return count == 0; })) {
+    relight_ms_ = relight_ms_ > 0 ? relight_ms_ + (render_ms - relight_ms_) * followed : render_ms;
+  } else {
+    learn(lost_, std::max(render_ms - relight_ms_, 0.05 * render_ms));
+  }
+}
+
+double Sharpening::share() const {
+  return static_cast<double>(reached_) /
+         static_cast<double>(std::max<std::size_t>(plan_.stages.size(), 1) * finished_stage);
+}
+
+double Sharpening::lost_share() const {
+  return static_cast<double>(std::accumulate(lost_.begin(), lost_.end(), std::size_t{0})) /
+         static_cast<double>(std::max<std::size_t>(plan_.stages.size(), 1));
+}
+
+// Costs, from what cells of these stages took together.
+void Sharpening::learn(const ByStage<std::size_t>& found, double ms) {
+  double foreseen = 0;
+  for (std::size_t s = 0; s < found.size(); ++s) {
+    foreseen += static_cast<double>(found[s]) * cost_[s];
+  }
+  const double ratio = ms / foreseen;
+  if (!(ratio > 0)) return;
   const bool known = std::ranges::any_of(timed_, std::identity());
   if (!known) {
     for (double& cost : cost_) cost *= ratio;
   }
-  for (std::size_t s = 0; s < found_.size(); ++s) {
-    if (found_[s] == 0) continue;
-    const double part = static_cast<double>(found_[s]) * cost_[s] / foreseen;
+  for (std::size_t s = 0; s < found.size(); ++s) {
+    if (found[s] == 0) continue;
+    const double part = static_cast<double>(found[s]) * cost_[s] / foreseen;
     const double change = known ? std::pow(ratio, (timed_[s] ? followed : 1) * part) : 1;
     cost_[s] *= change;
     timed_[s] = true;
@@ -137,6 +188,29 @@ void Sharpening::took(double render_ms, bool full) {
       cost_[finer] *= change;
     }
   }
+}
+
+void render_sharpening(Sharpening& sharpening,
+                       const render::FrameInputs& inputs,
+                       render::FrameJob& job,
+                       const capture::HalfImage& plate,
+                       render::FrameResult& result) {
+  using Clock = std::chrono::steady_clock;
+  using Milliseconds = std::chrono::duration<double, std::milli>;
+  const Clock::time_point start = Clock::now();
+  const auto frame = render::prepare_frame(inputs, job, plate);
+  const SharpeningPlan& plan = sharpening.next(inputs.kept->stages());
+  job.stages = plan.stages;
+  render::RenderStatistics ahead;
+  const Clock::time_point begun = Clock::now();
+  const auto time = std::chrono::duration_cast<Clock::duration>(Milliseconds(plan.ahead_ms));
+  const std::size_t count = render::refine_cells(*frame, plan.ahead, begun + time, job, ahead);
+  const Milliseconds ahead_ms = Clock::now() - begun;
+  sharpening.found_ahead(count, ahead_ms.count());
+  render::render_frame(*frame, plate, result);
+  result.statistics += ahead;
+  const Milliseconds all_ms = Clock::now() - start;
+  sharpening.took((all_ms - ahead_ms).count(), inputs.kept->is_full());
 }
 
 }  // namespace studio

@@ -9,45 +9,69 @@
 #include "capture/frame.h"
 #include "render/kept_transport.h"
 #include "render/refinement.h"
+#include "render/renderer.h"
 
 namespace studio {
 
-// Memory across frames, of a show: chooses the stages of each frame's cells
-// (render::FrameJob::stages). Cells that something moved before, and all of them where the camera
-// or the light's plan changed, are found anew; those that are kept go on to their next stage,
-// whatever plate, videos and light energies do.
+// What is done for one frame: first `ahead` is found, in its order, as far as the time goes
+// (render::refine_cells); then the frame is rendered.
+struct SharpeningPlan {
+  std::vector<std::uint8_t> stages;  // of all cells, row by row: render::FrameJob::stages
+  std::vector<render::Refinement> ahead;
+  double ahead_ms = 0;
+};
+
+// Memory across frames, of a show: chooses the stages of each frame's cells. Cells that something
+// moved before, and all of them where the camera or the light's plan changed, are found anew; those
+// that are kept go on to their next stage, whatever plate, videos and light energies do.
 //
-// In a live show as fast as a share of the frame's time allows; otherwise evenly, within a second
-// of frames, so that pictures do not depend on timing. Where the memory for kept cells is used up,
-// the picture stays as sharp as it is.
+// In a live show as far as a share of each frame's time goes; otherwise evenly, within a second of
+// frames, so that pictures do not depend on timing. Where the memory for kept cells is used up, the
+// picture stays as sharp as it is.
 class Sharpening {
  public:
   Sharpening(capture::Rational rate, bool live);
 
-  // Of the next frame, row by row, from what is still kept of the frames before
-  // (render::KeptTransport::stages()).
-  std::vector<std::uint8_t> next(std::span<const int> kept);
-  // What rendering that frame took, and whether what it found could not all be kept.
+  // Of the next frame, from what is still kept of the frames before
+  // (render::KeptTransport::stages()). It stands until the next call.
+  const SharpeningPlan& next(std::span<const int> kept);
+  // How many of `ahead` were found, and what that took.
+  void found_ahead(std::size_t count, double ms);
+  // What rendering the frame took then, and whether what it found could not all be kept.
   void took(double render_ms, bool full);
   // Of the last frame: 0 = coarse, 1 = as the effort asks.
-  double share() const { return share_; }
+  double share() const;
+  // Share of its cells that had to be found anew, for something moved.
+  double lost_share() const;
 
  private:
   template <class T>
   using ByStage = std::array<T, render::refinement_stages>;
 
-  double budget(std::size_t cells, bool at_rest) const;
-  std::size_t after(std::size_t stage) const;
+  double rest_ms(bool at_rest) const;
+  std::size_t after(std::size_t stage, std::size_t coarse) const;
+  std::size_t stage_of_lost(std::size_t lost) const;
+  void go_on(double left);
+  void learn(const ByStage<std::size_t>& found, double ms);
 
   double frame_ms_, frames_a_second_;
   bool live_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
   double relight_ms_ = 0;                // a frame that finds no cell anew
-  ByStage<double> cost_;                 // of a cell: live in ms, once a frame was timed
+  ByStage<double> cost_;                 // of a cell: live in ms, once one was timed
   ByStage<bool> timed_{};                // whether that is more than a guess
-  ByStage<std::size_t> found_{};         // cells of the last frame that were found anew
-  std::size_t promoted_ = 0;             // those that went on in it
-  double share_ = 0;
+  SharpeningPlan plan_;
+  ByStage<std::size_t> lost_{};  // cells of the last frame that were lost, by where they began
+  bool went_on_ = false;         // whether any other was found anew
+  std::size_t reached_ = 0;      // sum of all cells' stages
 };
+
+// Renders a frame so: render_frame() with the stages that sharpening plans, which it tells what was
+// done. For inputs with `kept`; throws as render_frame().
+void render_sharpening(Sharpening& sharpening,
+                       const render::FrameInputs& inputs,
+                       render::FrameJob& job,
+                       const capture::HalfImage& plate,
+                       render::FrameResult& result);
 
 }  // namespace studio

@@ -248,16 +248,16 @@ class Show::Stages {
       render::FrameInputs inputs = shown.prepared.inputs();
       inputs.kept = &kept_;
       inputs.count_rays = work.view.has_value();
-      const auto frame = render::prepare_frame(inputs, shown.prepared.job, *shown.prepared.plate);
-      if (sharpening_) shown.prepared.job.stages = sharpening_->next(kept_.stages());
-      render::render_frame(*frame, *shown.prepared.plate, *result);
+      render::FrameJob& job = shown.prepared.job;
+      const capture::HalfImage& plate = *shown.prepared.plate;
+      if (sharpening_) {
+        render_sharpening(*sharpening_, inputs, job, plate, *result);
+        tally_.status().sharpness = sharpening_->share();
+      } else {
+        render::render_frame(inputs, job, plate, *result);
+      }
     });
     shown.result = result;
-    if (sharpening_) {
-      constexpr auto stage = static_cast<std::size_t>(Stage::render);
-      sharpening_->took(shown.prepared.stage_ms[stage], kept_.is_full());
-      tally_.status().sharpness = sharpening_->share();
-    }
 
     const auto rgb8 = pictures_.lend();
     timed(shown, Stage::display, [&] {

@@ -113,15 +113,10 @@ class Dragging {
     render::FrameInputs inputs = shot_.inputs();
     inputs.kept = &kept_;
     const auto start = std::chrono::steady_clock::now();
-    const auto frame = render::prepare_frame(inputs, job, shot_.half_plate);
-    const std::vector<int> before = kept_.stages();
-    lost_ = static_cast<double>(std::ranges::count(before, render::KeptTransport::none)) /
-            static_cast<double>(before.size());
-    job.stages = sharpening_.next(before);
+    render_sharpening(sharpening_, inputs, job, shot_.half_plate, result_);
+    lost_ = sharpening_.lost_share();
     coarsest_ = *std::ranges::min_element(job.stages);
-    render::render_frame(*frame, shot_.half_plate, result_);
     const std::chrono::duration<double, std::milli> ms = std::chrono::steady_clock::now() - start;
-    sharpening_.took(ms.count(), kept_.is_full());
     return ms.count();
   }
 

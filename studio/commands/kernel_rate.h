@@ -17,7 +17,8 @@ struct KernelRate {
 // machine.
 KernelRate measure_kernel(const BenchScene& shot, const render::FrameJob& job, int runs);
 
-// A frame of a still shot, all of whose transport is kept: milliseconds, the best of `runs`.
+// A frame of a still shot under light that drifts, all of whose transport is kept: milliseconds,
+// the best of `runs`.
 double measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs);
 
 // Every pixel tests every light that it faces, and nothing adapts.

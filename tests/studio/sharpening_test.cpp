@@ -19,21 +19,43 @@ std::vector<int> as_kept(const std::vector<std::uint8_t>& stages) {
   return {stages.begin(), stages.end()};
 }
 
-// What rendering takes if every cell with one ray a pixel takes `cell_ms`.
-double ms_of(const std::vector<int>& kept, const std::vector<std::uint8_t>& now, double cell_ms) {
-  double ms = 3;
-  for (std::size_t i = 0; i < now.size(); ++i) {
-    if (kept[i] != now[i]) ms += cell_ms * std::pow(4, now[i] - render::one_ray_stage);
+// A machine on which every cell with one ray a pixel takes `cell_ms`, and the rest of a frame 3 ms.
+struct MadeMachine {
+  double cell_ms;
+  std::vector<int> kept = std::vector<int>(cells, none);
+
+  double ms_at(int stage) const { return cell_ms * std::pow(4, stage - render::one_ray_stage); }
+
+  // Shows a frame; returns what it takes.
+  double show(Sharpening& sharpening) {
+    const SharpeningPlan& plan = sharpening.next(kept);
+    double ms = 0;
+    std::size_t found = 0;
+    std::vector<std::uint8_t> stages = plan.stages;
+    for (; found < plan.ahead.size() && ms < plan.ahead_ms; ++found) {
+      const auto& [cell, stage] = plan.ahead[found];
+      EXPECT_LT(stages[cell], stage);
+      EXPECT_EQ(kept[cell], stages[cell]);
+      stages[cell] = stage;
+      ms += ms_at(stage);
+    }
+    sharpening.found_ahead(found, ms);
+    double frame_ms = 3;
+    for (std::size_t i = 0; i < cells; ++i) {
+      if (kept[i] == none) frame_ms += ms_at(stages[i]);
+    }
+    sharpening.took(frame_ms, false);
+    kept = as_kept(stages);
+    return ms + frame_ms;
   }
-  return ms;
-}
+};
 
 TEST(Sharpening, IsDoneWithinASecondOfFrames) {
   Sharpening sharpening({25, 1}, false);
   std::vector<int> kept(cells, none);
   double before = -1;
   for (int i = 0; i < 26; ++i) {
-    kept = as_kept(sharpening.next(kept));
+    kept = as_kept(sharpening.next(kept).stages);
     sharpening.took(10, false);
     if (i == 0) {
       EXPECT_EQ(kept, std::vector<int>(cells, render::one_ray_stage));
@@ -49,7 +71,7 @@ TEST(Sharpening, BeginsAgainOnlyWhereCellsWereLost) {
   Sharpening sharpening({25, 1}, false);
   std::vector<int> kept(cells, render::finished_stage);
   std::fill_n(kept.begin() + 300, 40, none);
-  const auto stages = sharpening.next(kept);
+  const auto stages = sharpening.next(kept).stages;
   for (std::size_t i = 0; i < cells; ++i) {
     EXPECT_EQ(stages[i], i >= 300 && i < 340 ? render::one_ray_stage : render::finished_stage) << i;
   }
@@ -57,7 +79,8 @@ TEST(Sharpening, BeginsAgainOnlyWhereCellsWereLost) {
 
 TEST(Sharpening, SpreadsOverThePicture) {
   Sharpening sharpening({100, 1}, false);
-  const auto stages = sharpening.next(std::vector<int>(cells, render::one_ray_stage));  // 40 x 30
+  // 40 x 30
+  const auto stages = sharpening.next(std::vector<int>(cells, render::one_ray_stage)).stages;
   std::array<int, 4> quarters{};
   int all = 0;
   for (std::size_t i = 0; i < cells; ++i) {
@@ -73,14 +96,10 @@ TEST(Sharpening, SpreadsOverThePicture) {
 TEST(Sharpening, KeepsToTheTimeOfALiveFrame) {
   for (const double coarse_ms : {5.0, 100.0}) {
     Sharpening sharpening({25, 1}, true);
-    std::vector<int> kept(cells, none);
+    MadeMachine machine{coarse_ms / cells};
     int late = 0, frames = 0;
     for (; (sharpening.share() < 1 || frames == 0) && frames < 500; ++frames) {
-      const auto now = sharpening.next(kept);
-      const double ms = ms_of(kept, now, coarse_ms / cells);
-      late += frames > 0 && ms > 40;
-      sharpening.took(ms, false);
-      kept = as_kept(now);
+      late += machine.show(sharpening) > 40 && frames > 0;
     }
     EXPECT_EQ(sharpening.share(), 1) << coarse_ms;
     EXPECT_EQ(late, 0) << coarse_ms;
@@ -91,22 +110,32 @@ TEST(Sharpening, KeepsToTheTimeOfALiveFrame) {
 // What is lost and can be found anew in the time of a frame is as fine as before at once.
 TEST(Sharpening, FindsAFewLostCellsFinishedAtOnce) {
   Sharpening sharpening({25, 1}, true);
-  std::vector<int> kept(cells, none);
-  const auto show = [&] {
-    const auto now = sharpening.next(kept);
-    const double ms = ms_of(kept, now, 0.02);
-    sharpening.took(ms, false);
-    kept = as_kept(now);
-    return ms;
-  };
-  for (int i = 0; i < 100; ++i) show();
+  MadeMachine machine{0.02};
+  for (int i = 0; i < 100; ++i) machine.show(sharpening);
   ASSERT_EQ(sharpening.share(), 1);
-  std::fill_n(kept.begin(), 20, none);
-  show();
+  std::fill_n(machine.kept.begin(), 20, none);
+  machine.show(sharpening);
   EXPECT_EQ(sharpening.share(), 1);
-  std::fill_n(kept.begin(), 400, none);
-  EXPECT_LE(show(), 40);
+  std::fill_n(machine.kept.begin(), 400, none);
+  EXPECT_LE(machine.show(sharpening), 40);
   EXPECT_LT(sharpening.share(), 1);
+}
+
+// Where rays at edges can be had everywhere within a second, they come before all cells have a ray
+// a pixel: those would take a good part of it.
+TEST(Sharpening, HasEdgesWithinASecondWhereItCan) {
+  for (const double coarse_ms : {30.0, 120.0}) {
+    Sharpening sharpening({25, 1}, true);
+    MadeMachine machine{coarse_ms / cells};
+    for (int i = 0; i < 400; ++i) machine.show(sharpening);
+    std::ranges::fill(machine.kept, none);
+    int frames = 0;
+    while (std::ranges::min(machine.kept) <= render::one_ray_stage && frames < 100) {
+      machine.show(sharpening);
+      ++frames;
+    }
+    EXPECT_LE(frames, 26) << coarse_ms;
+  }
 }
 
 TEST(Sharpening, StaysWhereTheMemoryEnds) {
@@ -114,7 +143,7 @@ TEST(Sharpening, StaysWhereTheMemoryEnds) {
   std::vector<int> kept(cells, none);
   double last = 0;
   for (int i = 0; i < 30; ++i) {
-    const auto now = sharpening.next(kept);
+    const auto now = sharpening.next(kept).stages;
     const bool full = sharpening.share() > 0.65;
     sharpening.took(10, full);
     kept = as_kept(now);

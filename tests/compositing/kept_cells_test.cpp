@@ -1,0 +1,156 @@
+// Cells that are kept from frame to frame: lit as they were, or found ahead.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+
+#include "made_room.h"
+#include "render/kept_transport.h"
+#include "render/renderer.h"
+
+namespace compositing {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// The room on a real floor, with a ball of glass before a plate that it bends.
+struct RealFloorRoom {
+  MadeRoom room{96, 72};
+  calibrate::Lens lens{"pinhole", 96, 72, {86.4, 86.4, 47.5, 35.5}};
+  render::KeptTransport kept;
+
+  RealFloorRoom() {
+    render::SceneDescription scene = MadeRoom::describe();
+    scene.materials.push_back(make_stand_in_material("floor", {}));
+    auto floor = std::make_shared<render::Mesh>(*scene.meshes[0]);
+    floor->materials = {static_cast<std::uint32_t>(scene.materials.size() - 1)};
+    scene.meshes[0] = floor;
+    scene.instances[0].kind = render::ObjectKind::stand_in;
+    scene.instances[0].blocks_light = false;
+    scene.instances[1].set_from_object[11] = -100;  // without the far wall: the plate shows
+    room.scene = std::make_unique<render::Scene>(std::move(scene));
+    for (auto& light : room.job.lights.lights) light.planned = light.irradiance;
+    for (std::size_t i = 0; i < room.plate.pixels.size(); ++i) {
+      room.plate.pixels[i] = capture::half_from_float(0.1F + 0.01F * static_cast<float>(i % 11));
+    }
+  }
+
+  render::FrameInputs inputs() {
+    render::FrameInputs inputs = room.inputs();
+    inputs.lens = &lens;
+    return inputs;
+  }
+  render::FrameResult show(render::KeptTransport* memory) {
+    render::FrameInputs all = inputs();
+    all.kept = memory;
+    render::FrameResult result;
+    render_frame(all, room.job, room.plate, result);
+    return result;
+  }
+  // Cells that the next frame shows as they are if nothing changes.
+  int lit_cells() const {
+    int count = 0;
+    if (kept.stages().empty()) return count;
+    for (int row = 0; row < 5; ++row) {
+      for (int column = 0; column < 6; ++column) {
+        const render::LitCell* lit = kept.lit(column, row);
+        count += lit != nullptr && lit->light == kept.keys().light;
+      }
+    }
+    return count;
+  }
+};
+
+void expect_same(const render::FrameResult& warm, const render::FrameResult& cold, int frame) {
+  EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
+  EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
+  EXPECT_EQ(warm.statistics.virtual_pixels, cold.statistics.virtual_pixels) << frame;
+  EXPECT_EQ(warm.statistics.affected_pixels, cold.statistics.affected_pixels) << frame;
+  EXPECT_EQ(warm.statistics.clamped_values, cold.statistics.clamped_values) << frame;
+  EXPECT_EQ(warm.statistics.clipped_plate, cold.statistics.clipped_plate) << frame;
+}
+
+TEST(LitCells, AreColdAndWarmTheSameAfterRandomEdits) {
+  RealFloorRoom shot;
+  MadeRoom& room = shot.room;
+  std::mt19937 random(7);
+  const auto below = [&](std::size_t end) { return random() % end; };
+  const auto brighten = [](float& value) { value = value * 1.5F + 0.01F; };
+  int shown_again = 0;
+  for (int frame = 0; frame < 60; ++frame) {
+    // As often as not nothing changes, so that cells are kept lit.
+    switch (below(14)) {
+      case 0:
+        room.job.lights.lights[below(64)].irradiance *= 1.25F;
+        break;
+      case 1:
+        room.plate.pixels[below(room.plate.pixels.size())] = capture::half_from_float(0.7F);
+        break;
+      case 2: {
+        auto& radiance = room.environment.radiance.pixels;
+        brighten(radiance[below(radiance.size())]);
+        render::smooth_for_reflections(room.environment);
+        break;
+      }
+      case 3:
+        room.show(made_video(90, 160, frame));
+        break;
+      case 4:
+        room.directions.sensitivity.assign(96 * 72, 1.0F);
+        room.directions.sensitivity[below(96 * 72)] = 0.5F;
+        break;
+      case 5: {
+        auto& level = room.environment.smoothed.back().pixels;
+        brighten(level[below(level.size())]);
+        break;
+      }
+      default:
+        break;
+    }
+    shown_again += shot.lit_cells() > 0;
+    expect_same(shot.show(&shot.kept), shot.show(nullptr), frame);
+  }
+  EXPECT_GT(shown_again, 20);
+}
+
+// Only what changes every frame is lit anew: the plate where nothing virtual hides it, and video.
+TEST(LitCells, AreNotKeptWhileTheLightChanges) {
+  RealFloorRoom shot;
+  for (int frame = 0; frame < 4; ++frame) {
+    for (render::DirectionalLight& light : shot.room.job.lights.lights) light.irradiance *= 1.01F;
+    shot.show(&shot.kept);
+    EXPECT_EQ(shot.lit_cells(), 0) << frame;
+  }
+  shot.show(&shot.kept);
+  EXPECT_GT(shot.lit_cells(), 10);
+  EXPECT_LT(shot.lit_cells(), 30);  // some see the video
+}
+
+TEST(RefineCells, FindsCellsAheadAsTheFrameWouldShowThem) {
+  RealFloorRoom shot;
+  render::FrameJob& job = shot.room.job;
+  render::FrameInputs inputs = shot.inputs();
+  inputs.kept = &shot.kept;
+  job.stages.assign(30, 1);
+  shot.show(&shot.kept);
+  const auto frame = render::prepare_frame(inputs, job, shot.room.plate);
+  std::vector<render::Refinement> wanted;
+  for (std::size_t i = 0; i < 30; i += 3) wanted.push_back({i, render::finished_stage});
+  render::RenderStatistics ahead;
+  EXPECT_EQ(render::refine_cells(*frame, wanted, Clock::now(), job, ahead), 0U);
+  EXPECT_EQ(job.stages, std::vector<std::uint8_t>(30, 1));
+  EXPECT_EQ(render::refine_cells(*frame, wanted, Clock::now() + std::chrono::hours(1), job, ahead),
+            wanted.size());
+  EXPECT_GT(ahead.primary_rays, 0U);
+  for (std::size_t i = 0; i < 30; ++i) {
+    EXPECT_EQ(job.stages[i], i % 3 == 0 ? render::finished_stage : 1) << i;
+  }
+  render::FrameResult warm;
+  render::render_frame(*frame, shot.room.plate, warm);
+  EXPECT_EQ(warm.statistics.primary_rays + warm.statistics.secondary_rays, 0U);
+  expect_same(warm, shot.show(nullptr), 0);
+}
+
+}  // namespace
+}  // namespace compositing
