@@ -79,6 +79,8 @@ struct PlateSight {
   float gain = 1;           // mean of the frame's light over the plate's
   float mismatch = 0;  // how far the screen in sight is from the plate as lit, as a share of it
   float clipped = 0;   // share of the screen in sight whose primary is at display white
+  float shadowed = 0;  // share of the plate's screen that is in sight with its colour, but with
+                       // less than a fourth of its light
 };
 
 // Keeps a plate true under light that changes: by a gain on a grid of 8x8 pixels, from those cells

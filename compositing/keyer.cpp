@@ -134,8 +134,8 @@ float falling(float value, float good, float bad) {
 }  // namespace
 
 std::string_view name_of(KeyStatus status) {
-  constexpr std::array<std::string_view, 7> names{"good",   "hidden", "clipped",  "noisy",
-                                                  "misfit", "unlit",  "no screen"};
+  constexpr std::array<std::string_view, 8> names{"good",  "hidden", "clipped", "shadowed",
+                                                  "noisy", "misfit", "unlit",   "no screen"};
   return names[static_cast<std::size_t>(status)];
 }
 
@@ -215,6 +215,7 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   lower(1 - falling(sight.screen, 0.03F, 0.25F), KeyStatus::hidden);
   if (settings_.method == KeyMethod::screen) {
     lower(0.5F + 0.5F * falling(sight.clipped, 0.05F, 0.6F), KeyStatus::clipped);
+    lower(falling(sight.shadowed, 0.003F, 0.012F), KeyStatus::shadowed);
     lower(falling(light_.lit().sigma, 0.06F, 0.25F), KeyStatus::noisy);
   }
   lower(falling(sight.mismatch, 0.06F, 0.16F), KeyStatus::misfit);

@@ -40,6 +40,7 @@ enum class KeyStatus : std::uint8_t {
   good,
   hidden,    // hardly any of the screen is in sight: light is the last that was known
   clipped,   // the screen's colour is at the camera's limit: edges are guesses
+  shadowed,  // a shadow on the screen is so deep that it may pass for the person
   noisy,     // the screen's share of a pixel is uncertain
   misfit,    // what is in sight is not the plate: moved, stale, or not this screen
   unlit,     // light has changed beyond what is followed

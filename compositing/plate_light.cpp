@@ -13,6 +13,9 @@ namespace {
 constexpr float least_excess = 0.004F;  // of display white: below it a plate shows no screen
 constexpr float least_gain = 0.15F, most_gain = 2.5F;
 constexpr float clipped_from = 0.985F;
+// Of a cell's gain in its neighbourhood's light: deep shadow, and what is too dark to have a
+// colour.
+constexpr float deep = 0.25F, black = 0.03F;
 
 int cells_along(int side, int step) { return (side + step - 1) / step; }
 
@@ -148,7 +151,8 @@ PlateSight PlateLight::measure(const Rows& source) {
   static_assert(cell == key_lanes);
   const int rows_apart = bare_.height * bare_.width > 500000 ? 4 : 2;
   std::size_t i = 0;
-  float screen = 0, seen = 0, clipped = 0, off = 0;
+  float screen = 0, seen = 0, clipped = 0, off = 0, all_known = 0;
+  F8 dark{};
   for (int row = 0; row < filler_.rows(); ++row) {
     const int bottom = std::min(bare_.height, (row + 1) * cell);
     for (int column = 0; column < filler_.columns(); ++column, ++i) {
@@ -167,8 +171,9 @@ PlateSight PlateLight::measure(const Rows& source) {
         const F8 q = c[0] / (p[0] > 0.0F ? p[0] : all_of(1));
         const F8 d1 = c[1] - p[1] * q, d2 = c[2] - p[2] * q;
         const F8 away = (d1 < 0.0F ? -d1 : d1) + (d2 < 0.0F ? -d2 : d2);
-        const I8 alike =
-            (away < tolerance_ * c[0]) & (q > least_gain) & (q < most_gain) & (inside > 0.0F);
+        const I8 coloured = (away < tolerance_ * c[0]) & (inside > 0.0F);
+        const I8 alike = coloured & (q > least_gain) & (q < most_gain);
+        dark += coloured & (q > black) & (q < deep) ? all_of(1) : F8{};
         const F8 one = alike ? all_of(1) : F8{};
         n += one, sum += one * q, squares += one * q * q;
         apart += alike ? away / c[0] : F8{};
@@ -176,6 +181,7 @@ PlateSight PlateLight::measure(const Rows& source) {
         all += static_cast<float>(count);
       }
       if (known < 0.5F * all) continue;
+      all_known += all;
       screen += 1;
       const float alike = sum_of(n);
       if (alike < 0.6F * all) continue;
@@ -192,6 +198,7 @@ PlateSight PlateLight::measure(const Rows& source) {
   sight.has_screen = screen > 0;
   sight.screen = screen > 0 ? seen / screen : 0;
   sight.clipped = seen > 0 ? clipped / seen : 0;
+  sight.shadowed = all_known > 0 ? sum_of(dark) / all_known : 0;
   sight.mismatch = seen > 0 ? off / seen : 0;
   return sight;
 }

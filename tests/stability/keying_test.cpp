@@ -179,6 +179,25 @@ TEST(Keying, LosesConfidenceBeforeThePictureAsTheScreenFades) {
   sweep("light", {1, 0.3F, 0.1F, 0.03F, 0.01F}, [](MadeScene& s, float v) { s.light = v; });
 }
 
+TEST(Keying, LosesConfidenceBeforeThePictureAsAShadowDeepens) {
+  sweep("shadow", {0, 0.4F, 0.6F, 0.8F, 0.9F, 0.95F}, [](MadeScene& s, float v) { s.shadow = v; });
+}
+
+TEST(Keying, SaysThatAShadowIsTooDeep) {
+  for (const float shadow : {0.0F, 0.6F, 0.8F, 0.9F}) {
+    MadeScene scene = made_scene("plain");
+    scene.shadow = shadow;
+    const MadeClip clip(scene, 3, height, width);
+    Keyer keyer(plate_of(clip), {});
+    capture::HalfImage keyed;
+    const KeyReport report = keyer.key(light_of(clip.frame(5).seen), keyed);
+    EXPECT_EQ(report.confidence<0.5F, shadow> 0.7F) << shadow << " " << report.confidence;
+    if (shadow > 0.7F) {
+      EXPECT_EQ(report.status, KeyStatus::shadowed) << shadow;
+    }
+  }
+}
+
 TEST(Keying, KeepsDarkHairBeforeAShadowedScreen) {
   for (const float shadow : {0.2F, 0.4F, 0.6F}) {
     MadeScene scene = made_scene("black hair");
