@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
 #include <system_error>
@@ -24,6 +25,12 @@ constexpr int buffer_size = 1 << 16;
 constexpr std::size_t marks_kept = 8;
 
 }  // namespace
+
+bool is_one_file(const std::string& a, const std::string& b) {
+  std::error_code ignored;  // a folder that is not there; opening tells
+  return std::filesystem::weakly_canonical(a, ignored) ==
+         std::filesystem::weakly_canonical(b, ignored);
+}
 
 OutputFile::OutputFile(const std::string& path) {
   descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -69,11 +76,13 @@ std::int64_t OutputFile::seek(void* file, std::int64_t offset, int whence) {
   return place < 0 ? AVERROR(errno) : place;
 }
 
+std::int64_t OutputFile::place() const { return avio_tell(context_); }
+
 void OutputFile::mark() {
-  const std::int64_t place = avio_tell(context_);
-  if (!marks_.empty() && marks_.back() == place) return;
+  const std::int64_t here = place();
+  if (!marks_.empty() && marks_.back() == here) return;
   if (marks_.size() == marks_kept) marks_.erase(marks_.begin());
-  marks_.push_back(place);
+  marks_.push_back(here);
 }
 
 void OutputFile::discard(bool discarding) noexcept {
@@ -95,10 +104,13 @@ bool OutputFile::has_room(std::int64_t place, std::int64_t room) noexcept {
   return ::ftruncate(descriptor_, place) == 0 && fits;
 }
 
+bool OutputFile::cut_to(std::int64_t place, std::int64_t room) noexcept {
+  return has_room(place, room) && avio_seek(context_, place, SEEK_SET) == place;
+}
+
 bool OutputFile::cut_back(std::int64_t room) noexcept {
   for (auto place = marks_.rbegin(); place != marks_.rend(); ++place) {
-    if (!has_room(*place, room)) continue;
-    return avio_seek(context_, *place, SEEK_SET) == *place;
+    if (cut_to(*place, room)) return true;
   }
   // Cutting gave up what might have gone beyond this mark; nothing more can be done if it fails.
   if (!marks_.empty()) static_cast<void>(has_room(marks_.back(), 0));

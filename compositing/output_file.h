@@ -9,6 +9,9 @@ struct AVIOContext;
 
 namespace compositing {
 
+// Whether two paths name one file, there or yet to be written, links followed.
+bool is_one_file(const std::string& a, const std::string& b);
+
 class OutputFile {
  public:
   // Creates or replaces the file. Throws std::runtime_error with path and reason.
@@ -22,6 +25,9 @@ class OutputFile {
   // Remembers that all up to here is whole. Only the last few places are kept.
   void mark();
 
+  // Bytes so far.
+  std::int64_t place() const;
+
   // Clears a failed write. While discarding, writes seem to succeed and go nowhere.
   void discard(bool discarding) noexcept;
 
@@ -29,6 +35,9 @@ class OutputFile {
   // libav write there again. If there is no such mark, cuts it back to the last one and returns
   // false.
   bool cut_back(std::int64_t room) noexcept;
+
+  // Cuts the file back to a place. Whether `room` more bytes can be written there by libav.
+  bool cut_to(std::int64_t place, std::int64_t room) noexcept;
 
  private:
   static int write(void* file, std::uint8_t* data, int size);

@@ -1,16 +1,22 @@
-// Records a take beside the show: video with sound, EXR frames, or both, on a thread of its own.
+// Takes: what is pushed waits in a queue, and is written from there.
 #include "compositing/recorder.h"
 
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <mutex>
+#include <span>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
 #include "compositing/exr_sequence.h"
+#include "compositing/fill_and_key.h"
+#include "compositing/locked_videos.h"
+#include "compositing/output_file.h"
 #include "compositing/sound_track.h"
 #include "compositing/video_writer.h"
 
@@ -38,12 +44,53 @@ VideoSettings video_settings(const RecorderSettings& settings) {
           .crf = settings.crf,
           .transfer = settings.transfer,
           .timecode = first ? to_string(*first) : std::string(),
+          .comment = {},
           .sound_channels = settings.sound_channels,
           .sound_rate = settings.sound_rate};
 }
 
+bool has_pair(const RecorderSettings& settings) { return !settings.fill_file.empty(); }
+
+VideoSettings fill_settings(const RecorderSettings& settings) {
+  VideoSettings fill = video_settings(settings);
+  fill.file = settings.fill_file;
+  fill.comment =
+      "fill of " + std::filesystem::path(settings.key_file).filename().string() +
+      ": programme = fill + (1 - key) * plate, in display codes; shaped: do not multiply by key";
+  return fill;
+}
+
+VideoSettings key_settings(const RecorderSettings& settings) {
+  VideoSettings key = video_settings(settings);
+  key.file = settings.key_file;
+  key.channels = 1;
+  key.sound_channels = 0;
+  key.comment = "key of " + std::filesystem::path(settings.fill_file).filename().string() +
+                ": share of the plate's display codes that is hidden, linear, 0 to 255";
+  return key;
+}
+
 void require(bool holds, const std::string& reason) {
   if (!holds) throw std::invalid_argument(reason);
+}
+
+void validate_pair(const RecorderSettings& settings) {
+  require(settings.fill_file.empty() == settings.key_file.empty(),
+          "fill and key come together: " +
+              (settings.fill_file.empty()
+                   ? "there is no file for the fill of the key " + settings.key_file
+                   : "there is no file for the key of the fill " + settings.fill_file));
+  if (!has_pair(settings)) return;
+  validate(fill_settings(settings));
+  validate(key_settings(settings));
+  require(settings.display != nullptr, "fill and key need the display whose codes they are");
+  const std::string& fill = settings.fill_file;
+  const std::string& key = settings.key_file;
+  require(!is_one_file(fill, key), fill + ": fill and key cannot be one file");
+  for (const std::string& of_pair : {fill, key}) {
+    require(settings.file.empty() || !is_one_file(of_pair, settings.file),
+            of_pair + ": is the programme's file already");
+  }
 }
 
 bool has_form(const capture::HalfImage* image, const RecorderSettings& settings, int channels) {
@@ -55,8 +102,10 @@ bool has_form(const capture::HalfImage* image, const RecorderSettings& settings,
 }
 
 void validate(const RecorderSettings& settings) {
-  require(!settings.file.empty() || !settings.exr_dir.empty(),
-          "nothing to record: name a video file, a folder for EXR frames, or both");
+  validate_pair(settings);
+  require(
+      !settings.file.empty() || !settings.exr_dir.empty() || has_pair(settings),
+      "nothing to record: name a video file, a folder for EXR frames, or files for fill and key");
   require(
       settings.queue_frames >= 1 && settings.queue_frames <= 4096,
       "the recorder's queue holds 1 to 4096 frames, not " + std::to_string(settings.queue_frames));
@@ -93,8 +142,11 @@ class Recorder::Take {
   void run();
   bool write_next();
   void write(const Item& item);
+  void write_pair(std::int64_t index, const RecordedFrame& frame);
   std::vector<capture::Sound> take_waiting_sounds();
   void write_sounds(const std::vector<capture::Sound>& sounds, capture::Time latest);
+  void write_sound(std::int64_t first, std::span<const float> samples);
+  void finish_videos() noexcept;
   void stop(const std::string& error);
 
   const RecorderSettings settings_;
@@ -102,6 +154,10 @@ class Recorder::Take {
   // The recording thread's own.
   std::optional<ExrSequence> exr_;
   std::optional<VideoWriter> video_;
+  std::optional<LockedVideos> pair_;
+  std::optional<FillAndKey> fill_and_key_;
+  std::vector<std::uint8_t> fill_, key_;  // of the frame that is written
+  std::int64_t raised_pixels_ = 0;
   std::optional<SoundTrack> sound_;
   std::optional<std::int64_t> first_number_;
   capture::Time start_{};
@@ -125,19 +181,29 @@ Recorder::Take::Take(const RecorderSettings& settings) : settings_(settings) {
   if (!settings.exr_dir.empty()) {
     exr_.emplace(ExrSequenceSettings{settings.exr_dir, settings.rate, settings.exr_compression});
   }
-  if (!settings.file.empty()) {
-    video_.emplace(video_settings(settings));
-    if (settings.sound_channels > 0) sound_.emplace(settings.sound_channels, settings.sound_rate);
+  if (!settings.file.empty()) video_.emplace(video_settings(settings));
+  if (has_pair(settings)) {
+    pair_.emplace(fill_settings(settings), key_settings(settings));
+    fill_and_key_.emplace(settings.display);
+    key_.resize(static_cast<std::size_t>(settings.width) *
+                static_cast<std::size_t>(settings.height));
+    fill_.resize(key_.size() * 3);
+  }
+  if ((video_ || pair_) && settings.sound_channels > 0) {
+    sound_.emplace(settings.sound_channels, settings.sound_rate);
   }
   thread_ = std::thread([this] { run(); });
 }
 
 void Recorder::Take::require_complete(const RecordedFrame& frame) const {
   const std::string name = "frame " + std::to_string(frame.number);
-  require(settings_.exr_dir.empty() || (has_form(frame.rgba.get(), settings_, 4) &&
-                                        has_form(frame.matte.get(), settings_, 1)),
-          name + " lacks a picture and matte of the take's size for its EXR file");
-  require(settings_.file.empty() ||
+  require(
+      (settings_.exr_dir.empty() && !has_pair(settings_)) ||
+          (has_form(frame.rgba.get(), settings_, 4) && has_form(frame.matte.get(), settings_, 1)),
+      name + " lacks a picture and matte of the take's size");
+  require(!has_pair(settings_) || has_form(frame.plate.get(), settings_, 3),
+          name + " lacks a plate of the take's size for fill and key");
+  require((settings_.file.empty() && !has_pair(settings_)) ||
               (frame.display_rgb8 &&
                frame.display_rgb8->size() == static_cast<std::size_t>(settings_.width) *
                                                  static_cast<std::size_t>(settings_.height) * 3),
@@ -196,6 +262,7 @@ void Recorder::Take::run() {
     while (write_next()) continue;
     write_sounds(take_waiting_sounds(), latest_sound_);
     if (video_) video_->close();
+    if (pair_) pair_->close();
   } catch (const std::exception& error) {
     stop(error.what());
   }
@@ -224,6 +291,10 @@ bool Recorder::Take::write_next() {
   const double taken_s = std::chrono::duration<double>(Clock::now() - begin).count();
   const std::lock_guard lock(mutex_);
   ++status_.written;
+  if (!key_.empty()) {
+    status_.raised_share =
+        static_cast<double>(raised_pixels_) / static_cast<double>(status_.written * key_.size());
+  }
   status_.write_s += taken_s;
   status_.worst_write_s = std::max(status_.worst_write_s, taken_s);
   return true;
@@ -237,15 +308,25 @@ void Recorder::Take::write(const Item& item) {
   }
   const std::int64_t index = frame.number - *first_number_;
   latest_sound_ = start_ + capture::time_of_frame(index, settings_.rate) + most_sound_ahead;
-  if (video_) {
-    video_->write_picture(index, *frame.display_rgb8);
-    write_sounds(item.sounds, latest_sound_);
-  }
+  if (video_) video_->write_picture(index, *frame.display_rgb8);
+  if (pair_) write_pair(index, frame);
+  write_sounds(item.sounds, latest_sound_);
   if (exr_) {
     const std::optional<Timecode> first = first_label(settings_);
     exr_->write(frame.number, *frame.rgba, *frame.matte,
                 first ? std::optional(advance(*first, index, settings_.rate)) : std::nullopt);
   }
+}
+
+void Recorder::Take::write_pair(std::int64_t index, const RecordedFrame& frame) {
+  raised_pixels_ += fill_and_key_->split(*frame.display_rgb8, *frame.rgba, *frame.plate,
+                                         *frame.matte, frame.tone, fill_, key_);
+  pair_->write_pictures(index, fill_, key_);
+}
+
+void Recorder::Take::write_sound(std::int64_t first, std::span<const float> samples) {
+  if (video_) video_->write_sound(first, samples);
+  if (pair_) pair_->write_sound(first, samples);
 }
 
 void Recorder::Take::write_sounds(const std::vector<capture::Sound>& sounds, capture::Time latest) {
@@ -265,23 +346,27 @@ void Recorder::Take::write_sounds(const std::vector<capture::Sound>& sounds, cap
         channels);
     for (std::int64_t left = laid->silence; left > 0;) {
       const std::int64_t count = std::min<std::int64_t>(left, settings_.sound_rate);
-      video_->write_sound(next,
-                          std::span(silence).first(static_cast<std::size_t>(count) * channels));
+      write_sound(next, std::span(silence).first(static_cast<std::size_t>(count) * channels));
       next += count;
       left -= count;
     }
-    video_->write_sound(next, laid->samples);
+    write_sound(next, laid->samples);
+  }
+}
+
+// After a failure, which may be another file's: the first error is the one to tell.
+void Recorder::Take::finish_videos() noexcept {
+  if (pair_) pair_->salvage();
+  if (!video_) return;
+  try {
+    video_->close();
+  } catch (const std::exception&) {
+    video_->salvage();
   }
 }
 
 void Recorder::Take::stop(const std::string& error) {
-  if (video_) {
-    try {
-      video_->close();  // it may be the EXR frames that failed
-    } catch (const std::exception&) {
-      video_->salvage();  // the first error is the one to tell
-    }
-  }
+  finish_videos();
   {
     const std::lock_guard lock(mutex_);
     status_.error = error;

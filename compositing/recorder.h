@@ -1,4 +1,5 @@
-// Records a take beside the show: video with sound, EXR frames, or both, on a thread of its own.
+// Records a take beside the show, on a thread of its own: video with sound, fill and key as a pair
+// of videos, EXR frames, or all of them.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +12,20 @@
 #include "capture/colour.h"
 #include "capture/frame.h"
 #include "capture/image.h"
+#include "compositing/display.h"
 #include "compositing/timecode.h"
+#include "compositing/tone.h"
 
 namespace compositing {
 
 struct RecorderSettings {
   std::string file;     // *.mkv, see video_writer.h; "" = no video
   std::string exr_dir;  // see exr_sequence.h; "" = no EXR frames
+  // *.mkv, with the same pictures at the same times whatever happens (locked_videos.h), of the
+  // codes that fill_and_key.h tells; "" = neither.
+  std::string fill_file;
+  std::string key_file;
+  std::shared_ptr<const Display> display;  // that made display_rgb8; for fill and key
   capture::Rational rate;
   int width = 0;
   int height = 0;
@@ -35,10 +43,12 @@ struct RecorderSettings {
 struct RecordedFrame {
   std::int64_t number = 0;
   capture::Time time{};  // of the picture, on the sound's clock; the first frame's is the take's 0
-  std::shared_ptr<const capture::HalfImage> rgba;                 // (height, width, 4); for EXR
-  std::shared_ptr<const capture::HalfImage> matte;                // (height, width, 1); for EXR
-  std::shared_ptr<const std::vector<std::uint8_t>> display_rgb8;  // (height, width, 3); for video
-  std::optional<capture::Sound> sound;  // that came with the frame, if any
+  std::shared_ptr<const capture::HalfImage> rgba;   // (height, width, 4); for EXR and key
+  std::shared_ptr<const capture::HalfImage> matte;  // (height, width, 1); for EXR and key
+  std::shared_ptr<const std::vector<std::uint8_t>> display_rgb8;  // (height, width, 3); for videos
+  std::shared_ptr<const capture::HalfImage> plate;  // (height, width, 3); for fill and key
+  ToneCurve tone;                                   // that display_rgb8 has; for fill and key
+  std::optional<capture::Sound> sound;              // that came with the frame, if any
 };
 
 struct RecorderStatus {
@@ -46,6 +56,7 @@ struct RecorderStatus {
   std::int64_t dropped = 0;  // came while the queue was full, or after an error
   int queued = 0;
   std::int64_t sounds_left_out = 0;  // chunks of another form, or with a time far after their frame
+  double raised_share = 0;           // of pixels whose key is above the matte, see fill_and_key.h
   double worst_write_s = 0;          // longest time that one frame took to write
   double write_s = 0;                // time spent writing, in all
   std::string error;                 // why recording stopped; "" = it has not

@@ -26,6 +26,7 @@ namespace {
 // A killed writer, or a full disk, loses at most the cluster that is being gathered.
 constexpr int cluster_limit_ms = 500;
 constexpr int cluster_limit_bytes = 1 << 20;
+constexpr std::size_t checkpoints_kept = 8;
 
 struct FreeOutput {
   void operator()(AVFormatContext* context) const { avformat_free_context(context); }
@@ -40,10 +41,17 @@ void require(bool holds, const std::string& reason) {
 }
 
 bool is_lossless(const VideoSettings& settings) { return settings.codec == "lossless"; }
+bool is_grey(const VideoSettings& settings) { return settings.channels == 1; }
+bool is_rgb(const VideoSettings& settings) { return is_lossless(settings) && !is_grey(settings); }
+
+AVPixelFormat pixel_format(const VideoSettings& settings) {
+  if (is_grey(settings)) return AV_PIX_FMT_GRAY8;
+  return is_rgb(settings) ? AV_PIX_FMT_RGB24 : AV_PIX_FMT_YUV420P;
+}
 
 capture::libav::CodecContext open_encoder(const VideoSettings& settings) {
-  const bool lossless = is_lossless(settings);
-  const AVCodec* const codec = avcodec_find_encoder_by_name(lossless ? "libx264rgb" : "libx264");
+  const bool rgb = is_rgb(settings), full_range = rgb || is_grey(settings);
+  const AVCodec* const codec = avcodec_find_encoder_by_name(rgb ? "libx264rgb" : "libx264");
   if (codec == nullptr) {
     throw std::runtime_error(settings.file +
                              ": this libavcodec has no libx264: install one that has");
@@ -52,7 +60,7 @@ capture::libav::CodecContext open_encoder(const VideoSettings& settings) {
   if (!encoder) throw std::bad_alloc();
   encoder->width = settings.width;
   encoder->height = settings.height;
-  encoder->pix_fmt = lossless ? AV_PIX_FMT_RGB24 : AV_PIX_FMT_YUV420P;
+  encoder->pix_fmt = pixel_format(settings);
   encoder->framerate = av_rational(settings.rate);
   encoder->time_base = av_inv_q(encoder->framerate);
   encoder->gop_size = std::max(1, static_cast<int>(std::lround(settings.rate.value())));
@@ -60,13 +68,13 @@ capture::libav::CodecContext open_encoder(const VideoSettings& settings) {
   encoder->color_primaries = AVCOL_PRI_BT709;
   encoder->color_trc =
       settings.transfer == capture::Transfer::srgb ? AVCOL_TRC_IEC61966_2_1 : AVCOL_TRC_BT709;
-  encoder->colorspace = lossless ? AVCOL_SPC_RGB : AVCOL_SPC_BT709;
-  encoder->color_range = lossless ? AVCOL_RANGE_JPEG : AVCOL_RANGE_MPEG;
-  encoder->chroma_sample_location = lossless ? AVCHROMA_LOC_UNSPECIFIED : AVCHROMA_LOC_LEFT;
+  encoder->colorspace = rgb ? AVCOL_SPC_RGB : AVCOL_SPC_BT709;
+  encoder->color_range = full_range ? AVCOL_RANGE_JPEG : AVCOL_RANGE_MPEG;
+  encoder->chroma_sample_location = full_range ? AVCHROMA_LOC_UNSPECIFIED : AVCHROMA_LOC_LEFT;
   encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   av_opt_set(encoder->priv_data, "preset", "ultrafast", 0);
   av_opt_set(encoder->priv_data, "tune", "zerolatency", 0);
-  if (lossless) {
+  if (is_lossless(settings)) {
     av_opt_set(encoder->priv_data, "qp", "0", 0);
   } else {
     av_opt_set(encoder->priv_data, "crf", std::to_string(settings.crf).c_str(), 0);
@@ -110,6 +118,8 @@ void validate(const VideoSettings& settings) {
               std::to_string(settings.height));
   require(settings.codec == "h264" || settings.codec == "lossless",
           "no codec \"" + settings.codec + "\"; there are \"h264\" and \"lossless\"");
+  require(settings.channels == 1 || settings.channels == 3,
+          "a take's pictures have 1 or 3 channels, not " + std::to_string(settings.channels));
   require(is_lossless(settings) || (settings.width % 2 == 0 && settings.height % 2 == 0),
           "H.264 needs an even width and height, not " + std::to_string(settings.width) + " x " +
               std::to_string(settings.height) + "; \"lossless\" takes any");
@@ -127,6 +137,12 @@ void validate(const VideoSettings& settings) {
       "sound has 1000 to 768000 samples per second, not " + std::to_string(settings.sound_rate));
 }
 
+// All pictures up to `index` are whole in the file's first `place` bytes.
+struct Checkpoint {
+  std::int64_t index = 0;
+  std::int64_t place = 0;
+};
+
 struct VideoWriter::State {
   explicit State(const VideoSettings& given)
       : settings(given), encoder(open_encoder(given)), file(given.file) {}
@@ -134,6 +150,9 @@ struct VideoWriter::State {
   void open_streams();
   void write_packet(AVPacket* packet, const AVStream* stream, AVRational time_base);
   void encode(const AVFrame* picture_or_end);
+  void write_gathered();
+  void give_gathered_up();
+  std::int64_t room_for_index() const;
   [[noreturn]] void fail(const char* what, int error) const {
     throw std::runtime_error(settings.file + ": " + what + ": " + capture::libav::reason(error));
   }
@@ -149,6 +168,7 @@ struct VideoWriter::State {
   std::optional<Yuv420Converter> converter;
   std::int64_t last_index = -1;
   std::int64_t next_sample = 0;
+  std::vector<Checkpoint> checkpoints;  // the last few
   bool finished = false;
 };
 
@@ -173,6 +193,9 @@ void VideoWriter::State::open_streams() {
   if (!settings.timecode.empty()) {
     av_dict_set(&picture_stream->metadata, "timecode", settings.timecode.c_str(), 0);
     av_dict_set(&muxer->metadata, "timecode", settings.timecode.c_str(), 0);
+  }
+  if (!settings.comment.empty()) {
+    av_dict_set(&muxer->metadata, "comment", settings.comment.c_str(), 0);
   }
   if (settings.sound_channels > 0) {
     sound_stream = avformat_new_stream(context, nullptr);
@@ -219,6 +242,28 @@ void VideoWriter::State::encode(const AVFrame* picture_or_end) {
   if (error != AVERROR(EAGAIN) && error != AVERROR_EOF) fail("encoding failed", error);
 }
 
+void VideoWriter::State::write_gathered() {
+  capture::libav::forget_log();
+  if (const int error = av_write_frame(muxer.get(), nullptr); error < 0) {
+    fail("writing failed", error);
+  }
+  file.mark();
+}
+
+// What the muxer still holds refers to pictures that were lost.
+void VideoWriter::State::give_gathered_up() {
+  file.discard(true);
+  av_write_frame(muxer.get(), nullptr);
+  file.discard(false);
+}
+
+// Some 30 bytes per second of the take, and what is fixed.
+std::int64_t VideoWriter::State::room_for_index() const {
+  constexpr std::int64_t fixed_room = 16 << 10;
+  const double seconds = static_cast<double>(last_index + 1) / settings.rate.value();
+  return fixed_room + static_cast<std::int64_t>(30 * seconds);
+}
+
 VideoWriter::VideoWriter(const VideoSettings& settings) {
   validate(settings);
   capture::libav::gather_log();
@@ -229,30 +274,33 @@ VideoWriter::VideoWriter(const VideoSettings& settings) {
   state.picture->width = settings.width;
   state.picture->height = settings.height;
   if (av_frame_get_buffer(state.picture.get(), 0) < 0) throw std::bad_alloc();
-  if (!is_lossless(settings)) state.converter.emplace(settings.width, settings.height);
+  if (!is_lossless(settings) && !is_grey(settings))
+    state.converter.emplace(settings.width, settings.height);
 }
 
 VideoWriter::VideoWriter(VideoWriter&&) noexcept = default;
 VideoWriter& VideoWriter::operator=(VideoWriter&&) noexcept = default;
 VideoWriter::~VideoWriter() = default;
 
-void VideoWriter::write_picture(std::int64_t index, std::span<const std::uint8_t> rgb) {
+void VideoWriter::write_picture(std::int64_t index, std::span<const std::uint8_t> codes) {
   State& state = *state_;
-  const auto row_bytes = static_cast<std::size_t>(state.settings.width) * 3;
+  const auto row_bytes = static_cast<std::size_t>(state.settings.width) *
+                         static_cast<std::size_t>(state.settings.channels);
   const auto height = static_cast<std::size_t>(state.settings.height);
   require(index > state.last_index,
           "picture " + std::to_string(index) + " after " + std::to_string(state.last_index));
-  require(rgb.size() == row_bytes * height, "the picture has " + std::to_string(rgb.size()) +
-                                                " values, not " +
-                                                std::to_string(row_bytes * height));
+  require(codes.size() == row_bytes * height, "the picture has " + std::to_string(codes.size()) +
+                                                  " values, not " +
+                                                  std::to_string(row_bytes * height));
   AVFrame& picture = *state.picture;
   if (av_frame_make_writable(&picture) < 0) throw std::bad_alloc();
   if (state.converter) {
-    state.converter->convert(rgb, {picture.data[0], picture.data[1], picture.data[2],
-                                   picture.linesize[0], picture.linesize[1], picture.linesize[2]});
+    state.converter->convert(
+        codes, {picture.data[0], picture.data[1], picture.data[2], picture.linesize[0],
+                picture.linesize[1], picture.linesize[2]});
   } else {
     for (std::size_t y = 0; y < height; ++y) {
-      std::copy_n(rgb.data() + y * row_bytes, row_bytes,
+      std::copy_n(codes.data() + y * row_bytes, row_bytes,
                   picture.data[0] + static_cast<std::ptrdiff_t>(y) * picture.linesize[0]);
     }
   }
@@ -283,15 +331,19 @@ void VideoWriter::write_sound(std::int64_t first, std::span<const float> samples
   state.write_packet(state.packet.get(), state.sound_stream, {1, state.settings.sound_rate});
 }
 
+void VideoWriter::checkpoint() {
+  State& state = *state_;
+  state.write_gathered();
+  std::vector<Checkpoint>& kept = state.checkpoints;
+  if (kept.size() == checkpoints_kept) kept.erase(kept.begin());
+  kept.push_back({state.last_index, state.file.place()});
+}
+
 void VideoWriter::close() {
   State& state = *state_;
   if (state.finished) return;
   state.encode(nullptr);
-  capture::libav::forget_log();
-  if (const int error = av_write_frame(state.muxer.get(), nullptr); error < 0) {
-    state.fail("writing failed", error);
-  }
-  state.file.mark();
+  state.write_gathered();
   state.finished = true;
   if (const int error = av_write_trailer(state.muxer.get()); error < 0) {
     state.file.cut_back(0);
@@ -303,15 +355,28 @@ void VideoWriter::salvage() noexcept {
   State& state = *state_;
   if (state.finished) return;
   state.finished = true;
-  // What the muxer still holds refers to pictures that were lost.
-  state.file.discard(true);
-  av_write_frame(state.muxer.get(), nullptr);
-  state.file.discard(false);
-  // The index, some 30 bytes per second of the take, and what is fixed.
-  constexpr std::int64_t fixed_room = 16 << 10;
-  const double seconds = static_cast<double>(state.last_index + 1) / state.settings.rate.value();
-  const auto index_room = static_cast<std::int64_t>(30 * seconds);
-  if (state.file.cut_back(index_room + fixed_room)) av_write_trailer(state.muxer.get());
+  state.give_gathered_up();
+  if (state.file.cut_back(state.room_for_index())) av_write_trailer(state.muxer.get());
+}
+
+void VideoWriter::salvage_together(VideoWriter& a, VideoWriter& b) noexcept {
+  State& one = *a.state_;
+  State& other = *b.state_;
+  if (one.finished || other.finished) return;
+  one.finished = other.finished = true;
+  one.give_gathered_up();
+  other.give_gathered_up();
+  // They may share a disk: each has to leave room for both.
+  const std::int64_t room = one.room_for_index() + other.room_for_index();
+  for (auto last = one.checkpoints.rbegin(); last != one.checkpoints.rend(); ++last) {
+    const auto same = std::ranges::find(other.checkpoints, last->index, &Checkpoint::index);
+    if (same == other.checkpoints.end()) continue;
+    const bool fits = one.file.cut_to(last->place, room) & other.file.cut_to(same->place, room);
+    if (!fits) continue;
+    av_write_trailer(one.muxer.get());
+    av_write_trailer(other.muxer.get());
+    return;
+  }
 }
 
 }  // namespace compositing
