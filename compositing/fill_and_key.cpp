@@ -11,6 +11,7 @@ namespace compositing {
 namespace {
 
 constexpr std::size_t half_count = 65536;
+constexpr capture::Half half_one = 0x3c00;
 
 // Nearest to product / 255, for products of two codes.
 constexpr int divided(int product) {
@@ -49,13 +50,13 @@ int passing_codes(capture::Half alpha, capture::Half matte, const std::vector<fl
   return static_cast<int>(255 * clear * shares[capture::half_from_float(lit)]);
 }
 
-// The most that may pass of these codes of the plate so that no fill is negative.
-int most_passing(const std::uint8_t* programme, const std::uint8_t* plate) {
-  int most = 255;
-  for (int c = 0; c < 3; ++c) {
-    if (plate[c] > 0) most = std::min(most, (programme[c] * 255 + 127) / plate[c]);
-  }
-  return most;
+// The most that may pass of these codes of the plate so that no fill is negative; exact where it is
+// at most 255. Without a branch: in shadows, a raised key is as likely as not.
+float most_passing(const std::uint8_t* programme, const std::uint8_t* plate) {
+  const auto most = [&](int c) {
+    return static_cast<float>(programme[c] * 255 + 127) / static_cast<float>(plate[c]);
+  };
+  return std::min(std::min(most(0), most(1)), most(2));
 }
 
 void require(bool holds, const std::string& reason) {
@@ -67,6 +68,11 @@ void require(bool holds, const std::string& reason) {
 FillAndKey::FillAndKey(std::shared_ptr<const Display> display) : display_(std::move(display)) {
   require(display_ != nullptr, "fill and key need the display whose codes they are");
   passed_ = shares_of_codes(*display_);
+  clear_.resize(half_count);
+  for (std::size_t bits = 0; bits < half_count; ++bits) {
+    const int passing = passing_codes(0, static_cast<capture::Half>(bits), passed_);
+    clear_[bits] = static_cast<std::uint8_t>(passing);
+  }
 }
 
 std::int64_t FillAndKey::split(std::span<const std::uint8_t> programme,
@@ -86,24 +92,38 @@ std::int64_t FillAndKey::split(std::span<const std::uint8_t> programme,
           "fill and key need room for " + std::to_string(pixels) + " pixels");
   row_.resize(width * 4);
   codes_.resize(width * 3);
+  mixed_.resize(width);
   std::int64_t raised = 0;
   for (std::size_t first = 0; first < pixels; first += width) {
-    for (std::size_t x = 0; x < width; ++x) {
-      std::copy_n(plate.pixels.data() + (first + x) * 3, 3, row_.data() + x * 4);
-    }
-    display_->to_rgb8(row_, codes_, tone);
-    for (std::size_t x = 0; x < width; ++x) {
-      const std::size_t at = first + x;
-      const std::uint8_t* const over = codes_.data() + x * 3;
-      const std::uint8_t* const shown = programme.data() + at * 3;
-      int passing = passing_codes(rgba.pixels[at * 4 + 3], matte.pixels[at], passed_);
-      const auto left = [&](int c) { return shown[c] - divided(passing * over[c]); };
-      if ((left(0) | left(1) | left(2)) < 0) {
-        passing = std::min(passing, most_passing(shown, over));
-        ++raised;
+    // Most pixels are plate alone, or hide it; only the others need the plate's codes.
+    std::size_t count = 0;
+    for (std::size_t at = first; at < first + width; ++at) {
+      const capture::Half* const over = plate.pixels.data() + at * 3;
+      const capture::Half* const shown = rgba.pixels.data() + at * 4;
+      if (shown[3] == half_one) {
+        std::copy_n(programme.data() + at * 3, 3, fill.data() + at * 3);
+        key[at] = 255;
+      } else if (matte.pixels[at] == 0 && shown[3] == 0 && std::equal(over, over + 3, shown)) {
+        std::fill_n(fill.data() + at * 3, 3, std::uint8_t{0});
+        key[at] = 0;
+      } else {
+        std::copy_n(over, 3, row_.data() + count * 4);
+        mixed_[count++] = at;
       }
+    }
+    display_->to_rgb8(std::span(row_).first(count * 4), std::span(codes_).first(count * 3), tone);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t at = mixed_[i];
+      const capture::Half alpha = rgba.pixels[at * 4 + 3], matted = matte.pixels[at];
+      const std::uint8_t* const over = codes_.data() + i * 3;
+      const std::uint8_t* const shown = programme.data() + at * 3;
+      const int asked = alpha == 0 ? clear_[matted] : passing_codes(alpha, matted, passed_);
+      const int passing =
+          static_cast<int>(std::min(static_cast<float>(asked), most_passing(shown, over)));
+      raised += passing < asked;
       for (int c = 0; c < 3; ++c) {
-        fill[at * 3 + static_cast<std::size_t>(c)] = static_cast<std::uint8_t>(left(c));
+        fill[at * 3 + static_cast<std::size_t>(c)] =
+            static_cast<std::uint8_t>(shown[c] - divided(passing * over[c]));
       }
       key[at] = static_cast<std::uint8_t>(255 - passing);
     }

@@ -49,7 +49,9 @@ class FillAndKey {
  private:
   std::shared_ptr<const Display> display_;
   std::vector<float> passed_;        // by the bits of a share of light: the share of codes
-  std::vector<capture::Half> row_;   // of the plate, with alpha
+  std::vector<std::uint8_t> clear_;  // by a matte's bits, where nothing covers: 255 - key
+  std::vector<std::size_t> mixed_;   // pixels of a row that show the plate and more
+  std::vector<capture::Half> row_;   // the plate there, with alpha
   std::vector<std::uint8_t> codes_;  // of it
 };
 
