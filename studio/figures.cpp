@@ -67,11 +67,12 @@ Json persons_json(const std::vector<PersonStatus>& persons) {
   return rows;
 }
 
-Json record_json(const compositing::RecorderStatus& recorder) {
+Json record_json(const Set& set, const compositing::RecorderStatus& recorder) {
   Json json{{"written", recorder.written},
             {"dropped", recorder.dropped},
             {"worst_write_ms", recorder.worst_write_s * 1000},
             {"write_ms", recorder.write_s * 1000}};
+  if (!set.record.key.empty()) json["key_raised"] = recorder.raised_share;
   if (!recorder.error.empty()) json["error"] = recorder.error;
   return json;
 }
@@ -129,7 +130,7 @@ std::string show_figures(const Set& set,
             {"affected_pixels", s.statistics.affected_pixels},
             {"display_nan", s.display_nan},
             {"effort", effort_json(s.effort)},
-            {"recorder", record_json(s.recorder)},
+            {"recorder", record_json(set, s.recorder)},
             {"peak_memory_mb", peak_memory_mb()},
             {"notes", s.notes}};
   if (s.match.matrix) json["match_matrix"] = *s.match.matrix;

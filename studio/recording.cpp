@@ -27,6 +27,9 @@ void Recording::start(const RecordSettings& settings) {
   compositing::RecorderSettings recorder;
   recorder.file = settings.file;
   recorder.exr_dir = settings.exr;
+  recorder.fill_file = settings.fill;
+  recorder.key_file = settings.key;
+  recorder.display = form_.display;
   recorder.rate = form_.rate;
   recorder.width = form_.width;
   recorder.height = form_.height;
@@ -56,6 +59,8 @@ void Recording::record(const ShownFrame& shown, bool wait) {
   frame.rgba = {shown.result, &shown.result->rgba};
   frame.matte = {shown.result, &shown.result->matte};
   frame.display_rgb8 = shown.rgb8;
+  frame.plate = shown.prepared.plate;
+  frame.tone = compositing::curve_of(shown.prepared.job.tone);
   frame.sound = joined(shown.prepared.sound);
   recorder_->push(std::move(frame));
 }

@@ -19,6 +19,7 @@ struct RecordingForm {
   capture::Transfer transfer = capture::Transfer::rec1886;  // of the display's codes
   int sound_channels = 0;
   int sound_rate = 0;
+  std::shared_ptr<const compositing::Display> display;  // whose codes are recorded
 };
 
 // One thread uses it.

@@ -107,6 +107,10 @@ RecordSettings read_record_section(Section section, const std::filesystem::path&
   };
   read_path("file", record.file);
   read_path("exr", record.exr);
+  read_path("fill", record.fill);
+  read_path("key", record.key);
+  if (!section.has("key") && section.has("fill")) section.fault("fill", "comes with record.key");
+  if (!section.has("fill") && section.has("key")) section.fault("key", "comes with record.fill");
   section.text("codec", record.codec);
   section.text("timecode", record.timecode);
   section.finish();

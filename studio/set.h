@@ -206,11 +206,15 @@ struct DisplayChoice {
 };
 
 struct RecordSettings {
-  std::string file;      // "" = no video
-  std::string exr;       // directory; "" = no EXR
+  std::string file;  // "" = no video
+  std::string exr;   // directory; "" = no EXR
+  std::string fill;  // videos for an external keyer, both or none
+  std::string key;
   std::string codec;     // "" = compositing's default
   std::string timecode;  // of the first frame; "" = 00:00:00:00
   Place place;
+
+  bool is_empty() const { return file.empty() && exr.empty() && fill.empty() && key.empty(); }
 };
 
 struct Set {

@@ -62,13 +62,21 @@ auto at_place(const Set& set, Place place, const Make& make) {
   }
 }
 
-RecordingForm form_of(const FrameMaker& maker) {
+std::shared_ptr<const compositing::Display> make_display(const Set& set) {
+  return at_place(set, set.display.place, [&] {
+    return std::make_shared<const compositing::Display>(display_settings(set));
+  });
+}
+
+RecordingForm form_of(const FrameMaker& maker,
+                      std::shared_ptr<const compositing::Display> display) {
   const Set& set = maker.set();
   const capture::CameraInfo& plate = maker.plate().info();
   const bool srgb = display_settings(set).display == "sRGB";
   return {set.show.width,       set.show.height,
           maker.rate(),         srgb ? capture::Transfer::srgb : capture::Transfer::rec1886,
-          plate.sound_channels, plate.sound_rate};
+          plate.sound_channels, plate.sound_rate,
+          std::move(display)};
 }
 
 }  // namespace
@@ -76,13 +84,13 @@ RecordingForm form_of(const FrameMaker& maker) {
 class Show::Stages {
  public:
   Stages(Set set, const ShowOptions& options)
-      : options_(options), maker_(std::move(set), options.rate), recording_(form_of(maker_)) {
+      : options_(options),
+        maker_(std::move(set), options.rate),
+        display_(make_display(maker_.set())),
+        recording_(form_of(maker_, display_)) {
     const Set& s = maker_.set();
     if (maker_.plate().is_live()) options_.live = true;
     if (options_.live) tally_.set_period_ms(1000 / maker_.rate().value());
-    display_ = at_place(s, s.display.place, [&] {
-      return std::make_unique<compositing::Display>(display_settings(s));
-    });
     if (s.display.tone) tone_.emplace(*s.display.tone);
     if (s.show.sharpen.value_or(options_.live)) {
       sharpening_.emplace(maker_.rate(), options_.live);
@@ -90,7 +98,7 @@ class Show::Stages {
     frames_ = options.frames ? options.frames : s.show.frames;
     if (!frames_ && !options_.live && maker_.is_endless()) frames_ = 1;
     planned_frames_ = frames_ ? frames_ : frames_of_plate();
-    if (options.record && !(s.record.file.empty() && s.record.exr.empty())) {
+    if (options.record && !s.record.is_empty()) {
       at_place(s, s.record.place, [&] { recording_.start(s.record); });
     }
     tally_.status().effort = s.effort;
@@ -373,7 +381,6 @@ class Show::Stages {
 
   // Of the caller's thread.
   Tally tally_;
-  std::unique_ptr<compositing::Display> display_;
   std::optional<ToneFollower> tone_;
   std::optional<Sharpening> sharpening_;
   render::KeptTransport kept_;
@@ -387,6 +394,7 @@ class Show::Stages {
   Clock::duration paused_for_{};
 
   // Of the caller's thread.
+  std::shared_ptr<const compositing::Display> display_;
   Recording recording_;
 
   // Shared.

@@ -28,6 +28,8 @@ struct RunOptions {
   std::optional<std::int64_t> check_error;
   std::string record;
   std::string exr;
+  std::string fill;
+  std::string key;
   std::string view;
   std::string view_png;
 };
@@ -37,6 +39,10 @@ std::string absolute(const std::string& path) { return std::filesystem::absolute
 void apply_options(const RunOptions& options, Set& set) {
   if (!options.record.empty()) set.record.file = absolute(options.record);
   if (!options.exr.empty()) set.record.exr = absolute(options.exr);
+  if (!options.fill.empty()) {
+    set.record.fill = absolute(options.fill);
+    set.record.key = absolute(options.key);
+  }
 }
 
 // The effort that a chart of the set found best for what was asked.
@@ -103,6 +109,10 @@ void report_end(const ShowStatus& status, const Set& set, Console& console) {
   if (!set.record.exr.empty()) {
     console.say(fmt::format("recorded {} frames to {}", status.recorder.written, set.record.exr));
   }
+  if (!set.record.fill.empty()) {
+    console.say(fmt::format("recorded {} frames of fill to {} and of key to {}",
+                            status.recorder.written, set.record.fill, set.record.key));
+  }
   for (const std::string& note : status.notes) console.warn(note);
 }
 
@@ -168,6 +178,11 @@ Command run_command() {
             arguments.option("--frames", o->frames, 1, 100'000'000, "show so many frames");
             arguments.option("--record", o->record, "record video to this .mkv file");
             arguments.option("--exr", o->exr, "record EXR frames to this directory");
+            arguments.option("--fill", o->fill,
+                             "record what an external keyer adds to the plate to this .mkv file; "
+                             "with --key");
+            arguments.option("--key", o->key,
+                             "record what of the plate it hides to this .mkv file");
             arguments.flag("--watch", o->watch, "take the set file over whenever it changes");
             arguments.option("--check-error", o->check_error, 2, 1 << 20,
                              "render the reference of the last frame with so many samples and "
@@ -185,6 +200,9 @@ Command run_command() {
             return [o](Console& console) {
               if (!o->view_png.empty() && o->view.empty()) {
                 throw UsageError("--view-png: which --view?");
+              }
+              if (o->fill.empty() != o->key.empty()) {
+                throw UsageError("--fill and --key: only both make a pair");
               }
               if (o->fps && o->error) throw UsageError("--fps and --error: only one can be held");
               run(*o, console);

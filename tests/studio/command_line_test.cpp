@@ -256,6 +256,36 @@ TEST_F(Runs, RecordVideoAndExr) {
   EXPECT_EQ(std::distance(fs::directory_iterator(dir_ / "take"), fs::directory_iterator()), 3);
 }
 
+TEST_F(Runs, RecordFillAndKeyForAnExternalKeyer) {
+  const auto path = [&](const char* name) { return (dir_ / name).string(); };
+  const Outcome outcome = run("run " + write_set() + " --fill " + path("fill.mkv") + " --key " +
+                              path("key.mkv") + " --json " + path("run.json"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("3 frames of fill to " + path("fill.mkv") + " and of key to " +
+                                     path("key.mkv")));
+  EXPECT_GT(fs::file_size(path("fill.mkv")), 500U);
+  EXPECT_GT(fs::file_size(path("key.mkv")), 500U);
+  const auto json = nlohmann::json::parse(content_of(path("run.json")));
+  EXPECT_LT(json["recorder"]["key_raised"], 1);
+}
+
+TEST_F(Runs, RefuseAPairThatIsNone) {
+  const std::string set = write_set();
+  const std::string fill = (dir_ / "fill.mkv").string(), key = (dir_ / "key.mov").string();
+  for (const std::string& half : {" --fill " + fill, " --key " + fill}) {
+    const Outcome outcome = run("run " + set + half);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("--fill and --key"));
+  }
+  for (const std::string& other : {fill, key}) {
+    const Outcome outcome = run("run " + set + " --fill " + fill + " --key " + other);
+    EXPECT_EQ(outcome.status, 1);
+    expect_one_line(outcome.err);
+    EXPECT_THAT(outcome.err, HasSubstr(other));
+    EXPECT_FALSE(fs::exists(fill));
+  }
+}
+
 TEST_F(Runs, CheckTheErrorOfTheLastFrame) {
   const std::string json_path = (dir_ / "run.json").string();
   const Outcome outcome =

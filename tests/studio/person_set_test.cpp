@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
+#include <span>
 
 #include "calibrate/lens.h"
+#include "compositing/display.h"
 #include "studio/show.h"
 #include "tests/studio/made_show.h"
 
@@ -158,6 +161,55 @@ TEST_F(PersonSetTest, GivesTheSameBitsWhateverTheTiming) {
     return pictures;
   };
   EXPECT_EQ(pictures_of(0), pictures_of(20));
+}
+
+// Of the first frames of a video, row by row.
+std::vector<std::uint8_t> codes_of(const std::string& file, const char* format, std::size_t size) {
+  std::vector<std::uint8_t> codes(size);
+  const std::string command =
+      "ffmpeg -v error -i " + file + " -f rawvideo -pix_fmt " + format + " -";
+  std::FILE* pipe = ::popen(command.c_str(), "r");
+  EXPECT_NE(pipe, nullptr);
+  EXPECT_EQ(std::fread(codes.data(), 1, size, pipe), size) << file;
+  EXPECT_EQ(std::fgetc(pipe), EOF) << file;
+  ::pclose(pipe);
+  return codes;
+}
+
+// An external keyer's mix of a set with a person, an object, and the shadows of both.
+TEST_F(PersonSetTest, IsMixedFromFillAndKeyInEveryCode) {
+  constexpr std::size_t frames = 8, pixels = 64 * 48;
+  Show show(made_set("grey:8,25,0", walker + std::string("[record]\nfile = \"programme.mkv\"\n"
+                                                         "fill = \"fill.mkv\"\nkey = \"key.mkv\"\n"
+                                                         "codec = \"lossless\"\n")));
+  std::vector<std::uint8_t> plate(pixels * 3 * frames);
+  std::size_t frame = 0;
+  show.run([&](const ShownFrame& shown) {
+    const compositing::Display display;
+    capture::HalfImage rgba{48, 64, std::vector<capture::Half>(pixels * 4), 4};
+    for (std::size_t i = 0; i < pixels * 3; ++i) {
+      rgba.pixels[i / 3 * 4 + i % 3] = shown.prepared.plate->pixels[i];
+    }
+    display.to_rgb8(rgba, std::span(plate).subspan(pixels * 3 * frame++, pixels * 3));
+  });
+  ASSERT_EQ(frame, frames);
+  EXPECT_EQ(show.status()->recorder.error, "");
+  const auto read = [&](const char* name, const char* format, std::size_t channels) {
+    return codes_of((dir_ / name).string(), format, pixels * frames * channels);
+  };
+  const auto programme = read("programme.mkv", "rgb24", 3), fill = read("fill.mkv", "rgb24", 3);
+  const auto key = read("key.mkv", "gray", 1);
+  std::size_t shadowed = 0, covered = 0, clear = 0;
+  for (std::size_t i = 0; i < programme.size(); ++i) {
+    const int passing = 255 - key[i / 3];
+    ASSERT_EQ(fill[i] + std::lround(passing * plate[i] / 255.0), programme[i]) << i;
+    covered += passing == 0;
+    clear += passing == 255;
+    shadowed += passing > 100 && passing < 230 && fill[i] <= 1;
+  }
+  EXPECT_GT(covered, programme.size() / 20);
+  EXPECT_GT(clear, programme.size() / 20);
+  EXPECT_GT(shadowed, programme.size() / 50);
 }
 
 TEST_F(PersonSetTest, HoldsItsLastPictureAfterTheEndAndSaysSo) {

@@ -123,6 +123,8 @@ tone_seconds = 0.5
 [record]
 file = "take.mkv"
 exr = "take"
+fill = "fill.mkv"
+key = "key.mkv"
 codec = "h264"
 timecode = "10:00:00:00"
 )"));
@@ -168,6 +170,8 @@ timecode = "10:00:00:00"
   EXPECT_EQ(set.display.tone->key, 0.2F);
   EXPECT_EQ(set.display.tone->seconds, 0.5);
   EXPECT_EQ(set.record.file, (dir_ / "take.mkv").string());
+  EXPECT_EQ(set.record.fill, (dir_ / "fill.mkv").string());
+  EXPECT_EQ(set.record.key, (dir_ / "key.mkv").string());
   EXPECT_EQ(set.record.timecode, "10:00:00:00");
 }
 
