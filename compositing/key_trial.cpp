@@ -1,6 +1,8 @@
 // Trials of keyers on made clips.
 #include "compositing/key_trial.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 
 #include "compositing/clean_plate.h"
@@ -74,6 +76,23 @@ SceneTrial judge_scene(const MadeScene& scene,
   trial.ours = mean_of(ours), trial.ffmpeg = mean_of(ffmpeg);
   trial.obs = mean_of(obs), trial.gstreamer = mean_of(gstreamer);
   return trial;
+}
+
+std::vector<SceneTrial> judge_scenes(std::span<const MadeScene> scenes,
+                                     std::span<const std::uint32_t> seeds,
+                                     const KeySettings& settings,
+                                     const TrialSize& size) {
+  std::vector<SceneTrial> trials(scenes.size());
+  tbb::parallel_for(std::size_t{0}, scenes.size(), [&](std::size_t i) {
+    trials[i] = judge_scene(scenes[i], seeds, settings, size);
+  });
+  return trials;
+}
+
+KeyScore mean_over(std::span<const SceneTrial> trials, KeyScore SceneTrial::*method) {
+  std::vector<KeyScore> scores;
+  for (const SceneTrial& trial : trials) scores.push_back(trial.*method);
+  return mean_of(scores);
 }
 
 }  // namespace compositing

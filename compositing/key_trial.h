@@ -47,4 +47,13 @@ SceneTrial judge_scene(const MadeScene& scene,
                        const KeySettings& settings,
                        const TrialSize& size = {});
 
+// The same for several scenes, beside each other.
+std::vector<SceneTrial> judge_scenes(std::span<const MadeScene> scenes,
+                                     std::span<const std::uint32_t> seeds,
+                                     const KeySettings& settings,
+                                     const TrialSize& size = {});
+
+// The mean of one method's scores.
+KeyScore mean_over(std::span<const SceneTrial> trials, KeyScore SceneTrial::*method);
+
 }  // namespace compositing

@@ -2,13 +2,13 @@
 #include "studio/charts/key.h"
 
 #include <algorithm>
+#include <array>
 #include <ctime>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "compositing/key_trial.h"
 
@@ -102,18 +102,8 @@ class KeyChart {
                                 bool peers = true) const {
     compositing::TrialSize trial_size = size();
     if (!peers) trial_size.peer_step = trial_size.frames;
-    std::vector<SceneTrial> trials(scenes.size());
     const std::array<std::uint32_t, 1> seeds{seed};
-    tbb::parallel_for(std::size_t{0}, scenes.size(), [&](std::size_t i) {
-      trials[i] = compositing::judge_scene(scenes[i], seeds, settings, trial_size);
-    });
-    return trials;
-  }
-
-  static KeyScore mean_over(const std::vector<SceneTrial>& trials, KeyScore SceneTrial::*method) {
-    std::vector<KeyScore> scores;
-    for (const SceneTrial& trial : trials) scores.push_back(trial.*method);
-    return compositing::mean_of(scores);
+    return compositing::judge_scenes(scenes, seeds, settings, trial_size);
   }
 
   void add(Chart& chart, ChartPoint point, const KeyScore& score) const {
@@ -155,7 +145,7 @@ class KeyChart {
                         {"follows_light", setting.settings.follows_light},
                         {"smoothing", double{setting.settings.smoothing}}};
       point.time_ms = least_ms(quick_ ? 2 : 9, [&] { keyer.key(coded, keyed); });
-      add(chart, std::move(point), mean_over(trials, &SceneTrial::ours));
+      add(chart, std::move(point), compositing::mean_over(trials, &SceneTrial::ours));
     }
     const auto key = compositing::pick_key_colour(frame);
     const auto add_peer = [&](const char* name, KeyScore SceneTrial::*score,
@@ -164,7 +154,7 @@ class KeyChart {
       point.method = name;
       point.peer = true;
       point.time_ms = least_ms(quick_ ? 1 : 3, work);
-      add(chart, std::move(point), mean_over(trials, score));
+      add(chart, std::move(point), compositing::mean_over(trials, score));
     };
     add_peer("FFmpeg chromakey + despill", &SceneTrial::ffmpeg,
              [&] { compositing::key_as_ffmpeg(frame.seen, key, compositing::tuned_ffmpeg); });

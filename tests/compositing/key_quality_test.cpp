@@ -1,6 +1,5 @@
 // How good the key is on made clips, beside other tools' formulas, with one setting for all.
 #include <gtest/gtest.h>
-#include <tbb/parallel_for.h>
 
 #include <iostream>
 #include <vector>
@@ -13,21 +12,6 @@ namespace {
 // Not those of the table (31 to 36), nor of the dials (21, 22).
 constexpr std::uint32_t judged_seeds[] = {1, 2, 3};
 
-std::vector<SceneTrial> judge(std::span<const MadeScene> scenes,
-                              std::span<const std::uint32_t> seeds,
-                              const TrialSize& size) {
-  std::vector<SceneTrial> trials(scenes.size());
-  tbb::parallel_for(std::size_t{0}, scenes.size(),
-                    [&](std::size_t i) { trials[i] = judge_scene(scenes[i], seeds, {}, size); });
-  return trials;
-}
-
-KeyScore mean_over(const std::vector<SceneTrial>& trials, KeyScore SceneTrial::*method) {
-  std::vector<KeyScore> scores;
-  for (const SceneTrial& trial : trials) scores.push_back(trial.*method);
-  return mean_of(scores);
-}
-
 void print(std::string_view name, const KeyScore& s) {
   std::cout << "  " << name << " dE " << s.error.composite << " edge " << s.error.edge << " mse "
             << s.error.alpha_mse << " flicker " << s.flicker << '\n';
@@ -39,7 +23,7 @@ TEST(KeyQuality, HoldsOnAFewScenesOfOtherSeeds) {
     scenes.push_back(made_scene(name));
   }
   const TrialSize size{270, 480, 12, 6};
-  const auto trials = judge(scenes, {judged_seeds, 1}, size);
+  const auto trials = judge_scenes(scenes, {judged_seeds, 1}, {}, size);
   const KeyScore ours = mean_over(trials, &SceneTrial::ours);
   EXPECT_LE(ours.error.composite, 0.55);
   EXPECT_LE(ours.error.edge, 1.3);
@@ -55,7 +39,7 @@ TEST(KeyQuality, HoldsOnAFewScenesOfOtherSeeds) {
 
 TEST(KeyQuality, HoldsOverAllScenesSeedsAndFrames) {
   if (!PLATELIGHT_FULL_TESTS) GTEST_SKIP() << "takes minutes: tests/run.sh --full";
-  const auto trials = judge(made_scenes(), judged_seeds, {});
+  const auto trials = judge_scenes(made_scenes(), judged_seeds, {});
   const KeyScore ours = mean_over(trials, &SceneTrial::ours);
   const KeyScore ffmpeg = mean_over(trials, &SceneTrial::ffmpeg);
   const KeyScore obs = mean_over(trials, &SceneTrial::obs);
