@@ -87,14 +87,7 @@ PersonSettings read_billboard_section(Section section, const SetContext& context
   read_source_key(section, "source", context.base, person.source);
   section.boolean("loop", person.loop);
   section.integer("frame", person.first, std::int64_t{0}, std::int64_t{1} << 40);
-  std::string colour;
-  if (section.text("colour", colour)) {
-    try {
-      person.colour = capture::transfer_from_name(colour);
-    } catch (const std::invalid_argument& error) {
-      section.fault("colour", fmt::format("\"{}\": {}", colour, error.what()));
-    }
-  }
+  read_colour(section, person.colour);
   section.colour("gain", person.gain, {0, 1e9});
   section.boolean("lit", person.lit);
   read_standing(section, context, person);

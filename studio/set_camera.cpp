@@ -96,16 +96,6 @@ void fit_lens(Section& section, const SetContext& context, CameraSettings& camer
                             camera.lens.width, camera.lens.height, show.width, show.height));
 }
 
-void read_colour(Section& section, capture::Transfer& colour) {
-  std::string name;
-  if (!section.text("colour", name)) return;
-  try {
-    colour = capture::transfer_from_name(name);
-  } catch (const std::invalid_argument& error) {
-    section.fault("colour", fmt::format("\"{}\": {}", name, error.what()));
-  }
-}
-
 void read_exposures(Section& section, ProbeSettings& probe) {
   section.number("exposure_error", probe.exposure_error, {0.001, 1});
   const TomlValue* given = section.value("exposures");
@@ -196,6 +186,16 @@ void read_probe_source(Section& section, const fs::path& base, ProbeSettings& pr
 }
 
 }  // namespace
+
+void read_colour(Section& section, capture::Transfer& colour) {
+  std::string name;
+  if (!section.text("colour", name)) return;
+  try {
+    colour = capture::transfer_from_name(name);
+  } catch (const std::invalid_argument& error) {
+    section.fault("colour", fmt::format("\"{}\": {}", name, error.what()));
+  }
+}
 
 calibrate::Pose read_fixed_pose(Section table) {
   if (table.has("look_at") == table.has("rotation")) {

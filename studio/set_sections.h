@@ -75,6 +75,9 @@ std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& con
 // The pose of a camera that stays where it is: position, and look_at or rotation.
 calibrate::Pose read_fixed_pose(Section table);
 
+// How a source's codes become light: `colour`.
+void read_colour(Section& section, capture::Transfer& colour);
+
 // A source's URI with its path made absolute and, where it names a file or directory, found.
 bool read_source_key(Section& section,
                      std::string_view key,

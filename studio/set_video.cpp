@@ -91,14 +91,7 @@ VideoSettings read_video_section(Section section, const SetContext& context, boo
   }
   section.colour("gain", video.gain, {0, 1e9});
   section.boolean("loop", video.loop);
-  std::string colour;
-  if (section.text("colour", colour)) {
-    try {
-      video.colour = capture::transfer_from_name(colour);
-    } catch (const std::invalid_argument& error) {
-      section.fault("colour", fmt::format("\"{}\": {}", colour, error.what()));
-    }
-  }
+  read_colour(section, video.colour);
   if (lights) {
     section.integers("samples", video.samples, 1, render::most_area_samples);
     section.number("ambient", video.ambient, {0, 1});
