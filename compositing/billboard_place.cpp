@@ -62,13 +62,11 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
   if (!to_camera) return std::nullopt;
 
   BillboardPlace place;
-  const double off = std::remainder(azimuth(standing, viewer).value_or(*to_camera) - *to_camera,
-                                    2 * std::numbers::pi);
-  const double most = std::clamp(turn_rad, 0.0, widest_turn_rad);
-  place.view_angle_rad = std::abs(off);
-  place.shallow = place.view_angle_rad > most;
-  const double facing = *to_camera + std::clamp(off, -most, most);
-  const Vec3 front{std::cos(facing), std::sin(facing), 0}, across{-front.y, front.x, 0};
+  const Facing facing = face(*to_camera, azimuth(standing, viewer).value_or(*to_camera), turn_rad);
+  place.view_angle_rad = facing.view_angle_rad;
+  place.shallow = facing.shallow;
+  const Vec3 front{std::cos(facing.azimuth_rad), std::sin(facing.azimuth_rad), 0},
+      across{-front.y, front.x, 0};
 
   const double away = dot(camera - standing, front);
   const double distance = calibrate::hypotenuse(camera.x - standing.x, camera.y - standing.y);
@@ -107,6 +105,12 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
   if (!std::ranges::all_of(place.set_from_object, [](float v) { return std::isfinite(v); }))
     return std::nullopt;
   return place;
+}
+
+Facing face(double own_rad, double viewer_rad, double turn_rad) {
+  const double off = std::remainder(viewer_rad - own_rad, 2 * std::numbers::pi);
+  const double most = std::clamp(turn_rad, 0.0, widest_turn_rad);
+  return {own_rad + std::clamp(off, -most, most), std::abs(off), std::abs(off) > most};
 }
 
 double parallax_m(double depth_m, double view_angle_rad) {

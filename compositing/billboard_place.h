@@ -31,6 +31,15 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
                                               calibrate::Vec3 viewer,
                                               double turn_rad);
 
+// An upright thing that turns to a viewer: azimuths about the vertical, of any one sense and zero.
+struct Facing {
+  double azimuth_rad = 0;
+  double view_angle_rad = 0;  // from its own azimuth to the viewer, 0..pi
+  bool shallow = false;       // that is more than it turns
+};
+// From `own_rad` towards `viewer_rad`, but at most `turn_rad` (0..1.3).
+Facing face(double own_rad, double viewer_rad, double turn_rad);
+
 // How far a point that stands `depth_m` off the plane is displaced, in metres at the person across
 // the view, for a view `view_angle_rad` away from the person's camera's: depth |sin(angle)|, for
 // views from afar and a plane that faces the person's camera.

@@ -235,10 +235,10 @@ void PersonFeed::place(Person& person, const calibrate::Pose& cam_from_set) {
   }
   // Faces the way that the set says, and from there turns to the camera.
   const double to_viewer = std::atan2(viewer.x - s.position.x, -(viewer.y - s.position.y));
-  const double off = std::remainder(to_viewer - s.yaw_rad, 2 * std::numbers::pi);
-  status.view_angle_deg = std::abs(off) / degree;
-  status.shallow = std::abs(off) > s.turn_rad;
-  const double turned = s.yaw_rad + std::clamp(off, -s.turn_rad, s.turn_rad);
+  const compositing::Facing facing = compositing::face(s.yaw_rad, to_viewer, s.turn_rad);
+  status.view_angle_deg = facing.view_angle_rad / degree;
+  status.shallow = facing.shallow;
+  const double turned = facing.azimuth_rad;
   const auto wide = static_cast<float>(s.height_m) * person.aspect;
   const auto c = static_cast<float>(std::cos(turned)), sine = static_cast<float>(std::sin(turned));
   const auto at = calibrate::to_float(s.position);
