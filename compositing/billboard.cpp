@@ -176,7 +176,8 @@ class BillboardShader final : public render::Shader {
                              float footprint_m) const override {
     const Block block = block_of(material);
     const std::array<float, 4> rgba = seen(context, material, block, hit, footprint_m);
-    return Layer{block.lit != 0 ? Vec3f{} : foreground(block, rgba), grey(1 - rgba[3])};
+    const Vec3f shown = foreground(block, rgba), passed = grey(1 - rgba[3]);
+    return block.lit != 0 ? Layer{{}, passed, shown} : Layer{shown, passed};
   }
 
   // A hole is where the camera does not see; how clear a place is within its picture depends on how

@@ -375,16 +375,20 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
   leave(direction);
 }
 
-// Goes on behind a picture. False if there is nothing more to see.
-bool PathTracer::pass_picture(Walk& w, const HitPoint& hit) const {
+// What a picture shows; nothing of other surfaces.
+std::optional<Layer> PathTracer::layer_at(const HitPoint& hit) const {
+  if (!materials_[hit.material].picture) return std::nullopt;
   const SceneDescription& description = scene_.description();
-  const auto layer = scene_.shader_of(hit.material)
-                         .layer({&description, &scene_, scene_.pictures()},
-                                description.materials[hit.material], hit, 0);
-  if (!layer) return false;
-  w.result.radiance += times(w.glow_share, layer->radiance);
-  w.share = times(w.share, layer->passed);
-  w.glow_share = times(w.glow_share, layer->passed);
+  return scene_.shader_of(hit.material)
+      .layer({&description, &scene_, scene_.pictures()}, description.materials[hit.material], hit,
+             0);
+}
+
+// Goes on behind a picture that is not lit. False if there is nothing more to see.
+bool PathTracer::pass_layer(Walk& w, const HitPoint& hit, const Layer& layer) {
+  w.result.radiance += times(w.glow_share, layer.radiance);
+  w.share = times(w.share, layer.passed);
+  w.glow_share = times(w.glow_share, layer.passed);
   w.origin = offset_origin(hit, w.direction);
   return w.share != Vec3f{};
 }
@@ -420,8 +424,9 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
       if (!survives(w, numbers)) break;
       continue;
     }
-    if (materials_[hit.material].picture) {
-      if (!pass_picture(w, hit)) break;
+    const std::optional<Layer> layer = layer_at(hit);
+    if (layer && layer->albedo == Vec3f{}) {
+      if (!pass_layer(w, hit, *layer)) break;
       if (!survives(w, numbers)) break;
       continue;
     }
@@ -431,9 +436,10 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
       surface.clearcoat_roughness = std::max(surface.clearcoat_roughness, caustic_roughness);
     }
     const Vec3f view = -w.direction;
-    const StandardWeights weights = materials_[hit.material].matte
-                                        ? StandardWeights{.diffuse = surface.base}
-                                        : standard_weights(surface, view);
+    const StandardWeights weights =
+        layer ? StandardWeights{.diffuse = layer->albedo, .transmission = layer->passed}
+        : materials_[hit.material].matte ? StandardWeights{.diffuse = surface.base}
+                                         : standard_weights(surface, view);
     w.result.radiance += times(w.glow_share, surface.emission);
     const bool split = w.kind == RayKind::camera && w.depth < split_depth;
     const PathLobes lobes(surface, weights, rules_.diffuse_bounces, split);

@@ -36,6 +36,8 @@ struct CameraPath {
   Vec3f incoming;
 };
 
+struct Layer;  // shader.h
+
 // The lobes of a surface, and one of them: inside.
 struct PathLobes;
 enum class PathLobe : std::uint8_t;
@@ -89,7 +91,8 @@ class PathTracer {
                           Vec3f view,
                           SampleSequence& numbers) const;
   void pass_glass(Walk& w, const HitPoint& hit, SampleSequence& numbers) const;
-  bool pass_picture(Walk& w, const HitPoint& hit) const;
+  std::optional<Layer> layer_at(const HitPoint& hit) const;
+  static bool pass_layer(Walk& w, const HitPoint& hit, const Layer& layer);
   bool scatter(Walk& w,
                const HitPoint& hit,
                const StandardSurface& surface,

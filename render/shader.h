@@ -104,6 +104,7 @@ struct ShadeContext {
 struct Layer {
   Vec3f radiance;
   Vec3f passed;
+  Vec3f albedo = {};  // of a matte one that the set's light falls on, as far as it covers
 };
 
 class Shader {
@@ -133,8 +134,8 @@ class Shader {
     static_cast<void>(material);
     return std::nullopt;
   }
-  // Of shaders that only glow and let light pass straight on: what shade() gives, for the
-  // reference's paths, which do not light such surfaces. `footprint_m`: width of the square of
+  // Of shaders that glow or are matte, and let light pass straight on: what shade() gives, for the
+  // reference's paths. `footprint_m`: width of the square of
   // surface whose mean is wanted.
   virtual std::optional<Layer> layer(const ShadeContext& context,
                                      const Material& material,

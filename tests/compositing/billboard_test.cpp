@@ -139,8 +139,8 @@ TEST(Billboard, LeavesThePlateItsBitsWhereItIsClear) {
 }
 
 // A person on a floor that catches the shadow, with a mirror behind and a glass ball in front.
-render::SceneDescription furnished() {
-  render::SceneDescription scene = scene_with(make_billboard_material("person", {}));
+render::SceneDescription furnished(bool lit = false) {
+  render::SceneDescription scene = scene_with(make_billboard_material("person", {.lit = lit}));
   scene.materials.push_back(make_stand_in_material("floor", {}));
   render::StandardParameters silver;
   silver.metallic = 1;
@@ -161,19 +161,115 @@ render::SceneDescription furnished() {
   return scene;
 }
 
+// Glowing, and lit.
 TEST(Billboard, CastsShadowsAndIsMirroredAndRefractedAsTheReferenceHasIt) {
-  MadeShot shot = shot_of(furnished(), {figure()});
-  shot.job.effort.light_samples = 256;
-  shot.job.lights = even_lights(256);
-  shot.job.effort.accuracy = 0.99F;
-  shot.job.effort.aa_tolerance = 0.02F;
-  const capture::Image seen = picture_of(shot);
-  const capture::Image plate = capture::to_float(shot.plate);
-  render::ReferenceSettings settings;
-  settings.samples = 256;
-  const capture::Image truth = render_reference(shot.inputs(), shot.job, plate, settings);
-  const capture::Image mask = render::affected_mask(truth, plate);
-  EXPECT_LT(render::picture_error(seen, truth, mask).relative_rms, 0.01);
+  for (const bool lit : {false, true}) {
+    MadeShot shot = shot_of(furnished(lit), {figure()});
+    shot.job.effort.light_samples = 256;
+    shot.job.lights = even_lights(256);
+    shot.job.effort.accuracy = 0.99F;
+    shot.job.effort.aa_tolerance = 0.02F;
+    if (lit) shot.environment = made_sky(32, 0, 1);  // all of its light is in the table
+    const capture::Image seen = picture_of(shot);
+    const capture::Image plate = capture::to_float(shot.plate);
+    render::ReferenceSettings settings;
+    settings.samples = 256;
+    const capture::Image truth = render_reference(shot.inputs(), shot.job, plate, settings);
+    settings.seed = 2;
+    const capture::Image again = render_reference(shot.inputs(), shot.job, plate, settings);
+    const capture::Image mask = render::affected_mask(truth, plate);
+    EXPECT_LT(render::picture_error(seen, {truth, again}, mask).relative_rms, 0.01) << lit;
+  }
+}
+
+constexpr std::array albedo{0.6F, 0.3F, 0.1F};
+
+// Everywhere the same, of that albedo.
+std::shared_ptr<const KeyedPicture> board(float alpha) {
+  return picture_from(16, 32, [&](int, int) {
+    return std::array{alpha * albedo[0], alpha * albedo[1], alpha * albedo[2], alpha};
+  });
+}
+
+// A board over a floor, in the shadow of a ball.
+render::SceneDescription shaded(const render::Material& material) {
+  render::SceneDescription scene = scene_with(material);
+  scene.materials.push_back(make_stand_in_material("floor", {}));
+  scene.materials.push_back(render::make_standard_material("ball", {}));
+  scene.meshes.push_back(made_floor(20, 1));
+  scene.meshes.push_back(made_ball({0.3F, -0.7F, 1.7F}, 0.3F, 2));
+  for (std::uint32_t mesh = 1; mesh < 3; ++mesh) scene.instances.emplace_back().mesh = mesh;
+  scene.instances[1].kind = render::ObjectKind::stand_in;
+  scene.instances[1].blocks_light = false;
+  return scene;
+}
+
+render::FrameResult rendered(const MadeShot& shot) {
+  render::FrameResult result;
+  render::render_frame(shot.inputs(), shot.job, shot.plate, result);
+  return result;
+}
+
+TEST(Billboard, IsWhenLitAsAMatteBoardOfItsAlbedo) {
+  render::StandardParameters paint;
+  std::ranges::copy(albedo, paint.base_color);
+  paint.roughness = 1;
+  paint.specular = 0;
+  // Each pixel tests each light: what is shared between neighbours depends on where edges are.
+  const auto seen_of = [](const render::Material& material, render::Scene::Pictures pictures) {
+    MadeShot shot = shot_of(shaded(material), std::move(pictures));
+    shot.job.effort.adaptive_visibility = false;
+    return picture_of(shot);
+  };
+  const capture::Image board_seen = seen_of(render::make_standard_material("board", paint), {});
+  const capture::Image lit_seen =
+      seen_of(make_billboard_material("person", {.lit = true}), {board(1)});
+  int compared = 0;
+  float darkest = 1e9F, brightest = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (lit_seen.at(y, x, 3) < 1 || board_seen.at(y, x, 3) < 1) continue;
+      const float red = board_seen.at(y, x, 0);
+      if (std::abs(red - 6 * board_seen.at(y, x, 2)) > 0.01F * red) continue;  // the ball's
+      ++compared;
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_NEAR(lit_seen.at(y, x, c), board_seen.at(y, x, c), 0.003F) << x << " " << y;
+      }
+      darkest = std::min(darkest, lit_seen.at(y, x, 0));
+      brightest = std::max(brightest, lit_seen.at(y, x, 0));
+    }
+  }
+  EXPECT_GT(compared, 2000);
+  EXPECT_LT(darkest, 0.9F * brightest) << "the ball's shadow is on it";
+}
+
+TEST(Billboard, LetsLightThroughByAlphaWhenLit) {
+  const auto of = [](float alpha) {
+    return rendered(
+        shot_of(shaded(make_billboard_material("person", {.lit = true})), {board(alpha)}));
+  };
+  constexpr float alpha = 0.4F;
+  const render::FrameResult none = of(0), part = of(alpha), whole = of(1);
+  const auto at = [](const capture::HalfImage& image, std::size_t i) {
+    return capture::float_from_half(image.pixels[i]);
+  };
+  int on_board = 0, in_shadow = 0;
+  for (std::size_t i = 0; i < part.matte.pixels.size(); ++i) {
+    // A pixel of the board, before the floor or the plate; or of the floor in the board's shadow.
+    const bool board_only = at(whole.rgba, i * 4 + 3) == 1 && at(none.rgba, i * 4 + 3) == 0;
+    const bool floor_only = at(whole.rgba, i * 4 + 3) == 0;
+    const float darker = at(whole.matte, i) - at(none.matte, i);
+    if (!board_only && !(floor_only && darker > 0.05F)) continue;
+    for (std::size_t c = 0; c < 4; ++c) {
+      const float mixed =
+          (1 - alpha) * at(none.rgba, i * 4 + c) + alpha * at(whole.rgba, i * 4 + c);
+      // Behind the board, the floor is in its shadow as well.
+      ASSERT_NEAR(at(part.rgba, i * 4 + c), mixed, board_only && c < 3 ? 0.06F : 0.01F) << i;
+    }
+    (board_only ? on_board : in_shadow) += 1;
+  }
+  EXPECT_GT(on_board, 1000);
+  EXPECT_GT(in_shadow, 200);
 }
 
 TEST(Billboard, IsTheSameWithWhatIsKeptFromOtherPictures) {
