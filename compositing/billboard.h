@@ -5,8 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "calibrate/lens.h"
-#include "calibrate/pose.h"
+#include "compositing/camera_grid.h"
 #include "render/mesh.h"
 #include "render/video_texture.h"
 
@@ -19,14 +18,6 @@ struct BillboardSettings {
   // The picture as it is, or as the albedo of a matte surface in the set's light.
   bool lit = false;
 };
-
-// The camera that filmed the person: its picture is projected from there, so that it is exact as
-// seen from there, wherever the rectangle stands.
-struct BillboardCamera {
-  calibrate::Lens lens;  // of the whole picture; sees less than widest_billboard_rad off its axis
-  calibrate::Pose cam_from_set;
-};
-inline constexpr double widest_billboard_rad = 1.3;
 
 // Registers the shader "billboard": a part of register_shaders() (stand_in.h).
 //

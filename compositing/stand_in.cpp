@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "compositing/billboard.h"
+#include "compositing/visual_hull.h"
 #include "render/shader.h"
 #include "render/standard.h"
 #include "render/trace.h"
@@ -87,6 +88,7 @@ class PlateBackground final : public render::BackgroundShader {
 void register_shaders() {
   render::register_shader("stand_in", std::make_shared<StandInShader>());
   register_billboards();
+  register_hulls();
   render::register_background("plate", std::make_shared<PlateBackground>());
 }
 

@@ -6,8 +6,8 @@
 
 namespace compositing {
 
-// Registers the shaders "stand_in" and "billboard" (billboard.h) and the background "plate". Call
-// once, before scenes are built.
+// Registers the shaders "stand_in", "billboard" (billboard.h) and "hull" (visual_hull.h), and the
+// background "plate". Call once, before scenes are built.
 //
 // A stand-in is a real surface that the plate shows. Per colour it gives
 //   out = plate (1 - lost/E) + (albedo/pi) E_virtual + F (L_hit - L_env),

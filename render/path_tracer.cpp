@@ -185,8 +185,9 @@ PathTracer::PathTracer(const Scene& scene,
       surfacing.matte = true;
     } else if (material.shader == "glass") {
       surfacing.glass = true;
-    } else if (scene.shader_of(static_cast<std::uint32_t>(materials_.size()))
-                   .picture_of(material)) {
+    } else if (!scene.shader_of(static_cast<std::uint32_t>(materials_.size()))
+                    .pictures_of(material)
+                    .empty()) {
       surfacing.picture = true;
     } else {
       surfacing.parameters =
@@ -376,12 +377,12 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
 }
 
 // What a picture shows; nothing of other surfaces.
-std::optional<Layer> PathTracer::layer_at(const HitPoint& hit) const {
+std::optional<Layer> PathTracer::layer_at(const Walk& w, const HitPoint& hit) const {
   if (!materials_[hit.material].picture) return std::nullopt;
   const SceneDescription& description = scene_.description();
   return scene_.shader_of(hit.material)
       .layer({&description, &scene_, scene_.pictures()}, description.materials[hit.material], hit,
-             0);
+             w.direction, w.kind, 0);
 }
 
 // Goes on behind a picture that is not lit. False if there is nothing more to see.
@@ -424,7 +425,7 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
       if (!survives(w, numbers)) break;
       continue;
     }
-    const std::optional<Layer> layer = layer_at(hit);
+    const std::optional<Layer> layer = layer_at(w, hit);
     if (layer && layer->albedo == Vec3f{}) {
       if (!pass_layer(w, hit, *layer)) break;
       if (!survives(w, numbers)) break;

@@ -91,7 +91,7 @@ class PathTracer {
                           Vec3f view,
                           SampleSequence& numbers) const;
   void pass_glass(Walk& w, const HitPoint& hit, SampleSequence& numbers) const;
-  std::optional<Layer> layer_at(const HitPoint& hit) const;
+  std::optional<Layer> layer_at(const Walk& w, const HitPoint& hit) const;
   static bool pass_layer(Walk& w, const HitPoint& hit, const Layer& layer);
   bool scatter(Walk& w,
                const HitPoint& hit,

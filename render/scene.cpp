@@ -149,8 +149,14 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
                           unsigned lane,
                           RayKind kind) const {
   const unsigned n = args->N;
-  const Vec3f incoming{RTCRayN_dir_x(args->ray, n, lane), RTCRayN_dir_y(args->ray, n, lane),
-                       RTCRayN_dir_z(args->ray, n, lane)};
+  Vec3f incoming{RTCRayN_dir_x(args->ray, n, lane), RTCRayN_dir_y(args->ray, n, lane),
+                 RTCRayN_dir_z(args->ray, n, lane)};
+  const unsigned inst_id = RTCHitN_instID(args->hit, n, lane, 0);
+  if (inst_id != RTC_INVALID_GEOMETRY_ID && instance_of_geometry[inst_id] != Part::none) {
+    // Inside an instance the ray is in the object's frame.
+    const Instance& placing = description.instances[instance_of_geometry[inst_id]];
+    incoming = transform_vector(placing.set_from_object, incoming);
+  }
   const HitPoint hit =
       hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
@@ -347,6 +353,9 @@ Scene::Bounds Scene::blocker_bounds() const { return impl_->blocker_bounds; }
 const std::vector<Scene::Bounds>& Scene::blocker_boxes() const { return impl_->blocker_boxes; }
 std::size_t Scene::skipped_triangles() const { return impl_->compiled->skipped; }
 const Scene::Pictures& Scene::pictures() const { return impl_->pictures; }
+bool Scene::shows_pictures(std::uint32_t instance) const {
+  return !impl_->compiled->pictures_of_mesh[impl_->description.instances[instance].mesh].empty();
+}
 const Scene::Places& Scene::places() const { return impl_->places; }
 
 std::optional<std::vector<Scene::Bounds>> Scene::moved(const Places& before, const Places& now) {

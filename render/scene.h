@@ -145,12 +145,13 @@ class Scene {
   const std::vector<Bounds>& blocker_boxes() const;
   std::size_t skipped_triangles() const;
   const Pictures& pictures() const;
+  bool shows_pictures(std::uint32_t instance) const;  // whether any is live on it
   // Where the moving instances of a scene stand, what they show, and what else it is made of.
   struct Places {
     std::uint64_t parts = 0;  // differs between scenes that share nothing
     std::vector<std::array<float, 12>> set_from_object;
     std::vector<Bounds> bounds;
-    Pictures pictures;  // of each, or null
+    std::vector<Pictures> pictures;  // that each shows
   };
   const Places& places() const;
   // Bounds, before and after, of what stands elsewhere in `now` or shows another picture; nothing

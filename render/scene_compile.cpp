@@ -108,17 +108,16 @@ void Scene::Compiled::build(const SceneDescription& description) {
 
 void Scene::Compiled::find_pictures(const SceneDescription& description) {
   for (const auto& mesh : description.meshes) {
-    std::optional<std::size_t>& shown = picture_of_mesh.emplace_back();
+    std::vector<std::size_t>& shown = pictures_of_mesh.emplace_back();
     for (const std::uint32_t material : mesh->materials) {
-      const auto picture = shaders[material]->picture_of(description.materials[material]);
-      if (picture && shown && *picture != *shown) {
-        throw std::invalid_argument("scene: a mesh shows two live pictures");
+      for (const std::size_t picture :
+           shaders[material]->pictures_of(description.materials[material])) {
+        if (std::ranges::find(shown, picture) == shown.end()) shown.push_back(picture);
       }
-      if (picture) shown = picture;
     }
   }
   for (const Instance& instance : description.instances) {
-    if (picture_of_mesh[instance.mesh] && !instance.moves) {
+    if (!pictures_of_mesh[instance.mesh].empty() && !instance.moves) {
       throw std::invalid_argument("scene: object " + instance.name +
                                   " shows a live picture, but is not one that moves");
     }
@@ -165,12 +164,14 @@ void Scene::Impl::assemble() {
     normal_matrices[i] = normal_matrix(instance.set_from_object);
     const Bounds bounds = placed_bounds(c.mesh_bounds[instance.mesh], instance.set_from_object);
     places.set_from_object.push_back(instance.set_from_object);
-    const std::optional<std::size_t>& picture = c.picture_of_mesh[instance.mesh];
-    if (picture && (*picture >= pictures.size() || !pictures[*picture])) {
-      throw std::invalid_argument("scene: object " + instance.name +
-                                  " shows a live picture that is not there");
+    Pictures& shown = places.pictures.emplace_back();
+    for (const std::size_t picture : c.pictures_of_mesh[instance.mesh]) {
+      if (picture >= pictures.size() || !pictures[picture]) {
+        throw std::invalid_argument("scene: object " + instance.name +
+                                    " shows a live picture that is not there");
+      }
+      shown.push_back(pictures[picture]);
     }
-    places.pictures.push_back(picture ? pictures[*picture] : nullptr);
     places.bounds.push_back(bounds);
     all_bounds = joined(all_bounds, bounds);
     if (instance.kind == ObjectKind::virtual_object) {

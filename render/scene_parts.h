@@ -48,7 +48,7 @@ struct Scene::Compiled {
   std::vector<std::vector<const Part*>> parts_of_mesh;  // inside instanced scenes
   std::vector<std::array<float, 9>> normal_matrices;    // per instance; of what moves, as it began
   std::vector<Bounds> mesh_bounds;                      // of meshes that move, in their own frame
-  std::vector<std::optional<std::size_t>> picture_of_mesh;    // of the scene's, that it shows
+  std::vector<std::vector<std::size_t>> pictures_of_mesh;     // of the scene's, that it shows
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds;  // of what does not move
   std::vector<Bounds> blocker_boxes;                          // of it
   std::size_t skipped = 0;

@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render/environment.h"
 #include "render/glass.h"
@@ -100,7 +101,7 @@ struct ShadeContext {
   std::span<const std::shared_ptr<const LivePicture>> pictures = {};
 };
 
-// What a flat picture adds to what is behind it, and the share of that which it lets pass.
+// What a picture adds to what is behind it, and the share of that which it lets pass.
 struct Layer {
   Vec3f radiance;
   Vec3f passed;
@@ -128,21 +129,23 @@ class Shader {
     static_cast<void>(material);
     return std::nullopt;
   }
-  // The scene's live picture that the material shows, if it shows one. What its instances hide and
-  // show changes with it, as if they moved.
-  virtual std::optional<std::size_t> picture_of(const Material& material) const {
+  // The scene's live pictures that the material shows. What its instances hide and show changes
+  // with any of them, as if they moved. Called when scenes are compiled.
+  virtual std::vector<std::size_t> pictures_of(const Material& material) const {
     static_cast<void>(material);
-    return std::nullopt;
+    return {};
   }
   // Of shaders that glow or are matte, and let light pass straight on: what shade() gives, for the
-  // reference's paths. `footprint_m`: width of the square of
-  // surface whose mean is wanted.
+  // reference's paths. `incoming`: unit, direction of the ray, which is of that kind;
+  // `footprint_m`: width of the square of surface whose mean is wanted.
   virtual std::optional<Layer> layer(const ShadeContext& context,
                                      const Material& material,
                                      const HitPoint& hit,
+                                     Vec3f incoming,
+                                     RayKind kind,
                                      float footprint_m) const {
     static_cast<void>(context), static_cast<void>(material), static_cast<void>(hit);
-    static_cast<void>(footprint_m);
+    static_cast<void>(incoming), static_cast<void>(kind), static_cast<void>(footprint_m);
     return std::nullopt;
   }
   // RGB share of light that passes straight through here. For `camera`, `reflection`, `difference`

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "made_walker.h"
+#include "compositing/made_walker.h"
 
 namespace compositing {
 namespace {

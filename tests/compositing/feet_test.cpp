@@ -10,7 +10,7 @@
 #include <random>
 
 #include "capture/camera.h"
-#include "made_walker.h"
+#include "compositing/made_walker.h"
 
 namespace compositing {
 namespace {
