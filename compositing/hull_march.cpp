@@ -11,12 +11,13 @@ namespace {
 using calibrate::Vec3f;
 
 constexpr float opaque = 0.998F;
-constexpr int most_levels = 12;    // of halving a ray
-constexpr int stride = 2;          // levels at a time
-constexpr int bisections = 4;      // of a step, where the surface is
-constexpr float nearest_m = 0.1F;  // depth before a camera at which steps are no finer
-constexpr float margin = 1.5F;     // of squares that must be empty: filters fade at their rims
-constexpr float speck_px = 0.02F;  // alpha times area, in pixels, that counts as nothing
+constexpr int most_levels = 12;        // of halving a ray
+constexpr int stride = 2;              // levels at a time
+constexpr int bisections = 4;          // of a step, where the surface is
+constexpr float nearest_m = 0.1F;      // depth before a camera at which steps are no finer
+constexpr float margin = 1.5F;         // of look-ups, in widths
+constexpr float bend = 0.02F;          // of a piece of a ray in a picture
+constexpr float nothing = 1.5F / 255;  // alpha that is not looked for
 
 bool is_within(GridPlace p) { return p.u >= 0 && p.u <= 1 && p.v >= 0 && p.v <= 1; }
 
@@ -47,41 +48,40 @@ float HullMarch::alpha_at(const Lines& lines, float t, float least) const {
   return seen ? alpha : 0;
 }
 
-// Whether the camera sees all of a piece of the ray, and nothing there.
-bool HullMarch::is_empty(const Lines& lines, std::size_t view, float from, float to) const {
-  const MarchView& v = block_.view[view];
-  const auto first = place_at(lines, view, from), last = place_at(lines, view, to);
-  const auto middle = place_at(lines, view, 0.5F * (from + to));
-  if (!first || !last || !middle) return false;
-  const float uv_per_px = v.camera.uv_per_tangent / v.px_per_tangent;
-  const auto distance = [&](const Vec3f& a, const Vec3f& b) {
-    return std::hypot(a.x / a.z - b.x / b.z, a.y / a.z - b.y / b.z) * v.camera.uv_per_tangent;
-  };
-  const auto at = [&](float t) { return lines.begin[view] + lines.along[view] * t; };
-  const Vec3f m = at(0.5F * (from + to));
-  const float half = std::max(distance(at(from), m), distance(at(to), m));
-  const float width_uv =
-      margin * (2 * half + std::max({first->width_uv, last->width_uv, uv_per_px}));
-  const float alpha = pictures_[v.picture]->look_up(middle->place.u, middle->place.v, width_uv)[3];
-  const float width_px = width_uv / uv_per_px;
-  return alpha * width_px * width_px < speck_px;
+// What no alpha on a piece of the ray exceeds in the camera's picture, if the camera sees all of
+// it.
+float HullMarch::most_between(std::size_t view,
+                              const std::optional<Place>& first,
+                              const std::optional<Place>& middle,
+                              const std::optional<Place>& last) const {
+  if (!first || !last || !middle) return 1;
+  const auto [u0, u1] = std::minmax({first->place.u, middle->place.u, last->place.u});
+  const auto [v0, v1] = std::minmax({first->place.v, middle->place.v, last->place.v});
+  // Pictures are rarely twice as high as wide, or as wide as high; lenses bend lines.
+  const float width_uv = std::max({first->width_uv, middle->width_uv, last->width_uv});
+  const float rim = margin * width_uv + bend * (u1 - u0 + v1 - v0);
+  return pictures_[block_.view[view].picture]->most_alpha(u0 - rim, v0 - rim, u1 + rim, v1 + rim);
 }
 
 // How often the ray is halved until no picture is crossed by longer steps than asked for.
-int HullMarch::levels_of(const Lines& lines, float from, float to) const {
+int HullMarch::levels_of(const Lines& lines, float from, float to, float coarser) const {
   float steps = 1;
   for (std::size_t i = 0; i < block_.views; ++i) {
     const Vec3f a = lines.begin[i], b = lines.along[i];
     const float across = std::hypot(b.x * a.z - b.z * a.x, b.y * a.z - b.z * a.y);
     const float z = std::max(std::min(a.z + b.z * from, a.z + b.z * to), nearest_m);
     const float px = across / (z * z) * (to - from) * block_.view[i].px_per_tangent;
-    if (px > steps * block_.step_px) steps = px / block_.step_px;  // nor where it is no number
+    const float step_px = block_.step_px * coarser;
+    if (px > steps * step_px) steps = px / step_px;  // nor where it is no number
   }
   const float most = static_cast<float>(1 << most_levels);
   return std::bit_width(static_cast<unsigned>(std::ceil(std::min(steps, most))) - 1U);
 }
 
-HullMarch::Crossing HullMarch::find(const HullRay& ray, float from_m, float to_m) const {
+HullMarch::Crossing HullMarch::find(const HullRay& ray,
+                                    float from_m,
+                                    float to_m,
+                                    float coarser) const {
   Crossing found;
   found.far_m = to_m;
   if (!(to_m > from_m) || !std::isfinite(to_m)) return found;
@@ -92,7 +92,7 @@ HullMarch::Crossing HullMarch::find(const HullRay& ray, float from_m, float to_m
     lines.begin[i] = in_camera(camera, ray.origin);
     lines.along[i] = turned_to_camera(camera, ray.direction);
   }
-  const int levels = levels_of(lines, from_m, to_m);
+  const int levels = levels_of(lines, from_m, to_m, coarser);
   const unsigned count = 1U << levels;
   const float step = (to_m - from_m) / static_cast<float>(count);
   const auto begin_of = [&](unsigned i) { return from_m + step * static_cast<float>(i); };
@@ -106,12 +106,20 @@ HullMarch::Crossing HullMarch::find(const HullRay& ray, float from_m, float to_m
   float half_at = from_m, alpha_there = 0;
   int level = levels;
   std::size_t emptied = 0;  // the camera that saw nothing last
+  std::array<std::optional<Place>, most_hull_views> begins;
+  std::array<unsigned, most_hull_views> begins_at;
+  begins_at.fill(count);
   for (unsigned i = 0; i < count;) {
     const unsigned width = 1U << level;
     bool empty = false;
     for (std::size_t k = 0; k < block_.views && level > 0 && !empty; ++k) {
       const std::size_t view = (emptied + k) % block_.views;
-      empty = is_empty(lines, view, begin_of(i), begin_of(i + width));
+      if (begins_at[view] != i) begins[view] = place_at(lines, view, begin_of(i));
+      begins_at[view] = i;
+      if (!begins[view]) continue;
+      const float from = begin_of(i), to = begin_of(i + width);
+      empty = most_between(view, begins[view], place_at(lines, view, 0.5F * (from + to)),
+                           place_at(lines, view, to)) <= std::max(found.alpha, nothing);
       if (empty) emptied = view;
     }
     if (level > 0 && !empty) {

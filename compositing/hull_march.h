@@ -52,9 +52,9 @@ class HullMarch {
     float far_m = 0;  // nothing beyond was looked at
   };
   // Follows the ray from `from_m` to `to_m`, and no further than to what is as good as opaque,
-  // which counts as 1. Steps are no longer than the block's in the picture that is nearest; what
-  // is empty in a picture is passed at once, by its coarser levels.
-  Crossing find(const HullRay& ray, float from_m, float to_m) const;
+  // which counts as 1. Steps are no longer than the block's in the picture that is nearest, times
+  // `coarser`; what a picture says is empty is passed at once (LivePicture::most_alpha).
+  Crossing find(const HullRay& ray, float from_m, float to_m, float coarser = 1) const;
 
   // What a camera sees at a place, in a square so wide; nothing if it does not see that far.
   std::optional<std::array<float, 4>> look(std::size_t view,
@@ -73,8 +73,11 @@ class HullMarch {
   };
   std::optional<Place> place_at(const Lines& lines, std::size_t view, float t) const;
   float alpha_at(const Lines& lines, float t, float least) const;
-  bool is_empty(const Lines& lines, std::size_t view, float from, float to) const;
-  int levels_of(const Lines& lines, float from, float to) const;
+  float most_between(std::size_t view,
+                     const std::optional<Place>& first,
+                     const std::optional<Place>& middle,
+                     const std::optional<Place>& last) const;
+  int levels_of(const Lines& lines, float from, float to, float coarser) const;
   std::span<const std::byte> places_of(std::size_t view) const {
     return places_.subspan(block_.view[view].first_byte);
   }

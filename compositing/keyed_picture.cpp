@@ -68,9 +68,55 @@ std::array<float, 4> filtered(const render::VideoTexture& texture,
 
 }  // namespace
 
-KeyedPicture::KeyedPicture(std::shared_ptr<const render::VideoTexture> texture)
+KeyedPicture::KeyedPicture(std::shared_ptr<const render::VideoTexture> texture, bool bounded)
     : texture_(std::move(texture)) {
   check_frame(texture_);
+  if (!bounded) return;
+  const capture::Image& image = texture_->levels.front();
+  Bounds level{image.width, image.height, {}};
+  level.most.assign(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height),
+                    255);
+  for (std::size_t i = 0; image.channels == 4 && i < level.most.size(); ++i) {
+    const float alpha = std::clamp(image.pixels[4 * i + 3], 0.0F, 1.0F);
+    level.most[i] = static_cast<std::uint8_t>(std::ceil(alpha * 255));
+  }
+  bounds_.push_back(std::move(level));
+  while (bounds_.back().width > 1 || bounds_.back().height > 1) {
+    const Bounds& fine = bounds_.back();
+    Bounds coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+    coarse.most.assign(
+        static_cast<std::size_t>(coarse.width) * static_cast<std::size_t>(coarse.height), 0);
+    for (int y = 0; y < fine.height; ++y) {
+      for (int x = 0; x < fine.width; ++x) {
+        std::uint8_t& most = coarse.most[static_cast<std::size_t>(y / 2 * coarse.width + x / 2)];
+        most = std::max(most, fine.most[static_cast<std::size_t>(y * fine.width + x)]);
+      }
+    }
+    bounds_.push_back(std::move(coarse));
+  }
+}
+
+float KeyedPicture::most_alpha(float u0, float v0, float u1, float v1) const {
+  if (bounds_.empty()) return 1;
+  // Interpolation reaches a texel further.
+  const auto texel = [](float place, int size, int further) {
+    const float at = std::clamp(place, 0.0F, 1.0F) * static_cast<float>(size);
+    return std::clamp(static_cast<int>(at) + further, 0, size - 1);
+  };
+  if (!(u1 >= u0 && v1 >= v0)) return 1;
+  const int width = bounds_[0].width, height = bounds_[0].height;
+  const int x0 = texel(u0, width, -1), x1 = texel(u1, width, 1);
+  const int y0 = texel(v0, height, -1), y1 = texel(v1, height, 1);
+  std::size_t k = 0;
+  while ((x1 >> k) - (x0 >> k) > 1 || (y1 >> k) - (y0 >> k) > 1) ++k;
+  const Bounds& level = bounds_[k];
+  std::uint8_t most = 0;
+  for (int y = y0 >> k; y <= y1 >> k; ++y) {
+    for (int x = x0 >> k; x <= x1 >> k; ++x) {
+      most = std::max(most, level.most[static_cast<std::size_t>(y * level.width + x)]);
+    }
+  }
+  return static_cast<float>(most) / 255;
 }
 
 std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv) const {

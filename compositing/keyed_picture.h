@@ -1,7 +1,9 @@
 // A keyed frame as a live picture, filtered by mip levels.
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "compositing/keyer.h"
 #include "render/live_picture.h"
@@ -13,13 +15,22 @@ namespace compositing {
 // channels is opaque.
 class KeyedPicture final : public render::LivePicture {
  public:
-  // Throws std::invalid_argument if there is no texture or it is empty.
-  explicit KeyedPicture(std::shared_ptr<const render::VideoTexture> texture);
+  // `bounded`: most_alpha() says more than 1, which hulls (visual_hull.h) are quick by; takes about
+  // a byte a texel. Throws std::invalid_argument if there is no texture or it is empty.
+  explicit KeyedPicture(std::shared_ptr<const render::VideoTexture> texture, bool bounded = false);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
+  float most_alpha(float u0, float v0, float u1, float v1) const override;
 
  private:
+  // The largest alpha of 2^k by 2^k texels, in 255ths rounded up.
+  struct Bounds {
+    int width = 0, height = 0;
+    std::vector<std::uint8_t> most;
+  };
+
   std::shared_ptr<const render::VideoTexture> texture_;
+  std::vector<Bounds> bounds_;  // by k
 };
 
 // The same of a frame that is not keyed yet: filtered first, then keyed once. For persons that few

@@ -96,7 +96,7 @@ float clearness(const Box& box, std::size_t view, Vec3f place, float width_m) {
   if (!(distance > clear_m)) return 1;
   const Vec3f direction = to_camera * (1 / distance);
   const float far_m = std::min(way_in_box(box.set_from_object, place, direction), distance);
-  return 1 - box.march.find({place, direction, width_m, 0}, clear_m, far_m).alpha;
+  return 1 - box.march.find({place, direction, width_m, 0}, clear_m, far_m, 2).alpha;
 }
 
 // Colour at a place, times `alpha`: the cameras' foregrounds without their own alpha.

@@ -46,6 +46,10 @@ struct Stressor {
   // Error that is left whatever the samples do, with its name; 0 = none is known.
   double floor = 0;
   std::string floor_name{};
+  std::string error_name{};  // of its axis, "" = the chart's
+  std::string own_name{};    // of its line, "" = "error"
+  // Figures of the samples that are drawn as lines too, each with a name.
+  std::vector<std::pair<std::string, std::string>> beside{};
 };
 
 // Other figures of the points against their time, each with a word on it. "error", "error_p99", or

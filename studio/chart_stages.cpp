@@ -5,6 +5,7 @@
 
 #include "studio/charts/glass.h"
 #include "studio/charts/hdr.h"
+#include "studio/charts/hull.h"
 #include "studio/charts/key.h"
 #include "studio/charts/lens.h"
 #include "studio/charts/lights.h"
@@ -14,9 +15,9 @@
 namespace studio {
 
 std::span<const ChartStage> chart_stages() {
-  static const std::vector<ChartStage> all{glass_chart(), hdr_chart(),    key_chart(),
-                                           lens_chart(),  lights_chart(), photograph_chart(),
-                                           render_chart()};
+  static const std::vector<ChartStage> all{glass_chart(),      hdr_chart(),   hull_chart(),
+                                           key_chart(),        lens_chart(),  lights_chart(),
+                                           photograph_chart(), render_chart()};
   return all;
 }
 

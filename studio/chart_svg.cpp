@@ -46,16 +46,47 @@ void draw_stressor(
     const auto [low, high] = std::ranges::minmax(values);
     x = {low, high > low ? high : low + 1, false, left, left + small_width};
   }
+  const auto figure_of = [](const StressorSample& s, const std::string& name) {
+    const auto found = std::ranges::find(s.figures, name, [](const auto& f) { return f.first; });
+    return found == s.figures.end() ? 0.0 : found->second;
+  };
+  for (const auto& [figure, word] : stressor.beside) {
+    for (const StressorSample& s : stressor.samples) {
+      if (const double value = figure_of(s, figure); value > 0) errors.push_back(value);
+    }
+  }
   if (stressor.floor > 0) errors.push_back(stressor.floor);
-  const Axis y = axis_of(chart, errors, top + small_height, top);
+  Axis y = axis_of(chart, errors, top + small_height, top);
+  if (!stressor.beside.empty()) {
+    // Above the lines there is room for their names.
+    const double most = errors.empty() ? 0 : *std::ranges::max_element(errors);
+    y = {0, most > 0 ? 1.6 * most : 1, false, top + small_height, top};
+  }
   const std::string name = stressor.unit.empty()
                                ? stressor.stressor
                                : fmt::format("{}, {}", stressor.stressor, stressor.unit);
-  draw_axes(svg, x, y, name, chart.stressed_error_name, 11.5);
+  draw_axes(svg, x, y, name,
+            stressor.error_name.empty() ? chart.stressed_error_name : stressor.error_name, 11.5);
+  for (std::size_t i = 0; i < stressor.beside.size(); ++i) {
+    const auto& colour = chart_colours[(i + 1) % chart_colours.size()];
+    std::vector<std::pair<double, double>> line;
+    for (const StressorSample& s : stressor.samples) {
+      const double value = figure_of(s, stressor.beside[i].first);
+      line.emplace_back(x(s.value), y(value));
+    }
+    svg.polyline(line, colour, 1.6);
+    for (const auto& [px, py] : line) svg.mark(px, py, Mark::square, 3, colour);
+    const double word_y = top + 16 + 14 * static_cast<double>(i);
+    svg.line(left + 10, word_y - 4, left + 26, word_y - 4, colour, 1.6);
+    svg.text(left + 32, word_y, stressor.beside[i].second, {10.5});
+  }
+  const auto has_place = [&](const StressorSample& s) {
+    return s.error > 0 || !stressor.beside.empty();
+  };
   std::vector<std::pair<double, double>> error_line;
   std::vector<std::pair<double, double>> reported_line;
   for (const StressorSample& s : stressor.samples) {
-    if (s.error > 0) error_line.emplace_back(x(s.value), y(s.error));
+    if (has_place(s)) error_line.emplace_back(x(s.value), y(s.error));
     if (s.reported_error && *s.reported_error > 0) {
       reported_line.emplace_back(x(s.value), y(*s.reported_error));
     }
@@ -69,7 +100,7 @@ void draw_stressor(
   svg.polyline(error_line, chart_colours[0], 2);
   for (const StressorSample& s : stressor.samples) {
     const bool good = s.status == "ok";
-    if (!(s.error > 0)) continue;
+    if (!has_place(s)) continue;
     svg.mark(x(s.value), y(s.error), good ? Mark::disc : Mark::cross, good ? 4 : 5,
              good ? chart_colours[0] : chart_colours[1]);
     if (!s.label.empty()) {
@@ -78,7 +109,7 @@ void draw_stressor(
   }
   const double key_y = top - 12;
   svg.line(left, key_y - 4, left + 22, key_y - 4, chart_colours[0], 2);
-  svg.text(left + 28, key_y, "error", {11.5});
+  svg.text(left + 28, key_y, stressor.own_name.empty() ? "error" : stressor.own_name, {11.5});
   if (!reported_line.empty()) {
     svg.polyline({{left + 84, key_y - 4}, {left + 106, key_y - 4}}, chart_colours[1], 1.6, "6 4");
     svg.text(left + 112, key_y, "the program's own estimate", {11.5});
