@@ -313,6 +313,32 @@ TEST(KeyedPicture, IsNothingBeyondItsRimAndHasNoNumbersThatAreNone) {
   EXPECT_THROW(KeyedPicture(nullptr), std::invalid_argument);
 }
 
+TEST(KeyedPicture, HasNoAlphaBeyondItsBound) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> one(0, 1);
+  capture::Image image = capture::make_image(53, 91, 4);
+  for (int i = 0; i < 40; ++i) {
+    const auto y = static_cast<int>(52 * one(random)), x = static_cast<int>(90 * one(random));
+    for (int c = 0; c < 4; ++c) image.at(y, x, c) = one(random);
+  }
+  const KeyedPicture picture(
+      std::make_shared<render::VideoTexture>(render::make_video_texture(image)), true);
+  int useful = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const float u = 1.2F * one(random) - 0.1F, v = 1.2F * one(random) - 0.1F;
+    const float footprint = 0.2F * one(random) * one(random);
+    const float reach = 1.5F * footprint;
+    const float most = picture.most_alpha(u - reach, v - reach, u + reach, v + reach);
+    ASSERT_LE(picture.look_up(u, v, footprint)[3], most + 1e-6F)
+        << u << " " << v << " " << footprint;
+    useful += most < 0.5F;
+  }
+  EXPECT_GT(useful, 1000);
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(picture.most_alpha(nan, 0, 1, 1), 1);
+  EXPECT_LE(picture.most_alpha(-5, -5, 7, 7), 1);
+}
+
 TEST(Billboard, RefusesWhatCannotBeShown) {
   const calibrate::Pose here = calibrate::look_at({0, -4, 1}, {0, 0, 1}, 0);
   const calibrate::Lens wide{"equisolid", width, height, {50, 80, 60}};
