@@ -16,6 +16,7 @@
 #include "made_shot.h"
 #include "render/kept_transport.h"
 #include "render/reference.h"
+#include "render/trace.h"
 
 namespace compositing {
 namespace {
@@ -322,6 +323,46 @@ TEST(Hull, HidesWhatIsBehindItInItsBoxAndIsHiddenByWhatIsBefore) {
   };
   EXPECT_NEAR(with_ball(-0.6F, 1), 5, 0.1);
   EXPECT_NEAR(with_ball(0.6F, 1), 0.5, 0.05);
+}
+
+// Rays that are decided while they travel are in the box's frame.
+TEST(Hull, CastsTheSameShadowFromATurnedBox) {
+  const Filmed person = filmed({0, 60, 120}, walker_from);
+  const render::Scene straight(scene_with(person.views), person.pictures);
+  render::SceneDescription scene = scene_with(person.views);
+  const float c = std::cos(0.7F), s = std::sin(0.7F);
+  // About the set's vertical, with the same floor and ceiling.
+  scene.instances[0].set_from_object = {3 * c,
+                                        -2.6F * s,
+                                        0,
+                                        -1.5F * c + 1.3F * s,
+                                        3 * s,
+                                        2.6F * c,
+                                        0,
+                                        -1.5F * s - 1.3F * c,
+                                        0,
+                                        0,
+                                        upper.z - lower.z,
+                                        lower.z};
+  const render::Scene turned(scene, person.pictures);
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> one(-1, 1), high(0.1F, 1.7F);
+  int dark = 0;
+  for (int i = 0; i < 600; ++i) {
+    const Vec3f through{0.3F * one(random), 0.3F * one(random), high(random)};
+    const Vec3f direction = normalize(Vec3f{one(random), one(random), 0.2F * one(random)});
+    const auto passed = [&](const render::Scene& of) {
+      return render::transmittance(of, through - direction * 4, direction, 0, 8,
+                                   render::mask_virtual)
+          .x;
+    };
+    const float a = passed(straight), b = passed(turned);
+    dark += a < 0.1F;
+    // The larger box's steps lie elsewhere, and it holds more of what only some cameras see.
+    if (a > 0.9F) continue;
+    ASSERT_NEAR(a, b, 0.35) << i;
+  }
+  EXPECT_GT(dark, 100);
 }
 
 TEST(Hull, ShowsThePlateBitForBitWhereACameraSeesNobody) {
