@@ -193,7 +193,9 @@ TEST_F(PersonSetTest, LooksTheSameKeyedByFramesAndByTexels) {
         const bool person = frames[n].at(y, x, 0) > 2 * frames[n].at(y, x, 2);
         on_person += person;
         clear += frames[n].at(y, x, 3) == 0 && texels[n].at(y, x, 3) == 0;
-        if (person) EXPECT_NEAR(by_texel, by_frame, 0.1) << n << " " << x << " " << y;
+        if (person) {
+          EXPECT_NEAR(by_texel, by_frame, 0.1) << n << " " << x << " " << y;
+        }
         difference += std::abs(by_texel - by_frame);
       }
     }
