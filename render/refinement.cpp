@@ -7,7 +7,7 @@ namespace render {
 
 namespace {
 
-constexpr float block_accuracy = 0.8F, coarse_accuracy = 0.8F, coarse_contrast = 0.4F;
+constexpr float coarse_accuracy = 0.8F, coarse_contrast = 0.4F;
 
 }  // namespace
 
@@ -17,7 +17,7 @@ Effort effort_of_stage(const Effort& effort, int stage) {
   Effort coarse = effort;
   if (stage >= finished_stage) return coarse;
   const bool blocks = stage < one_ray_stage;
-  coarse.accuracy = std::min(effort.accuracy, blocks ? block_accuracy : coarse_accuracy);
+  coarse.accuracy = std::min(effort.accuracy, coarse_accuracy);
   // Of a block, the pixel that stands for all would see the same share of the lights everywhere.
   if (blocks) coarse.interleave = 1;
   if (stage > one_ray_stage) {
