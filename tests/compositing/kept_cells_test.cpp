@@ -22,12 +22,7 @@ struct RealFloorRoom {
 
   RealFloorRoom() {
     render::SceneDescription scene = MadeRoom::describe();
-    scene.materials.push_back(make_stand_in_material("floor", {}));
-    auto floor = std::make_shared<render::Mesh>(*scene.meshes[0]);
-    floor->materials = {static_cast<std::uint32_t>(scene.materials.size() - 1)};
-    scene.meshes[0] = floor;
-    scene.instances[0].kind = render::ObjectKind::stand_in;
-    scene.instances[0].blocks_light = false;
+    make_floor_real(scene);
     scene.instances[1].set_from_object[11] = -100;  // without the far wall: the plate shows
     room.scene = std::make_unique<render::Scene>(std::move(scene));
     for (auto& light : room.job.lights.lights) light.planned = light.irradiance;

@@ -24,12 +24,7 @@ void light(MadeRoom& room, std::array<int, 2> samples = {5, 5}, float ambient = 
 MadeRoom room_on_real_floor(int width, int height) {
   MadeRoom room(width, height);
   render::SceneDescription scene = MadeRoom::describe();
-  scene.materials.push_back(make_stand_in_material("floor", {}));
-  auto floor = std::make_shared<render::Mesh>(*scene.meshes[0]);
-  floor->materials = {static_cast<std::uint32_t>(scene.materials.size() - 1)};
-  scene.meshes[0] = floor;
-  scene.instances[0].kind = render::ObjectKind::stand_in;
-  scene.instances[0].blocks_light = false;
+  make_floor_real(scene);
   room.scene = std::make_unique<render::Scene>(std::move(scene));
   capture::Image plate = capture::make_image(height, width);
   for (std::size_t i = 0; i < plate.pixels.size(); ++i)

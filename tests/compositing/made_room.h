@@ -127,6 +127,16 @@ struct MadeRoom {
   }
 };
 
+// The real floor in place of the room's own: a stand-in on which the plate shows.
+inline void make_floor_real(render::SceneDescription& scene) {
+  scene.materials.push_back(make_stand_in_material("floor", {}));
+  auto floor = std::make_shared<render::Mesh>(*scene.meshes[0]);
+  floor->materials = {static_cast<std::uint32_t>(scene.materials.size() - 1)};
+  scene.meshes[0] = floor;
+  scene.instances[0].kind = render::ObjectKind::stand_in;
+  scene.instances[0].blocks_light = false;
+}
+
 inline render::FrameResult render_room(const MadeRoom& room,
                                        render::KeptTransport* kept = nullptr) {
   render::FrameResult result;
