@@ -61,6 +61,9 @@ void LockedVideos::write_sound(std::int64_t first, std::span<const float> sample
 
 void LockedVideos::close() {
   checkpoint();
+  // All pictures are in both before either is finished: what fails until then is cut back in both.
+  first_.drain();
+  second_.drain();
   try {
     first_.close();
   } catch (const std::runtime_error&) {

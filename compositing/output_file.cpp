@@ -27,9 +27,13 @@ constexpr std::size_t marks_kept = 8;
 }  // namespace
 
 bool is_one_file(const std::string& a, const std::string& b) {
-  std::error_code ignored;  // a folder that is not there; opening tells
-  return std::filesystem::weakly_canonical(a, ignored) ==
-         std::filesystem::weakly_canonical(b, ignored);
+  const auto whole = [](const std::string& path) {
+    std::error_code failed;  // where a folder cannot be looked into; opening tells
+    const std::filesystem::path absolute = std::filesystem::absolute(path, failed);
+    std::filesystem::path real = std::filesystem::weakly_canonical(absolute, failed);
+    return failed ? absolute.lexically_normal() : real;
+  };
+  return whole(a) == whole(b);
 }
 
 OutputFile::OutputFile(const std::string& path) {

@@ -169,7 +169,7 @@ struct VideoWriter::State {
   std::int64_t last_index = -1;
   std::int64_t next_sample = 0;
   std::vector<Checkpoint> checkpoints;  // the last few
-  bool finished = false;
+  bool drained = false, finished = false;
 };
 
 void VideoWriter::State::open_streams() {
@@ -333,17 +333,25 @@ void VideoWriter::write_sound(std::int64_t first, std::span<const float> samples
 
 void VideoWriter::checkpoint() {
   State& state = *state_;
+  if (state.finished) return;
   state.write_gathered();
   std::vector<Checkpoint>& kept = state.checkpoints;
   if (kept.size() == checkpoints_kept) kept.erase(kept.begin());
   kept.push_back({state.last_index, state.file.place()});
 }
 
+void VideoWriter::drain() {
+  State& state = *state_;
+  if (state.drained) return;
+  state.encode(nullptr);
+  state.write_gathered();
+  state.drained = true;
+}
+
 void VideoWriter::close() {
   State& state = *state_;
   if (state.finished) return;
-  state.encode(nullptr);
-  state.write_gathered();
+  drain();
   state.finished = true;
   if (const int error = av_write_trailer(state.muxer.get()); error < 0) {
     state.file.cut_back(0);

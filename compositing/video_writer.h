@@ -56,6 +56,9 @@ class VideoWriter {
   // write_picture.
   void checkpoint();
 
+  // Writes all that is held back: no pictures or sound may follow. Throws like write_picture.
+  void drain();
+
   // Finishes the file. Throws std::runtime_error like write_picture.
   void close();
 

@@ -169,21 +169,16 @@ TEST_F(LockedTakeTest, DropsTheSameFramesWhenTheDiskIsSlow) {
   EXPECT_EQ(locked_times_s().size(), static_cast<std::size_t>(status.written));
 }
 
-// The limit on a file's size stands for a full disk: write() fails in the same way.
 TEST_F(LockedTakeTest, KeepsBothWholeAndOfOneLengthWhenTheDiskIsFull) {
   for (const Larger larger : {Larger::fill, Larger::key}) {
     for (const char* codec : {"h264", "lossless"}) {
       RecorderSettings settings = pair(160, 120, codec);
       settings.sound_channels = 1;
       settings.sound_rate = 8000;
-      struct rlimit before {};
-      ::getrlimit(RLIMIT_FSIZE, &before);
-      const auto handler = ::signal(SIGXFSZ, SIG_IGN);
-      const struct rlimit limited { 1'200'000, before.rlim_max };
-      ::setrlimit(RLIMIT_FSIZE, &limited);
       RecorderStatus status;
       std::string made;
       {
+        const FileSizeLimit limit(1'200'000);
         Recorder recorder(settings);
         int n = 0;
         for (; n < 2000 && recorder.status().error.empty(); ++n) {
@@ -196,8 +191,6 @@ TEST_F(LockedTakeTest, KeepsBothWholeAndOfOneLengthWhenTheDiskIsFull) {
         status = recorder.status();
         EXPECT_EQ(status.written + status.dropped, n);
       }
-      ::setrlimit(RLIMIT_FSIZE, &before);
-      ::signal(SIGXFSZ, handler);
 
       const std::string& full = larger == Larger::fill ? settings.fill_file : settings.key_file;
       EXPECT_NE(status.error.find(full), std::string::npos) << status.error;
@@ -213,6 +206,38 @@ TEST_F(LockedTakeTest, KeepsBothWholeAndOfOneLengthWhenTheDiskIsFull) {
         EXPECT_EQ(bytes_of(file, "gray").size(), times.size() * 160 * 120) << file;
         EXPECT_NE(probe(file, "format=duration", ""), "N/A") << file;
       }
+    }
+  }
+}
+
+// All pictures are written when it is a file's index that has no room.
+TEST_F(LockedTakeTest, KeepsEveryPictureWhenTheDiskIsFullAtTheEnd) {
+  for (const Larger larger : {Larger::fill, Larger::key}) {
+    const RecorderSettings settings = pair(64, 48);
+    const auto take = [&] {
+      Recorder recorder(settings);
+      for (int n = 0; n < 30; ++n) {
+        recorder.wait_for_room();
+        recorder.push(frame(settings, n, larger));
+      }
+      recorder.close();
+      return recorder.status();
+    };
+    EXPECT_EQ(take().error, "");
+    const std::string& full = larger == Larger::fill ? settings.fill_file : settings.key_file;
+    const std::string& other = larger == Larger::fill ? settings.key_file : settings.fill_file;
+    const std::uintmax_t whole = fs::file_size(full);
+    ASSERT_LT(fs::file_size(other) + 100, whole);
+    for (const std::uintmax_t lacking : {1U, 10U, 30U}) {
+      RecorderStatus status;
+      {
+        const FileSizeLimit limit(whole - lacking);
+        status = take();
+      }
+      EXPECT_NE(status.error.find(full), std::string::npos) << status.error;
+      EXPECT_EQ(status.written, 30) << lacking;
+      EXPECT_EQ(locked_times_s().size(), 30U) << lacking;
+      EXPECT_NE(probe(other, "format=duration", ""), "N/A") << lacking;
     }
   }
 }
@@ -288,6 +313,13 @@ TEST_F(LockedTakeTest, RefusesHalfAPairAndOneFileTwiceByName) {
   expect_words("key.mov", [this](RecorderSettings& s) { s.key_file = path("key.mov"); });
   expect_words("fill.avi", [this](RecorderSettings& s) { s.fill_file = path("fill.avi"); });
   expect_words("display", [](RecorderSettings& s) { s.display = nullptr; });
+  const fs::path here = fs::current_path();
+  fs::current_path(dir_);
+  expect_words("one file", [](RecorderSettings& s) {
+    s.fill_file = "fill.mkv";
+    s.key_file = "./fill.mkv";
+  });
+  fs::current_path(here);
   fs::create_directory_symlink(dir_, path("link"));
   expect_words("one file", [this](RecorderSettings& s) { s.key_file = path("link/fill.mkv"); });
 }

@@ -65,7 +65,6 @@ TEST_F(RecorderFaultsTest, LeavesAPlayableFileWhenKilled) {
   output_of("ffmpeg -v error -xerror -i " + file + " -f null -");
 }
 
-// The limit on a file's size stands for a full disk: write() fails in the same way.
 TEST_F(RecorderFaultsTest, StopsCleanlyWhenTheDiskIsFull) {
   for (const char* codec : {"h264", "lossless"}) {
     const std::string file = path(std::string(codec) + ".mkv");
@@ -75,13 +74,9 @@ TEST_F(RecorderFaultsTest, StopsCleanlyWhenTheDiskIsFull) {
     settings.codec = codec;
     settings.sound_channels = 1;
     settings.sound_rate = 8000;
-    struct rlimit before {};
-    ::getrlimit(RLIMIT_FSIZE, &before);
-    const auto handler = ::signal(SIGXFSZ, SIG_IGN);
-    const struct rlimit limited { 1'500'000, before.rlim_max };
-    ::setrlimit(RLIMIT_FSIZE, &limited);
     RecorderStatus status;
     {
+      const FileSizeLimit limit(1'500'000);
       Recorder recorder(settings);
       int n = 0;
       for (; n < 2000 && recorder.status().error.empty(); ++n) {
@@ -97,8 +92,6 @@ TEST_F(RecorderFaultsTest, StopsCleanlyWhenTheDiskIsFull) {
       status = recorder.status();
       EXPECT_EQ(status.written + status.dropped, n + 1);
     }
-    ::setrlimit(RLIMIT_FSIZE, &before);
-    ::signal(SIGXFSZ, handler);
 
     EXPECT_NE(status.error.find(file), std::string::npos) << status.error;
     EXPECT_NE(status.error.find("File too large"), std::string::npos) << status.error;
