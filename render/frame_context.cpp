@@ -79,22 +79,43 @@ std::uint64_t transport_key(const FrameContext& context) {
   return key.value();
 }
 
-// Changes whenever a kept cell may be lit differently, but for live textures and the plate.
-std::uint64_t light_key(const FrameContext& context) {
+// Changes whenever a kept cell may be lit differently, but for live textures and the plate. At a
+// glance: the table and the smallest level, which follow live light.
+DataKey light_key(const FrameContext& context, const DataKey& before) {
   Key key;
   for (const DirectionalLight& light : context.job->lights.lights) {
     key.mix(light.direction), key.mix(light.irradiance);
   }
   for (const LocalLight& lamp : context.job->lights.lamps) key.mix(lamp.intensity);
-  for (std::size_t i = 0; i < context.first_plate_level; ++i) key.mix(context.levels[i]->pixels);
+  const auto levels = std::span(context.levels).first(context.first_plate_level);
+  key.mix((*std::ranges::min_element(levels, {}, &capture::Image::height))->pixels);
+  const std::uint64_t glance = key.value();
+  if (glance != before.glance) return {glance, glance};
+  for (const capture::Image* level : levels) key.mix(level->pixels);
   key.mix(context.inputs.directions->sensitivity);
-  return key.value();
+  return {glance, key.value()};
 }
 
-std::uint64_t plate_levels_key(const FrameContext& context) {
+DataKey plate_levels_key(const FrameContext& context, const DataKey& before) {
+  if (context.plate_levels.empty()) return {};
+  constexpr int glanced = 4;  // of levels: some thousands of pixels
   Key key;
-  if (!context.plate_levels.empty()) key.mix(context.plate_levels.front().pixels);
-  return key.value();
+  key.mix(
+      context.plate_levels[std::min<std::size_t>(glanced, context.plate_levels.size() - 1)].pixels);
+  const std::uint64_t glance = key.value();
+  if (glance != before.glance) return {glance, glance};
+  key.mix(context.plate_levels.front().pixels);
+  return {glance, key.value()};
+}
+
+FrameKeys keys_of(const FrameContext& context, const KeptTransport& kept) {
+  const FrameKeys& before = kept.keys();
+  FrameKeys keys{transport_key(context), light_key(context, before.light), {}};
+  const bool light_stays = keys.light.all == before.light.all;
+  if (light_stays && kept.bends_plate()) {
+    keys.plate_levels = plate_levels_key(context, before.plate_levels);
+  }
+  return keys;
 }
 
 // Whether places in one are places in the other.
@@ -273,10 +294,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.rows = (d.height + cell_size - 1) / cell_size;
   context.efforts = efforts_of(e);
   check_stages(context);
-  if (inputs.kept) {
-    inputs.kept->begin_frame(
-        {transport_key(context), light_key(context), plate_levels_key(context)}, context);
-  }
+  if (inputs.kept) inputs.kept->begin_frame(keys_of(context, *inputs.kept), context);
   return context;
 }
 

@@ -12,7 +12,8 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
   const bool same_size = frame.columns == columns_ && frame.rows == rows_;
   auto moved = Scene::moved(places_, scene.places());
   const bool same_transport = keys.transport == keys_.transport;
-  light_stays_ = keys.light == keys_.light;
+  light_stays_ = keys.light.all == keys_.light.all;
+  scarce_ = bytes_ > max_bytes / 2;
   keys_ = keys;
   if (same_transport && same_size && moved) {
     if (moved->empty()) return;
@@ -37,6 +38,7 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
 
 void KeptTransport::forget_all(const Scene& scene) {
   for (Cell& cell : cells_) cell.stage = none;
+  bends_plate_ = false;
   cones_.clear();
   grid_ = SpaceGrid(scene.virtual_bounds());
 }
@@ -75,7 +77,7 @@ CellTransport* KeptTransport::place(int column, int row) {
   Cell& cell = cells_[index(column, row)];
   // What was forgotten keeps its room for what comes, unless others may need it: a cell begins
   // again coarse, and takes a hundredth of what it took in the end.
-  if (cell.stage == none && bytes_ > max_bytes / 2) {
+  if (cell.stage == none && scarce_) {
     bytes_ -= cell.bytes;
     cell = {};
   }
@@ -96,6 +98,7 @@ void KeptTransport::keep(int column, int row, int stage) {
   const std::size_t before = bytes_.fetch_add(bytes - cell.bytes);
   cell.bytes = bytes;
   cell.stage = stage;
+  if (!cell.transport->bent.empty()) bends_plate_ = true;
   if (before + bytes <= max_bytes) return;
   // Too much: this cell's is given back.
   full_ = true;

@@ -24,11 +24,15 @@ struct LitCell {
   RenderStatistics statistics;  // of lighting it
 };
 
-// Numbers that differ where what they stand for does.
+// A number that differs where what it stands for does. Of much data a part is looked at first: in a
+// live show that has changed already, and stands for all.
+struct DataKey {
+  std::uint64_t glance = 0, all = 0;
+};
 struct FrameKeys {
-  std::uint64_t transport = 0;     // all that cells' transport depends on, but things that move
-  std::uint64_t light = 0;         // what lights it, but live textures and the plate
-  std::uint64_t plate_levels = 0;  // the plate as clear bodies show it
+  std::uint64_t transport = 0;  // all that cells' transport depends on, but things that move
+  DataKey light;                // what lights it, but live textures and the plate
+  DataKey plate_levels;         // the plate as clear bodies show it
 };
 
 // While camera, lens, light directions and effort stay, a frame under other light takes no ray; and
@@ -56,6 +60,8 @@ class KeptTransport {
   // where the cell is not kept, or if the memory is used up.
   LitCell* place_lit(int column, int row);
   const FrameKeys& keys() const { return keys_; }
+  // Whether any cell was kept that clear bodies show the plate in.
+  bool bends_plate() const { return bends_plate_; }
 
   // Of all cells, row by row: the stage that they are kept at, or `none`.
   static constexpr int none = -1;
@@ -92,7 +98,8 @@ class KeptTransport {
   std::vector<Cell> cells_;
   std::vector<CellCone> cones_;  // once anything has moved
   std::atomic<std::size_t> bytes_ = 0;
-  std::atomic<bool> full_ = false;
+  std::atomic<bool> full_ = false, bends_plate_ = false;
+  bool scarce_ = false;  // when the frame began, half of the memory was taken
 };
 
 }  // namespace render

@@ -26,8 +26,12 @@ struct TileWorkspace::Impl {
   void light(const FrameContext& frame, const CellTransport& cell, RenderStatistics& statistics);
   void write(
       const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) const;
-  void write_kept(
-      const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result);
+  void write_kept(const FrameContext& frame,
+                  const CellTransport& cell,
+                  const TileJob& tile,
+                  int x0,
+                  int y0,
+                  TileResult& result);
   static void write_counts(
       const CellTransport& cell, const TileJob& tile, int x0, int y0, TileResult& result);
 };
@@ -167,17 +171,31 @@ void keep_lit(const TileResult& result, const TileJob& tile, int x0, int y0, Lit
   });
 }
 
+// Whether anything of the plate is no number, so that even no share of it is none.
+bool is_broken_plate(const TileJob& tile, int x0, int y0) {
+  bool broken = false;
+  for_rows(tile.background_rect, tile.rect, x0, y0, 3, [&](const CellRow& row) {
+    const auto values = std::span(tile.background).subspan(row.in_image, row.length);
+    broken = broken || std::ranges::any_of(
+                           values, [](capture::Half value) { return (value & 0x7c00) == 0x7c00; });
+  });
+  return broken;
+}
+
 // A cell whose transport is kept: as it was lit last, if nothing that lights it has changed.
-void TileWorkspace::Impl::write_kept(
-    const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) {
+void TileWorkspace::Impl::write_kept(const FrameContext& frame,
+                                     const CellTransport& cell,
+                                     const TileJob& tile,
+                                     int x0,
+                                     int y0,
+                                     TileResult& result) {
   KeptTransport& memory = *frame.inputs.kept;
   const int column = x0 / cell_size, row = y0 / cell_size;
-  const CellTransport& cell = *memory.find(column, row, frame.stage_of(column, row));
   const FrameKeys& keys = memory.keys();
   const LitCell* lit = memory.lit(column, row);
-  if (lit && lit->light == keys.light &&
-      (cell.bent.empty() || lit->plate_levels == keys.plate_levels) &&
-      (!lit->shows_plate || has_plate_of(*lit, tile, x0, y0))) {
+  if (lit && lit->light == keys.light.all &&
+      (cell.bent.empty() || lit->plate_levels == keys.plate_levels.all) &&
+      (lit->shows_plate ? has_plate_of(*lit, tile, x0, y0) : !is_broken_plate(tile, x0, y0))) {
     copy_lit(*lit, tile, x0, y0, result);
     return;
   }
@@ -187,10 +205,10 @@ void TileWorkspace::Impl::write_kept(
   write(frame, tile, x0, y0, result);
   if (LitCell* room = cell.video.empty() ? memory.place_lit(column, row) : nullptr) {
     keep_lit(result, tile, x0, y0, *room);
-    room->light = keys.light;
-    room->plate_levels = keys.plate_levels;
+    room->light = keys.light.all;
+    room->plate_levels = keys.plate_levels.all;
     room->shows_plate =
-        !cell.catchers.empty() ||
+        !cell.catchers.empty() || is_broken_plate(tile, x0, y0) ||
         std::ranges::any_of(picture.share, [](Vec3f share) { return share != Vec3f{}; });
     room->statistics = result.statistics;
   }
@@ -205,7 +223,7 @@ void TileWorkspace::Impl::render_cell(
   const CellTransport* kept = memory ? memory->find(column, row, stage) : nullptr;
   const bool counts = frame.inputs.count_rays;
   if (kept && (!counts || !kept->counts.empty())) {
-    write_kept(frame, tile, x0, y0, result);
+    write_kept(frame, *kept, tile, x0, y0, result);
     result.statistics.kept_rays += kept->rays;
     if (counts) write_counts(*kept, tile, x0, y0, result);
   } else {

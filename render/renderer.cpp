@@ -95,12 +95,12 @@ std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
   return context;
 }
 
-std::size_t refine_cells(const FrameContext& context,
-                         std::span<const Refinement> cells,
-                         std::chrono::steady_clock::time_point deadline,
-                         FrameJob& job,
-                         RenderStatistics& statistics) {
-  if (cells.empty()) return 0;
+void refine_cells(const FrameContext& context,
+                  std::span<const Refinement> cells,
+                  std::chrono::steady_clock::time_point deadline,
+                  FrameJob& job,
+                  RenderStatistics& statistics) {
+  if (cells.empty()) return;
   std::atomic<std::size_t> next = 0;
   std::atomic<bool> full = false;
   std::mutex statistics_mutex;
@@ -125,7 +125,6 @@ std::size_t refine_cells(const FrameContext& context,
     statistics += taken;
   };
   tbb::parallel_for(0, tbb::this_task_arena::max_concurrency(), work, tbb::simple_partitioner());
-  return std::min<std::size_t>(next, cells.size());
 }
 
 void render_frame(const FrameInputs& inputs,

@@ -62,14 +62,15 @@ struct Refinement {
 };
 
 // Between the two: finds cells' transport ahead of the frame, in their order, until the deadline,
-// and changes their stages in `job`, which is the frame's own. Each cell occurs once. Returns how
-// many were begun before the deadline, all of which are done; the rays that it took are added to
-// `statistics`. Only for inputs with `kept`; where its memory is used up, it ends.
-std::size_t refine_cells(const FrameContext& context,
-                         std::span<const Refinement> cells,
-                         std::chrono::steady_clock::time_point deadline,
-                         FrameJob& job,
-                         RenderStatistics& statistics);
+// and changes the stages of those that are done in `job`, which is the frame's own. Each cell
+// occurs once. The rays that it took are added to `statistics`. Only for inputs with `kept`; where
+// its memory is used up, it ends, and cells that found no room are found again as they were, in the
+// frame.
+void refine_cells(const FrameContext& context,
+                  std::span<const Refinement> cells,
+                  std::chrono::steady_clock::time_point deadline,
+                  FrameJob& job,
+                  RenderStatistics& statistics);
 
 // Renders a frame with oneTBB over tiles. `plate` is (height, width, 3) of the picture's size,
 // linear. `result` keeps its buffers from frame to frame. Throws std::invalid_argument if sizes

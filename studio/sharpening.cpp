@@ -133,14 +133,14 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept) {
   return plan_;
 }
 
-void Sharpening::found_ahead(std::size_t count, double ms) {
-  if (count == 0) return;
+void Sharpening::found_ahead(std::span<const std::uint8_t> stages, double ms) {
   ByStage<std::size_t> found{};
-  for (const auto& [cell, stage] : std::span(plan_.ahead).first(count)) {
+  for (const auto& [cell, stage] : plan_.ahead) {
+    if (stages[cell] != stage) continue;
     ++found[stage];
     reached_ += stage - std::size_t{plan_.stages[cell]};
   }
-  went_on_ = true;
+  went_on_ = !plan_.ahead.empty();
   learn(found, ms);
 }
 
@@ -171,8 +171,8 @@ void Sharpening::learn(const ByStage<std::size_t>& found, double ms) {
   for (std::size_t s = 0; s < found.size(); ++s) {
     foreseen += static_cast<double>(found[s]) * cost_[s];
   }
+  if (!(foreseen > 0) || !(ms > 0)) return;
   const double ratio = ms / foreseen;
-  if (!(ratio > 0)) return;
   const bool known = std::ranges::any_of(timed_, std::identity());
   if (!known) {
     for (double& cost : cost_) cost *= ratio;
@@ -204,9 +204,9 @@ void render_sharpening(Sharpening& sharpening,
   render::RenderStatistics ahead;
   const Clock::time_point begun = Clock::now();
   const auto time = std::chrono::duration_cast<Clock::duration>(Milliseconds(plan.ahead_ms));
-  const std::size_t count = render::refine_cells(*frame, plan.ahead, begun + time, job, ahead);
+  render::refine_cells(*frame, plan.ahead, begun + time, job, ahead);
   const Milliseconds ahead_ms = Clock::now() - begun;
-  sharpening.found_ahead(count, ahead_ms.count());
+  sharpening.found_ahead(job.stages, ahead_ms.count());
   render::render_frame(*frame, plate, result);
   result.statistics += ahead;
   const Milliseconds all_ms = Clock::now() - start;

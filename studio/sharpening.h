@@ -35,8 +35,8 @@ class Sharpening {
   // Of the next frame, from what is still kept of the frames before
   // (render::KeptTransport::stages()). It stands until the next call.
   const SharpeningPlan& next(std::span<const int> kept);
-  // How many of `ahead` were found, and what that took.
-  void found_ahead(std::size_t count, double ms);
+  // The frame's stages with what was found ahead, and what that took.
+  void found_ahead(std::span<const std::uint8_t> stages, double ms);
   // What rendering the frame took then, and whether what it found could not all be kept.
   void took(double render_ms, bool full);
   // Of the last frame: 0 = coarse, 1 = as the effort asks.

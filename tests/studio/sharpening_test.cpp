@@ -39,7 +39,7 @@ struct MadeMachine {
       stages[cell] = stage;
       ms += ms_at(stage);
     }
-    sharpening.found_ahead(found, ms);
+    sharpening.found_ahead(stages, ms);
     double frame_ms = 3;
     for (std::size_t i = 0; i < cells; ++i) {
       if (kept[i] == none) frame_ms += ms_at(stages[i]);
