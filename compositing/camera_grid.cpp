@@ -37,15 +37,14 @@ Window window_of(const calibrate::Lens& lens) {
           calibrate::unproject(lens, {lens.width * share_x - 0.5, lens.height * share_y - 0.5});
       if (!v) continue;
       if (!(std::atan2(std::hypot(v->x, v->y), v->z) < widest_billboard_rad)) {
-        throw std::invalid_argument(
-            "a billboard's camera must see less than 75 degrees off its axis");
+        throw std::invalid_argument("a person's camera must see less than 75 degrees off its axis");
       }
       window.x0 = std::min(window.x0, v->x / v->z), window.x1 = std::max(window.x1, v->x / v->z);
       window.y0 = std::min(window.y0, v->y / v->z), window.y1 = std::max(window.y1, v->y / v->z);
     }
   }
   if (!(window.x0 < window.x1 && window.y0 < window.y1)) {
-    throw std::invalid_argument("a billboard's camera sees nothing");
+    throw std::invalid_argument("a person's camera sees nothing");
   }
   return window;
 }

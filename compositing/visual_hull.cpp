@@ -36,6 +36,22 @@ HullBlock block_of(const Material& material) {
   return block;
 }
 
+// What is out of range in it, or null.
+const char* fault_of(const HullBlock& block) {
+  if (block.views < 2 || block.views > most_hull_views) return "must have 2 to 8 views";
+  if (!(block.step_px >= finest_step_px && block.step_px <= coarsest_step_px)) {
+    return "step_px must be 0.25 to 64";
+  }
+  for (const float gain : block.gain) {
+    if (!(gain >= 0 && std::isfinite(gain))) return "gain must be finite, and 0 or more";
+  }
+  return nullptr;
+}
+
+[[noreturn]] void refuse(const std::string& name, const char* reason) {
+  throw std::invalid_argument("hull \"" + name + "\": " + reason);
+}
+
 HullMarch march_of(const ShadeContext& context, const Material& material, const HullBlock& block) {
   return {block, std::span(material.parameters).subspan(sizeof block), context.pictures};
 }
@@ -153,30 +169,22 @@ Seen seen_by(const ShadeContext& context, const HitPoint& hit, const HullRay& ra
 class HullShader final : public render::Shader {
  public:
   void check(const render::SceneDescription&, const Material& material) const override {
-    const auto refuse = [&](const char* reason) {
-      throw std::invalid_argument("hull \"" + material.name + "\": " + reason);
-    };
-    if (material.parameters.size() < sizeof(HullBlock)) refuse("wrong parameter block");
+    const std::string& name = material.name;
+    if (material.parameters.size() < sizeof(HullBlock)) refuse(name, "wrong parameter block");
     const HullBlock b = block_of(material);
-    if (b.views < 2 || b.views > most_hull_views) refuse("must have 2 to 8 views");
-    if (!(b.step_px >= finest_step_px && b.step_px <= coarsest_step_px)) {
-      refuse("step_px must be 0.25 to 64");
-    }
-    for (const float gain : b.gain) {
-      if (!(gain >= 0 && std::isfinite(gain))) refuse("gain must be finite, and 0 or more");
-    }
+    if (const char* fault = fault_of(b)) refuse(name, fault);
     std::size_t bytes = 0;
     for (const MarchView& view : std::span(b.view).first(b.views)) {
-      if (const char* fault = fault_of(view.camera)) refuse(fault);
+      if (const char* fault = compositing::fault_of(view.camera)) refuse(name, fault);
       if (view.camera.columns == 0 || !render::is_finite(view.position) ||
           !(view.px_per_tangent > 0 && std::isfinite(view.px_per_tangent)) ||
           !(view.camera.uv_per_tangent > 0)) {
-        refuse("its camera is not finite");
+        refuse(name, "its camera is not finite");
       }
-      if (view.first_byte != bytes) refuse("wrong parameter block");
+      if (view.first_byte != bytes) refuse(name, "wrong parameter block");
       bytes += bytes_of_places(view.camera);
     }
-    if (material.parameters.size() != sizeof b + bytes) refuse("wrong parameter block");
+    if (material.parameters.size() != sizeof b + bytes) refuse(name, "wrong parameter block");
   }
 
   void shade(const ShadeContext& context,
@@ -247,22 +255,12 @@ Material make_hull_material(std::string name,
                             const HullSettings& settings,
                             std::span<const HullView> views,
                             int steps) {
-  if (views.size() < 2 || views.size() > most_hull_views) {
-    throw std::invalid_argument("a hull has 2 to 8 views");
-  }
-  for (const float gain : settings.gain) {
-    if (!(gain >= 0 && std::isfinite(gain))) {
-      throw std::invalid_argument("a hull's gain must be finite, and 0 or more");
-    }
-  }
-  if (!(settings.step_px >= finest_step_px && settings.step_px <= coarsest_step_px)) {
-    throw std::invalid_argument("a hull's step_px must be 0.25 to 64");
-  }
   HullBlock block{};
   block.views = static_cast<std::uint32_t>(views.size());
   block.hides = settings.hides ? 1 : 0;
   block.step_px = settings.step_px;
   block.gain = settings.gain;
+  if (const char* fault = fault_of(block)) refuse(name, fault);
   std::vector<GridPlace> places;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const LensGrid grid = make_lens_grid(views[i].camera, steps);

@@ -13,8 +13,8 @@ namespace compositing {
 
 struct HullSettings {
   std::array<float, 3> gain{1, 1, 1};  // radiance of the pictures' white, in the plate's units
-  // Longest step along a ray, in pixels of the picture that is nearest to it, .25 to 64. Parts that
-  // are thinner may be missed.
+  // Longest step along a ray, in pixels of the picture that is nearest to it, .25 to 64; but no ray
+  // takes more than 4096. Parts that are thinner may be missed.
   float step_px = 1.5F;
   // Colour only from cameras that the hull itself does not hide the place from.
   bool hides = true;
@@ -38,9 +38,11 @@ struct HullView {
 // shadow rays, which have none, see the finest texels.
 //
 // Other objects in the box hide what is behind them and are hidden by what is before them. Not so:
-// rays that begin in the box do not see the hull, nor does what is in the box take its shadow; of
-// two persons whose boxes overlap, the one whose box is nearer is drawn over the other. It has no
-// normals, and is shown as it was filmed, whatever the set's light.
+// rays that begin in the box do not see the hull, nor does what is in the box take its shadow; a
+// lamp in the box shadows what it lights through the person behind it too, for shadow rays are
+// followed to the end of the box; of two persons whose boxes overlap, the one whose box is nearer
+// is drawn over the other. It has no normals, and is shown as it was filmed, whatever the set's
+// light.
 //
 // Matusik, Buehler, Raskar, Gortler and McMillan, "Image-Based Visual Hulls", SIGGRAPH 2000, here
 // with soft alpha, by sampling instead of polygons. Colour: Buehler, Bosse, McMillan, Gortler and

@@ -145,18 +145,28 @@ HitPoint Scene::Impl::hit_point(
   return hit;
 }
 
+// A ray that is filtered, in the set: Embree gives it in the object's frame inside an instance.
+Scene::Impl::FilteredRay Scene::Impl::ray_of(const RTCFilterFunctionNArguments* args,
+                                             unsigned lane) const {
+  const unsigned n = args->N;
+  FilteredRay ray{{RTCRayN_org_x(args->ray, n, lane), RTCRayN_org_y(args->ray, n, lane),
+                   RTCRayN_org_z(args->ray, n, lane)},
+                  {RTCRayN_dir_x(args->ray, n, lane), RTCRayN_dir_y(args->ray, n, lane),
+                   RTCRayN_dir_z(args->ray, n, lane)}};
+  const unsigned inst_id = RTCHitN_instID(args->hit, n, lane, 0);
+  if (inst_id != RTC_INVALID_GEOMETRY_ID && instance_of_geometry[inst_id] != Part::none) {
+    const auto& placed = description.instances[instance_of_geometry[inst_id]].set_from_object;
+    ray.origin = transform_point(placed, ray.origin);
+    ray.direction = transform_vector(placed, ray.direction);
+  }
+  return ray;
+}
+
 Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
                           unsigned lane,
                           RayKind kind) const {
   const unsigned n = args->N;
-  Vec3f incoming{RTCRayN_dir_x(args->ray, n, lane), RTCRayN_dir_y(args->ray, n, lane),
-                 RTCRayN_dir_z(args->ray, n, lane)};
-  const unsigned inst_id = RTCHitN_instID(args->hit, n, lane, 0);
-  if (inst_id != RTC_INVALID_GEOMETRY_ID && instance_of_geometry[inst_id] != Part::none) {
-    // Inside an instance the ray is in the object's frame.
-    const Instance& placing = description.instances[instance_of_geometry[inst_id]];
-    incoming = transform_vector(placing.set_from_object, incoming);
-  }
+  const Vec3f incoming = ray_of(args, lane).direction;
   const HitPoint hit =
       hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
@@ -175,16 +185,7 @@ bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned 
   part(RTCHitN_geomID(args->hit, n, lane), RTCHitN_instID(args->hit, n, lane, 0), met);
   const Instance& real = description.instances[met];
   if (real.kind != ObjectKind::stand_in || real.occludes) return false;
-  Vec3f origin{RTCRayN_org_x(args->ray, n, lane), RTCRayN_org_y(args->ray, n, lane),
-               RTCRayN_org_z(args->ray, n, lane)};
-  Vec3f direction{RTCRayN_dir_x(args->ray, n, lane), RTCRayN_dir_y(args->ray, n, lane),
-                  RTCRayN_dir_z(args->ray, n, lane)};
-  const unsigned inst_id = RTCHitN_instID(args->hit, n, lane, 0);
-  if (inst_id != RTC_INVALID_GEOMETRY_ID && instance_of_geometry[inst_id] != Part::none) {
-    // Inside an instance the ray is in the object's frame.
-    origin = transform_point(real.set_from_object, origin);
-    direction = transform_vector(real.set_from_object, direction);
-  }
+  const auto [origin, direction] = ray_of(args, lane);
   const auto& traced = *reinterpret_cast<const TraceContext*>(args->context);
   TraceContext context(*traced.scene, RayKind::camera, false);
   RTCRayHit ray{};

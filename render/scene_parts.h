@@ -125,6 +125,10 @@ struct Scene::Impl {
   }
   static void filter_closest(const RTCFilterFunctionNArguments* args);
   static void filter_any(const RTCFilterFunctionNArguments* args);
+  struct FilteredRay {
+    Vec3f origin, direction;
+  };
+  FilteredRay ray_of(const RTCFilterFunctionNArguments* args, unsigned lane) const;
   Vec3f passes(const RTCFilterFunctionNArguments* args, unsigned lane, RayKind kind) const;
   bool stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const;
 };

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "compositing/keyed_picture.h"
+#include "furnished_scene.h"
 #include "made_shot.h"
 #include "render/kept_transport.h"
 #include "render/reference.h"
@@ -141,23 +142,7 @@ TEST(Billboard, LeavesThePlateItsBitsWhereItIsClear) {
 // A person on a floor that catches the shadow, with a mirror behind and a glass ball in front.
 render::SceneDescription furnished(bool lit = false) {
   render::SceneDescription scene = scene_with(make_billboard_material("person", {.lit = lit}));
-  scene.materials.push_back(make_stand_in_material("floor", {}));
-  render::StandardParameters silver;
-  silver.metallic = 1;
-  silver.roughness = 0;
-  std::fill_n(silver.base_color, 3, 0.9F);
-  scene.materials.push_back(make_standard_material("mirror", silver));
-  scene.materials.push_back(render::make_glass_material("glass", {}));
-  auto mirror = std::make_shared<render::Mesh>();
-  mirror->positions = {{-1.6F, 0.9F, 0}, {1.6F, 1.4F, 0}, {1.6F, 1.4F, 2}, {-1.6F, 0.9F, 2}};
-  mirror->triangles = {{0, 1, 2}, {0, 2, 3}};
-  mirror->materials = {2};
-  scene.meshes.push_back(made_floor(20, 1));
-  scene.meshes.push_back(mirror);
-  scene.meshes.push_back(made_ball({0.55F, -0.6F, 0.6F}, 0.35F, 3));
-  for (std::uint32_t mesh = 1; mesh < 4; ++mesh) scene.instances.emplace_back().mesh = mesh;
-  scene.instances[1].kind = render::ObjectKind::stand_in;
-  scene.instances[1].blocks_light = false;
+  furnish(scene, {0.9F, 1.4F}, {0.55F, -0.6F, 0.6F});
   return scene;
 }
 
