@@ -20,11 +20,17 @@ namespace compositing {
 // Vectors of the compiler: AVX2 has them in one register, baseline machines in two.
 using F8 = float __attribute__((vector_size(32)));
 using I8 = std::int32_t __attribute__((vector_size(32)));
+using F4 = float __attribute__((vector_size(16)));
 inline constexpr int key_lanes = 8;
 
 inline F8 all_of(float value) { return F8{} + value; }
 inline F8 load_lanes(const float* from) {
   F8 v;
+  std::memcpy(&v, from, sizeof v);
+  return v;
+}
+inline F4 load_four(const float* from) {
+  F4 v;
   std::memcpy(&v, from, sizeof v);
   return v;
 }
@@ -55,6 +61,36 @@ inline bool any_of(I8 lanes) {
 #endif
 }
 
+// How many of the lanes are -1, of lanes that are 0 or -1.
+inline int count_of(I8 lanes) {
+#if defined(__AVX__)
+  return std::popcount(static_cast<unsigned>(_mm256_movemask_ps(std::bit_cast<__m256>(lanes))));
+#else
+  std::int32_t count = 0;
+  for (int i = 0; i < key_lanes; ++i) count -= lanes[i];
+  return count;
+#endif
+}
+
+inline float sum_of(F8 v) {
+  const F4 four =
+      __builtin_shufflevector(v, v, 0, 1, 2, 3) + __builtin_shufflevector(v, v, 4, 5, 6, 7);
+  const F4 two = four + __builtin_shufflevector(four, four, 2, 3, 0, 1);
+  return two[0] + two[1];
+}
+
+// Channels of four texels, from texels of four channels.
+inline std::array<F4, 4> transposed(F4 a, F4 b, F4 c, F4 d) {
+  const F4 ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5);
+  const F4 ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+  const F4 cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+  const F4 cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+  return {__builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5),
+          __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7),
+          __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5),
+          __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7)};
+}
+
 // Light of a transfer curve by a polynomial: value * p(value), within 2e-4 of it over 0..1.
 struct LightPolynomial {
   std::array<float, 6> factors{};
@@ -67,25 +103,68 @@ struct LightPolynomial {
 
 LightPolynomial light_polynomial(capture::Transfer transfer);
 
+// Light between which a block of pixels is screen at a glance, in the keyer's order.
+struct LightBounds {
+  std::array<float, 3> most{};  // 0 lets nothing through
+  float least = 1;              // of the first
+};
+
 // Loads channels in the keyer's order. Values that are not finite, and negative ones, become 0.
 class LightRows {
  public:
+  using Bounds = LightBounds;
+
   LightRows(const capture::Image& frame, std::array<int, 3> order)
       : pixels_(frame.pixels.data()), width_(frame.width), order_(order) {}
 
   // `count` pixels from (y, x) on; lanes beyond repeat the last one.
   void load(int y, int x, int count, std::array<F8, 3>& channels) const {
-    const float* from =
-        pixels_ + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                       static_cast<std::size_t>(x));
-    for (int i = 0; i < key_lanes; ++i) {
-      const float* pixel = from + 3 * std::min(i, count - 1);
-      for (std::size_t c = 0; c < 3; ++c) channels[c][i] = pixel[order_[c]];
+    const float* from = at(y, x);
+    if (count == key_lanes) {
+      load_raw(from, channels);
+    } else {
+      for (int i = 0; i < key_lanes; ++i) {
+        const float* pixel = from + 3 * std::min(i, count - 1);
+        for (std::size_t c = 0; c < 3; ++c) channels[c][i] = pixel[order_[c]];
+      }
     }
     for (F8& c : channels) c = (c > 0.0F) & (c < 1e9F) ? c : F8{};
   }
 
+  // Whether eight pixels lie within bounds.
+  bool within(int y, int x, const LightBounds& bounds) const {
+    std::array<F8, 3> c;
+    load_raw(at(y, x), c);
+    const I8 inside = (c[0] >= bounds.least) & (c[0] <= bounds.most[0]) & (c[1] <= bounds.most[1]) &
+                      (c[2] <= bounds.most[2]);
+    return !any_of(~inside);
+  }
+
  private:
+  const float* at(int y, int x) const {
+    return pixels_ + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                          static_cast<std::size_t>(x));
+  }
+
+  // Eight pixels of three channels, apart.
+  void load_raw(const float* from, std::array<F8, 3>& channels) const {
+    std::array<F8, 3> rgb;
+    const F4 a = load_four(from), b = load_four(from + 4), c = load_four(from + 8);
+    const F4 d = load_four(from + 12), e = load_four(from + 16), f = load_four(from + 20);
+    const F8 ad = __builtin_shufflevector(a, d, 0, 1, 2, 3, 4, 5, 6, 7);
+    const F8 be = __builtin_shufflevector(b, e, 0, 1, 2, 3, 4, 5, 6, 7);
+    const F8 cf = __builtin_shufflevector(c, f, 0, 1, 2, 3, 4, 5, 6, 7);
+    // Within each half: a = r0 g0 b0 r1, b = g1 b1 r2 g2, c = b2 r3 g3 b3.
+    const F8 rg23 = __builtin_shufflevector(be, cf, 2, 3, 9, 10, 6, 7, 13, 14);  // r2 g2 r3 g3
+    const F8 gb01 = __builtin_shufflevector(ad, be, 1, 2, 8, 9, 5, 6, 12, 13);   // g0 b0 g1 b1
+    rgb[0] = __builtin_shufflevector(ad, rg23, 0, 3, 8, 10, 4, 7, 12, 14);
+    rgb[1] = __builtin_shufflevector(gb01, rg23, 0, 2, 9, 11, 4, 6, 13, 15);
+    rgb[2] = __builtin_shufflevector(gb01, cf, 1, 3, 8, 11, 5, 7, 12, 15);
+    for (std::size_t i = 0; i < 3; ++i) {
+      channels[i] = order_[i] == 0 ? rgb[0] : order_[i] == 1 ? rgb[1] : rgb[2];
+    }
+  }
+
   const float* pixels_;
   int width_;
   std::array<int, 3> order_;
@@ -100,6 +179,8 @@ struct CodeBounds {
 // The same of RGBA codes of 8 bits; alpha is not read.
 class CodeRows {
  public:
+  using Bounds = CodeBounds;
+
   CodeRows(const std::uint8_t* codes, int width, std::array<int, 3> order, LightPolynomial light)
       : codes_(codes), width_(width), light_(light) {
     for (std::size_t c = 0; c < 3; ++c) shifts_[c] = 8 * order[c];

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
-#include <type_traits>
 
 #include "capture/half.h"
 #include "capture/image.h"
@@ -23,18 +22,21 @@ inline constexpr float calm = 1.0F, moving = 2.0F, least_gain_of_change = 0.2F;
 // Alpha below this share of the noise is none; from twice of it on it is as it was.
 inline constexpr float haze_of_noise = 0.6F;
 
-// One frame through `Formula`, which gives a matte (alpha and spill) of texel and plate, and a
-// foreground of them and the matte.
+// One frame through `Formula`, which tells the share of the screen, of that a matte, and of that a
+// foreground.
 //
-// Three rows of alpha are in flight: a row is finished when the one below it has been seen.
+// Three rows are in flight: one is finished when the one below it has been seen. What is not screen
+// at a glance is done eight pixels at a time, by short loops over a row: in one loop, each eight
+// would wait for results of their own, longer than a processor looks ahead.
 template <class Source, class Formula>
 class KeyPass {
  public:
+  using Bounds = typename Source::Bounds;
   struct Inputs {
     const LitPlate& plate;
     std::span<const std::uint8_t> garbage, core;
-    float noise;                       // of alpha, one sigma; 0 = no smoothing
-    std::span<const CodeBounds> bare;  // codes of each 8x8 pixels that are screen at a glance
+    float noise;                   // of alpha, one sigma; 0 = no smoothing
+    std::span<const Bounds> bare;  // what is screen at a glance, of each 8x8 pixels; or empty
   };
 
   KeyPass(const Source& source,
@@ -47,25 +49,19 @@ class KeyPass {
         in_(in),
         scratch_(scratch),
         keyed_(keyed),
-        order_(channels_of(in.plate.colour)),
-        padded_(
-            static_cast<std::size_t>((in.plate.width + key_lanes - 1) / key_lanes * key_lanes)) {
-    const std::size_t stride = padded_ + 2 * key_lanes;
-    plate_stride_ = padded_ + 4 * key_lanes;
-    scratch.rows.resize(stride * 8 + 12 * plate_stride_);
-    plate_rows_ = scratch.rows.data() + stride * 8;
-    float* row = scratch.rows.data() + key_lanes;
-    for (std::size_t i = 0; i < 3; ++i)
-      alpha_[i] = row + 2 * i * stride, change_[i] = row + (2 * i + 1) * stride;
-    for (std::size_t i = 0; i < 2; ++i) spill_[i] = row + (6 + i) * stride;
-    scratch.clear.resize(2 * (padded_ / key_lanes));
-    const std::size_t cells = padded_ * static_cast<std::size_t>(in.plate.height);
-    if (scratch.previous.size() != cells) {
-      scratch.previous.assign(cells, 0);
+        across_(static_cast<std::size_t>((in.plate.width + key_lanes - 1) / key_lanes)) {
+    const std::size_t stride = (across_ + 2) * key_lanes;
+    scratch.change.resize(3 * stride);
+    for (std::size_t i = 0; i < 3; ++i) change_[i] = scratch.change.data() + key_lanes + i * stride;
+    for (auto& blocks : scratch.blocks) blocks.resize(across_);
+    const std::size_t pixels = across_ * key_lanes * static_cast<std::size_t>(in.plate.height);
+    if (scratch.previous.size() != pixels) {
+      scratch.previous.assign(pixels, 0);
       scratch.has_previous = false;
     }
-    clear_ = scratch.clear.data();
     smooths_ = in.noise > 0 && scratch.has_previous;
+    const auto order = channels_of(in.plate.colour);
+    for (std::size_t i = 0; i < 3; ++i) place_of_[static_cast<std::size_t>(order[i])] = i;
   }
 
   // Returns how many pixels are neither clear nor whole.
@@ -81,118 +77,129 @@ class KeyPass {
   }
 
  private:
-  std::size_t slot(int y) const { return static_cast<std::size_t>(y) % 3; }
+  float* change(int y) const { return change_[static_cast<std::size_t>(y) % 3]; }
+  // Those of a row that are not clear.
+  std::span<KeyBlock> blocks(int y) const {
+    const auto slot = static_cast<std::size_t>(y) % 2;
+    return std::span(scratch_.blocks[slot]).first(count_[slot]);
+  }
   std::uint16_t* previous(int y) const {
-    return scratch_.previous.data() + static_cast<std::size_t>(y) * padded_;
-  }
-  int count_at(int x) const { return std::min(key_lanes, in_.plate.width - x); }
-
-  // The plate at eight pixels.
-  F8 plate_at_lanes(int x, std::size_t channel) const {
-    const F8 top = load_lanes(above_ + channel * plate_stride_ + x);
-    if (down_ == 0) return top;
-    return top + down_ * (load_lanes(below_ + channel * plate_stride_ + x) - top);
+    return scratch_.previous.data() + static_cast<std::size_t>(y) * across_ * key_lanes;
   }
 
-  // A row of plate cells, as wide as the frame: four rows of floats, kept while they are near.
-  const float* wide_row(int row) {
-    const auto slot = static_cast<std::size_t>(row) % 3;
-    float* wide = plate_rows_ + slot * 4 * plate_stride_;
-    if (wide_rows_[slot] == row) return wide;
-    wide_rows_[slot] = row;
-    const LitPlate& plate = in_.plate;
-    using F4 = float __attribute__((vector_size(16)));
-    constexpr F4 weight{.125F, .375F, .625F, .875F};
-    for (std::size_t c = 0; c < 4; ++c) {
-      float* to = wide + c * plate_stride_;
-      const float* cell = plate.cell(row, 0) + c;
-      if (plate.step == 1) {
-        for (int x = 0; x < plate.columns; ++x) to[x] = cell[4 * x];
-        for (std::size_t x = static_cast<std::size_t>(plate.columns); x < padded_; ++x)
-          to[x] = to[x - 1];
-        continue;
-      }
-      // Pixels lie between the centres of cells at eighths.
-      to[0] = to[1] = cell[0];
-      to += 2;
-      for (int column = 0; column < plate.columns; ++column, to += 4) {
-        const float a = cell[4 * column], b = cell[4 * std::min(column + 1, plate.columns - 1)];
-        const F4 four = a + weight * (b - a);
-        std::memcpy(to, &four, sizeof four);
-      }
-      const float* end = wide + c * plate_stride_ + padded_;
-      for (; to < end; ++to) *to = to[-1];
-    }
-    return wide;
-  }
-
-  void place_plate(int y) {
+  // Where a row of pixels lies in the plate.
+  struct PlateRow {
+    const float* above;  // cells
+    const float* below;
+    float down;  // of the way between them
+  };
+  PlateRow plate_row(int y) const {
     const LitPlate& plate = in_.plate;
     const float at =
         std::clamp((static_cast<float>(y) + 0.5F) / static_cast<float>(plate.step) - 0.5F, 0.0F,
                    static_cast<float>(plate.rows - 1));
     const int row = static_cast<int>(at);
-    down_ = at - static_cast<float>(row);
-    above_ = wide_row(row);
-    below_ = wide_row(std::min(row + 1, plate.rows - 1));
+    return {plate.cell(row, 0), plate.cell(std::min(row + 1, plate.rows - 1), 0),
+            at - static_cast<float>(row)};
   }
 
-  std::array<F8, 3> plate_colour(int x) const {
-    return {plate_at_lanes(x, 0), plate_at_lanes(x, 1), plate_at_lanes(x, 2)};
+  // The plate at eight pixels: cells blended downwards, then across.
+  std::array<F8, 4> plate_at_lanes(const PlateRow& row, int x) const {
+    const LitPlate& plate = in_.plate;
+    std::array<F8, 4> p;
+    if (plate.step == 1) {
+      const auto cell = [&](int i) {
+        return load_four(row.above + 4 * std::min(x + i, plate.columns - 1));
+      };
+      const auto first = transposed(cell(0), cell(1), cell(2), cell(3));
+      const auto second = transposed(cell(4), cell(5), cell(6), cell(7));
+      for (std::size_t c = 0; c < 4; ++c)
+        p[c] = __builtin_shufflevector(first[c], second[c], 0, 1, 2, 3, 4, 5, 6, 7);
+      return p;
+    }
+    // Pixels lie between the centres of cells of 4 at eighths.
+    const auto cell = [&](int i) {
+      const int column = 4 * std::clamp(x / 4 + i, 0, plate.columns - 1);
+      const F4 top = load_four(row.above + column), low = load_four(row.below + column);
+      return top + row.down * (low - top);
+    };
+    constexpr F8 across{.625F, .875F, .125F, .375F, .625F, .875F, .125F, .375F};
+    const auto cells = transposed(cell(-1), cell(0), cell(1), cell(2));
+    for (std::size_t c = 0; c < 4; ++c) {
+      const F8 left = __builtin_shufflevector(cells[c], cells[c], 0, 0, 1, 1, 1, 1, 2, 2);
+      const F8 right = __builtin_shufflevector(cells[c], cells[c], 1, 1, 2, 2, 2, 2, 3, 3);
+      p[c] = left + across * (right - left);
+    }
+    return p;
+  }
+
+  // Of each eight pixels of a row, which are not bare screen at a glance, or were not clear before.
+  void find_blocks(int y) {
+    const auto slot = static_cast<std::size_t>(y) % 2;
+    KeyBlock* const blocks = scratch_.blocks[slot].data();
+    const std::uint16_t* const before = previous(y);
+    const int width = in_.plate.width, whole = in_.bare.empty() ? 0 : width / key_lanes;
+    const Bounds* const bare =
+        in_.bare.empty() ? nullptr : in_.bare.data() + static_cast<std::size_t>(y / 8) * across_;
+    std::size_t count = 0;
+    int x = 0;
+    for (int i = 0; i < whole; ++i, x += key_lanes) {
+      std::array<std::uint64_t, 2> codes;
+      std::memcpy(codes.data(), before + x, sizeof codes);
+      const bool was_clear = (codes[0] | codes[1]) == 0;
+      blocks[count].x = x;
+      blocks[count].count = key_lanes;
+      count += !(source_.within(y, x, bare[i]) & was_clear);
+    }
+    for (; x < width; x += key_lanes) {
+      blocks[count].x = x;
+      blocks[count].count = std::min(key_lanes, width - x);
+      ++count;
+    }
+    count_[slot] = count;
   }
 
   void see_row(int y) {
-    place_plate(y);
-    float* alpha = alpha_[slot(y)];
-    float* change = change_[slot(y)];
-    float* spill = spill_[static_cast<std::size_t>(y) % 2];
-    const std::uint16_t* before = previous(y);
-    const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(in_.plate.width);
-    for (int x = 0; x < in_.plate.width; x += key_lanes) {
-      const int count = count_at(x);
-      char& clear = clear_[static_cast<std::size_t>(y) % 2 * (padded_ / key_lanes) +
-                           static_cast<std::size_t>(x / key_lanes)];
-      clear = is_clear(y, x, count, before + x);
-      if (clear) {
-        store_lanes(change + x, F8{});
-        continue;
-      }
-      std::array<F8, 3> c;
-      source_.load(y, x, count, c);
-      TexelMatte<F8> matte = formula_.matte(c, plate_colour(x), plate_at_lanes(x, 3));
-      if (!in_.garbage.empty() || !in_.core.empty())
-        apply_masks(at + static_cast<std::size_t>(x), count, matte);
-      store_lanes(alpha + x, matte.alpha);
-      store_lanes(spill + x, matte.spill);
-      if (!smooths_) continue;
-      const F8 d = matte.alpha - load_previous(before + x);
-      store_lanes(change + x, d < 0.0F ? -d : d);
+    find_blocks(y);
+    const std::span<KeyBlock> row = blocks(y);
+    const PlateRow plate_here = plate_row(y);
+    for (KeyBlock& block : row) {
+      source_.load(y, block.x, block.count, block.light);
+      const auto p = plate_at_lanes(plate_here, block.x);
+      block.plate = {p[0], p[1], p[2]};
+      block.plate_last = p[3];
     }
-    change[-1] = change[0];
-    change[in_.plate.width] = change[in_.plate.width - 1];
+    for (KeyBlock& block : row)
+      block.share = formula_.share(block.light, block.plate, block.plate_last);
+    for (KeyBlock& block : row)
+      block.matte = formula_.matte(block.light, block.plate, block.plate_last, block.share);
+    if (!in_.garbage.empty() || !in_.core.empty()) {
+      for (KeyBlock& block : row) apply_masks(y, block);
+    }
+    if (smooths_) tell_change(y, row);
   }
 
-  // Whether eight pixels are bare screen at a glance, and were clear before.
-  bool is_clear(int y, int x, int count, const std::uint16_t* before) const {
-    if constexpr (std::is_same_v<Source, CodeRows>) {
-      if (in_.bare.empty() || count < key_lanes) return false;
-      const auto block =
-          static_cast<std::size_t>(y / 8) * (padded_ / 8) + static_cast<std::size_t>(x / 8);
-      if (!source_.within(y, x, in_.bare[block])) return false;
-      std::array<std::uint64_t, 2> codes;
-      std::memcpy(codes.data(), before, sizeof codes);
-      return (codes[0] | codes[1]) == 0;
+  void tell_change(int y, std::span<const KeyBlock> row) {
+    float* const change_here = change(y);
+    const std::uint16_t* const before = previous(y);
+    std::fill_n(change_here, across_ * key_lanes, 0.0F);
+    for (const KeyBlock& block : row) {
+      const F8 d = block.matte.alpha - load_previous(before + block.x);
+      store_lanes(change_here + block.x, d < 0.0F ? -d : d);
     }
-    return false;
+    change_here[-1] = change_here[0];
+    change_here[in_.plate.width] = change_here[in_.plate.width - 1];
   }
 
-  void apply_masks(std::size_t at, int count, TexelMatte<F8>& matte) const {
-    for (int i = 0; i < count; ++i) {
-      const std::size_t pixel = at + static_cast<std::size_t>(i);
-      if (!in_.core.empty()) {
-        matte.alpha[i] = std::max(matte.alpha[i], static_cast<float>(in_.core[pixel]) / 255);
-      }
-      if (!in_.garbage.empty()) matte.alpha[i] *= 1 - static_cast<float>(in_.garbage[pixel]) / 255;
+  void apply_masks(int y, KeyBlock& block) const {
+    for (int i = 0; i < block.count; ++i) {
+      const std::size_t pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(in_.plate.width) +
+          static_cast<std::size_t>(block.x + i);
+      F8& alpha = block.matte.alpha;
+      if (!in_.core.empty())
+        alpha[i] = std::max(alpha[i], static_cast<float>(in_.core[pixel]) / 255);
+      if (!in_.garbage.empty()) alpha[i] *= 1 - static_cast<float>(in_.garbage[pixel]) / 255;
     }
   }
 
@@ -209,81 +216,67 @@ class KeyPass {
   }
 
   void finish_row(int y) {
-    place_plate(y);
-    const int height = in_.plate.height;
-    const float* alpha = alpha_[slot(y)];
-    const float* spill = spill_[static_cast<std::size_t>(y) % 2];
-    const std::array<const float*, 3> around{change_[slot(std::max(y - 1, 0))], change_[slot(y)],
-                                             change_[slot(std::min(y + 1, height - 1))]};
-    const float per_noise = smooths_ ? 1 / (9 * in_.noise) : 0;
-    capture::Half* to = &keyed_.pixels[keyed_.index(y, 0)];
-    std::uint16_t* before = previous(y);
-    for (int x = 0; x < in_.plate.width; x += key_lanes, to += 4 * key_lanes) {
-      const int count = count_at(x);
-      if (clear_[static_cast<std::size_t>(y) % 2 * (padded_ / key_lanes) +
-                 static_cast<std::size_t>(x / key_lanes)]) {
-        write_clear(count, to);
-        continue;
+    const std::span<KeyBlock> row = blocks(y);
+    if (smooths_) smooth(y, row);
+    if (in_.noise > 0) {
+      std::uint16_t* const before = previous(y);
+      // Noise of bare screen is above 0 only, and so would leave a haze.
+      const float haze = in_.noise * haze_of_noise;
+      for (KeyBlock& block : row) {
+        F8& alpha = block.matte.alpha;
+        store_previous(before + block.x, alpha);
+        alpha = least(alpha, most(2 * (alpha - haze), F8{}));
       }
-      TexelMatte<F8> matte{load_lanes(alpha + x), load_lanes(spill + x)};
-      if (smooths_) {
-        F8 sum{};
-        for (const float* row : around) {
-          sum += load_lanes(row + x - 1) + load_lanes(row + x) + load_lanes(row + x + 1);
-        }
-        const F8 zero{}, one = all_of(1);
-        const F8 moved = (sum * per_noise - calm) * (1 / (moving - calm));
-        const F8 gain =
-            least_gain_of_change + (1 - least_gain_of_change) * least(most(moved, zero), one);
-        const F8 old = load_previous(before + x);
-        matte.alpha = old + gain * (matte.alpha - old);
-        // What never gets there in codes of 1/65535 is there.
-        matte.alpha = matte.alpha < 0.002F ? zero : matte.alpha > 0.998F ? one : matte.alpha;
+    }
+    capture::Half* const to = &keyed_.pixels[keyed_.index(y, 0)];
+    std::fill_n(to, 4 * static_cast<std::size_t>(in_.plate.width), capture::Half{0});
+    for (const KeyBlock& block : row) {
+      if (!any_of(block.matte.alpha > 0.0F)) continue;
+      write(formula_.foreground(block.light, block.plate, block.matte), block.count,
+            to + 4 * block.x);
+    }
+  }
+
+  // Alpha over frames.
+  void smooth(int y, std::span<KeyBlock> row) const {
+    const std::array<const float*, 3> around{change(std::max(y - 1, 0)), change(y),
+                                             change(std::min(y + 1, in_.plate.height - 1))};
+    const std::uint16_t* const before = previous(y);
+    const float per_noise = 1 / (9 * in_.noise);
+    const F8 zero{}, one = all_of(1);
+    for (KeyBlock& block : row) {
+      F8 sum{};
+      for (const float* from : around) {
+        from += block.x;
+        sum += load_lanes(from - 1) + load_lanes(from) + load_lanes(from + 1);
       }
-      if (in_.noise > 0) {
-        store_previous(before + x, matte.alpha);
-        // Noise of bare screen is above 0 only, and so would leave a haze.
-        const float haze = in_.noise * haze_of_noise;
-        matte.alpha = least(matte.alpha, most(2 * (matte.alpha - haze), F8{}));
-      }
-      if (!any_of(matte.alpha > 0.0F)) {
-        write_clear(count, to);
-        continue;
-      }
-      std::array<F8, 3> c;
-      source_.load(y, x, count, c);
-      const auto texel = formula_.foreground(c, plate_colour(x), matte);
-      write(texel, count, to);
+      const F8 moved = (sum * per_noise - calm) * (1 / (moving - calm));
+      const F8 gain =
+          least_gain_of_change + (1 - least_gain_of_change) * least(most(moved, zero), one);
+      const F8 old = load_previous(before + block.x);
+      const F8 alpha = old + gain * (block.matte.alpha - old);
+      // What never gets there in codes of 1/65535 is there.
+      block.matte.alpha = alpha < 0.002F ? zero : alpha > 0.998F ? one : alpha;
     }
   }
 
   void write(const KeyedTexel<F8>& texel, int count, capture::Half* to) {
-    std::array<F8, 4> rgba;
-    rgba[static_cast<std::size_t>(order_[0])] = texel.first;
-    rgba[static_cast<std::size_t>(order_[1])] = texel.second;
-    rgba[static_cast<std::size_t>(order_[2])] = texel.third;
-    for (std::size_t c = 0; c < 3; ++c) rgba[c] = least(rgba[c], all_of(capture::half_max));
-    rgba[3] = texel.alpha;
+    const auto channel = [&](std::size_t place) {
+      const F8 v = place == 0 ? texel.first : place == 1 ? texel.second : texel.third;
+      return least(v, all_of(capture::half_max));
+    };
+    const std::array<F8, 4> rgba{channel(place_of_[0]), channel(place_of_[1]),
+                                 channel(place_of_[2]), texel.alpha};
     const F8 part = texel.alpha * (1.0F - texel.alpha);
     const I8 soft = part > 0.0475F;  // .05 < alpha < .95
     if (count == key_lanes) {
-      if (any_of(soft)) {
-        for (int i = 0; i < key_lanes; ++i) soft_ -= soft[i];
-      }
+      soft_ += count_of(soft);
       write_eight(rgba, to);
       return;
     }
     for (int i = 0; i < count; ++i) {
       soft_ -= soft[i];
       for (std::size_t c = 0; c < 4; ++c) *to++ = capture::half_from_float(rgba[c][i]);
-    }
-  }
-
-  static void write_clear(int count, capture::Half* to) {
-    if (count == key_lanes) {
-      std::memset(to, 0, 4 * sizeof *to * key_lanes);  // of known size: two stores
-    } else {
-      std::fill_n(to, 4 * count, capture::Half{0});
     }
   }
 
@@ -312,17 +305,10 @@ class KeyPass {
   const Inputs in_;
   KeyScratch& scratch_;
   capture::HalfImage& keyed_;
-  std::array<int, 3> order_;
-  std::size_t padded_;
-  std::array<float*, 3> alpha_{}, change_{};
-  std::array<float*, 2> spill_{};
-  char* clear_ = nullptr;
-  const float* above_ = nullptr;
-  const float* below_ = nullptr;
-  float down_ = 0;
-  float* plate_rows_ = nullptr;
-  std::size_t plate_stride_ = 0;
-  std::array<int, 3> wide_rows_{-1, -1, -1};
+  std::size_t across_;                     // blocks of a row
+  std::array<std::size_t, 2> count_{};     // of blocks that are not clear
+  std::array<std::size_t, 3> place_of_{};  // of red, green and blue in the keyer's order
+  std::array<float*, 3> change_{};
   bool smooths_ = false;
   std::int64_t soft_ = 0;
 };

@@ -60,9 +60,28 @@ class KeyTable {
  public:
   explicit KeyTable(const TableCodes& codes);
 
-  TableEntry<float> at(const TablePlace<float>& place) const { return entry<float>(place); }
-  [[gnu::always_inline]] TableEntry<F8> at(const TablePlace<F8>& place) const {
-    return entry<F8>(place);
+  // Between four places: which, and how far in shares and lights.
+  template <class V>
+  struct Square {
+    decltype(to_int_lanes(V{})) index;
+    V across_shares;
+    V across_lights;
+  };
+  template <class V>
+  [[gnu::always_inline]] static Square<V> square_of(const TablePlace<V>& place) {
+    const auto share =
+        to_int_lanes(least(place.share, lanes_like(place.share, table_shares - 1.5F)));
+    const auto light =
+        to_int_lanes(least(place.light, lanes_like(place.share, table_lights - 1.5F)));
+    const auto hue = to_int_lanes(place.hue + 0.5F);
+    return {hue * squares + share * squares_across + light, place.share - to_float_lanes(share),
+            place.light - to_float_lanes(light)};
+  }
+  template <class V>
+  [[gnu::always_inline]] TableEntry<V> at(const Square<V>& square) const {
+    const auto both = words(square.index);
+    return {between<V>(both.alpha, square.across_shares, square.across_lights),
+            between<V>(both.plate, square.across_shares, square.across_lights)};
   }
 
  private:
@@ -101,19 +120,6 @@ class KeyTable {
     }
     return both;
 #endif
-  }
-
-  template <class V>
-  [[gnu::always_inline]] TableEntry<V> entry(const TablePlace<V>& place) const {
-    const auto low_share =
-        to_int_lanes(least(place.share, lanes_like(place.share, table_shares - 1.5F)));
-    const auto low_light =
-        to_int_lanes(least(place.light, lanes_like(place.share, table_lights - 1.5F)));
-    const V u = place.share - to_float_lanes(low_share),
-            v = place.light - to_float_lanes(low_light);
-    const auto hue = to_int_lanes(place.hue + 0.5F);
-    const auto both = words(hue * squares + low_share * squares_across + low_light);
-    return {between<V>(both.alpha, u, v), between<V>(both.plate, u, v)};
   }
 
   template <class V, class I>

@@ -33,24 +33,42 @@ struct TexelMatte {
   V spill;
 };
 
+// How much of the screen a texel is, as far as one look tells: what its matte is made from.
+template <class V>
+struct TexelShare {
+  V share;                     // of the plate's excess
+  KeyTable::Square<V> square;  // where the table says what it means; unset without a table
+};
+
 // `c` and `p` are light of texel and plate, scene-linear, in the keyer's order; `over_excess` is
-// the last value of the plate's cell. Alpha is 1 where the plate shows no screen.
+// the last value of the plate's cell.
 template <bool two_primaries, class V>
-[[gnu::always_inline]] inline TexelMatte<V> matte_of(const std::array<V, 3>& c,
+[[gnu::always_inline]] inline TexelShare<V> share_of(const std::array<V, 3>& c,
                                                      const std::array<V, 3>& p,
                                                      V over_excess,
                                                      const KeyDials& dials) {
+  TexelShare<V> texel;
+  texel.share = screen_excess<two_primaries>(c[0], c[1], c[2]) * over_excess;
+  if (dials.table == nullptr) return texel;
+  // Of two primaries, the greater rest stands for the second channel.
+  V second = c[1] - texel.share * p[1];
+  if constexpr (two_primaries) second = most(second, c[0] - texel.share * p[0]);
+  const V third = c[2] - texel.share * p[2];
+  texel.square =
+      KeyTable::square_of(place_in_table(texel.share, second * over_excess, third * over_excess));
+  return texel;
+}
+
+// Alpha is 1 where the plate shows no screen.
+template <class V>
+[[gnu::always_inline]] inline TexelMatte<V> matte_of(const TexelShare<V>& texel,
+                                                     V over_excess,
+                                                     const KeyDials& dials) {
   const V zero = lanes_like(over_excess, 0), one = lanes_like(over_excess, 1);
-  const V share = screen_excess<two_primaries>(c[0], c[1], c[2]) * over_excess;
-  V alpha = one - share;
-  V plate = least(most(share, zero), one);
+  V alpha = one - texel.share;
+  V plate = least(most(texel.share, zero), one);
   if (dials.table != nullptr) {
-    // Of two primaries, the greater rest stands for the second channel.
-    V second = c[1] - share * p[1];
-    if constexpr (two_primaries) second = most(second, c[0] - share * p[0]);
-    const V third = c[2] - share * p[2];
-    const auto entry =
-        dials.table->at(place_in_table(share, second * over_excess, third * over_excess));
+    const auto entry = dials.table->at(texel.square);
     alpha = over_excess > 0.0F ? entry.alpha : one;
     plate = over_excess > 0.0F ? entry.plate : zero;
   }
@@ -61,6 +79,14 @@ template <bool two_primaries, class V>
   const V mixed = least(most((plate - 0.3F) * (1 / 0.3F), zero), one);
   spill = most(spill, mixed * plate - (one - alpha));
   return {alpha, spill};
+}
+
+template <bool two_primaries, class V>
+[[gnu::always_inline]] inline TexelMatte<V> matte_of(const std::array<V, 3>& c,
+                                                     const std::array<V, 3>& p,
+                                                     V over_excess,
+                                                     const KeyDials& dials) {
+  return matte_of(share_of<two_primaries>(c, p, over_excess, dials), over_excess, dials);
 }
 
 // The foreground that goes with a matte: what is left of the texel without the plate behind it and

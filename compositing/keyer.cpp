@@ -16,31 +16,29 @@ namespace {
 
 using capture::HalfImage;
 
+using Three = std::array<F8, 3>;
+
 template <bool two_primaries>
 struct ScreenFormula {
   KeyDials dials;
-  TexelMatte<F8> matte(const std::array<F8, 3>& c,
-                       const std::array<F8, 3>& p,
-                       F8 over_excess) const {
-    return matte_of<two_primaries>(c, p, over_excess, dials);
+  TexelShare<F8> share(const Three& c, const Three& p, F8 over_excess) const {
+    return share_of<two_primaries>(c, p, over_excess, dials);
   }
-  KeyedTexel<F8> foreground(const std::array<F8, 3>& c,
-                            const std::array<F8, 3>& p,
-                            const TexelMatte<F8>& matte) const {
+  TexelMatte<F8> matte(const Three&, const Three&, F8 over_excess, const TexelShare<F8>& s) const {
+    return matte_of(s, over_excess, dials);
+  }
+  KeyedTexel<F8> foreground(const Three& c, const Three& p, const TexelMatte<F8>& matte) const {
     return foreground_of<two_primaries>(c, p, matte, dials.despill);
   }
 };
 
 struct DifferenceFormula {
   KeyDials dials;
-  TexelMatte<F8> matte(const std::array<F8, 3>& c,
-                       const std::array<F8, 3>& p,
-                       F8 over_noise) const {
+  TexelShare<F8> share(const Three&, const Three&, F8) const { return TexelShare<F8>(); }
+  TexelMatte<F8> matte(const Three& c, const Three& p, F8 over_noise, const TexelShare<F8>&) const {
     return difference_matte(c, p, over_noise, dials);
   }
-  KeyedTexel<F8> foreground(const std::array<F8, 3>& c,
-                            const std::array<F8, 3>& p,
-                            const TexelMatte<F8>& matte) const {
+  KeyedTexel<F8> foreground(const Three& c, const Three& p, const TexelMatte<F8>& matte) const {
     return foreground_of<true>(c, p, matte, 0.0F);  // no colour to take out
   }
 };
@@ -61,45 +59,42 @@ const std::array<std::uint8_t, 4096>& codes_of(capture::Transfer transfer) {
   return all[static_cast<std::size_t>(transfer)];
 }
 
-// Codes within which eight pixels of a row are screen at a glance, for each 8x8 pixels: the
-// primary within a tenth of the plate, the others no brighter than it by more than noise. A thing
-// that covers less than `bare_share` of each of eight pixels is given up.
-void bound_screen(const LitPlate& lit,
-                  capture::Transfer transfer,
-                  std::vector<CodeBounds>& bounds) {
+// Light within which eight pixels of a row are screen at a glance, for each 8x8 pixels: the primary
+// within a tenth of the plate, the others no brighter than it by more than noise. A thing that
+// covers less than a twentieth of each of eight pixels is given up.
+template <class Add>
+void bound_screen(const LitPlate& lit, const Add& add) {
   constexpr float darkest = 0.955F, brightest = 1.15F, more = 0.03F;
-  if (has_two_primaries(lit.colour)) return;
-  const auto order = channels_of(lit.colour);
-  const auto& codes = codes_of(transfer);
+  const int blocks = (lit.width + 7) / 8;
+  for (int row = 0; row < lit.rows; row += 2) {
+    for (int block = 0; block < blocks; ++block) {
+      F4 low = load_four(lit.cell(row, std::min(2 * block, lit.columns - 1))), high = low;
+      for (int part = 1; part < 4; ++part) {
+        const F4 cell = load_four(lit.cell(std::min(row + part / 2, lit.rows - 1),
+                                           std::min(2 * block + part % 2, lit.columns - 1)));
+        low = cell < low ? cell : low;
+        high = cell > high ? cell : high;
+      }
+      LightBounds bounds;
+      if (low[3] > 0) {
+        const float slack = more / high[3];
+        bounds = {{low[0] * brightest, low[1] + slack, low[2] + slack}, high[0] * darkest};
+      }
+      add(bounds);
+    }
+  }
+}
+
+CodeBounds codes_of(const LightBounds& bounds,
+                    const std::array<std::uint8_t, 4096>& codes,
+                    const std::array<int, 3>& order) {
   const auto code = [&](float light) {
     return static_cast<std::uint32_t>(
         codes[static_cast<std::size_t>(std::clamp(light, 0.0F, 1.0F) * 4095)]);
   };
-  const int blocks = (lit.width + 7) / 8;
-  for (int row = 0; row < lit.rows; row += 2) {
-    for (int block = 0; block < blocks; ++block) {
-      std::array<float, 4> low{}, high{};
-      const float* first = lit.cell(row, std::min(2 * block, lit.columns - 1));
-      std::copy_n(first, 4, low.begin());
-      high = low;
-      for (int part = 1; part < 4; ++part) {
-        const float* cell = lit.cell(std::min(row + part / 2, lit.rows - 1),
-                                     std::min(2 * block + part % 2, lit.columns - 1));
-        for (std::size_t c = 0; c < 4; ++c) {
-          low[c] = std::min(low[c], cell[c]);
-          high[c] = std::max(high[c], cell[c]);
-        }
-      }
-      CodeBounds bound{0xFF000000U, 0};
-      if (low[3] > 0) {
-        const float slack = more / high[3];
-        const std::array<float, 3> top{low[0] * brightest, low[1] + slack, low[2] + slack};
-        for (std::size_t c = 0; c < 3; ++c) bound.most |= code(top[c]) << (8 * order[c]);
-        bound.least = code(high[0] * darkest) << (8 * order[0]);
-      }
-      bounds.push_back(bound);
-    }
-  }
+  CodeBounds coded{0xFF000000U, code(bounds.least) << (8 * order[0])};
+  for (std::size_t c = 0; c < 3; ++c) coded.most |= code(bounds.most[c]) << (8 * order[c]);
+  return coded;
 }
 
 const KeyTable& shipped_table() {
@@ -161,19 +156,32 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
 KeyReport Keyer::key(const capture::Image& frame, HalfImage& keyed) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   const LightRows rows(frame, channels_of(light_.plate().colour));
-  scratch_.bare.clear();
-  return report(sight, key_rows(rows, keyed));
+  scratch_.bare_light.clear();
+  if (glances()) {
+    bound_screen(light_.lit(),
+                 [&](const LightBounds& bounds) { scratch_.bare_light.push_back(bounds); });
+  }
+  return report(sight, key_rows(rows, scratch_.bare_light, keyed));
 }
 
 KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
-  const CodeRows rows(frame.rgba.data(), frame.width, channels_of(light_.plate().colour),
-                      light_polynomial(frame.transfer));
-  scratch_.bare.clear();
-  if (masks_.core.empty() && settings_.method == KeyMethod::screen && settings_.learned) {
-    bound_screen(light_.lit(), frame.transfer, scratch_.bare);
+  const auto order = channels_of(light_.plate().colour);
+  const CodeRows rows(frame.rgba.data(), frame.width, order, light_polynomial(frame.transfer));
+  scratch_.bare_codes.clear();
+  if (glances()) {
+    const auto& codes = codes_of(frame.transfer);
+    bound_screen(light_.lit(), [&](const LightBounds& bounds) {
+      scratch_.bare_codes.push_back(codes_of(bounds, codes, order));
+    });
   }
-  return report(sight, key_rows(rows, keyed));
+  return report(sight, key_rows(rows, scratch_.bare_codes, keyed));
+}
+
+// Whether pixels may be told to be screen before they are keyed.
+bool Keyer::glances() const {
+  return masks_.core.empty() && settings_.method == KeyMethod::screen && settings_.learned &&
+         !has_two_primaries(light_.lit().colour);
 }
 
 KeyReport Keyer::follow(const capture::Image& frame) {
@@ -182,7 +190,9 @@ KeyReport Keyer::follow(const capture::Image& frame) {
 
 // Returns the share of pixels that are neither screen nor person.
 template <class Source>
-float Keyer::key_rows(const Source& source, HalfImage& keyed) {
+float Keyer::key_rows(const Source& source,
+                      std::span<const typename Source::Bounds> bare,
+                      HalfImage& keyed) {
   const LitPlate& lit = light_.lit();
   const std::size_t pixels =
       static_cast<std::size_t>(lit.height) * static_cast<std::size_t>(lit.width);
@@ -191,8 +201,7 @@ float Keyer::key_rows(const Source& source, HalfImage& keyed) {
   const auto run = [&](const auto& formula) {
     using Pass = KeyPass<Source, std::decay_t<decltype(formula)>>;
     const float noise = settings_.smoothing * lit.sigma;
-    Pass pass(source, formula, {lit, masks_.garbage, masks_.core, noise, scratch_.bare}, scratch_,
-              keyed);
+    Pass pass(source, formula, {lit, masks_.garbage, masks_.core, noise, bare}, scratch_, keyed);
     return static_cast<float>(pass.run()) / static_cast<float>(pixels);
   };
   if (settings_.method == KeyMethod::difference) return run(DifferenceFormula{dials_});

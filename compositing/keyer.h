@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -80,7 +81,10 @@ class Keyer {
 
  private:
   template <class Source>
-  float key_rows(const Source& source, capture::HalfImage& keyed);
+  float key_rows(const Source& source,
+                 std::span<const typename Source::Bounds> bare,
+                 capture::HalfImage& keyed);
+  bool glances() const;
   KeyReport report(const PlateSight& sight, float soft) const;
 
   PlateLight light_;

@@ -53,12 +53,6 @@ F8 lanes_below(int count) {
   return v;
 }
 
-float sum_of(F8 v) {
-  float sum = 0;
-  for (int i = 0; i < key_lanes; ++i) sum += v[i];
-  return sum;
-}
-
 }  // namespace
 
 std::array<float, 4> plate_at(const LitPlate& plate, int y, int x) {
