@@ -107,12 +107,27 @@ class PlateLight {
   PlateSight update_from(const Rows& rows, bool follow);
   template <class Rows>
   PlateSight measure(const Rows& rows);
-  float cells_at(int y, int x, std::array<F8, 3>& p) const;
+  struct CellSums;
+  template <class Rows>
+  CellSums look_at(const Rows& rows, int row, int column) const;
+  std::array<F8, 3> ratios_at(int y, int x) const;
+  void prepare();
   void light_up();
+
+  // Two cells of the gain that a column of the plate lies between.
+  struct Between {
+    int left, right;
+    float share;  // of the right one
+  };
 
   CleanPlate plate_;
   LitPlate bare_;  // without gain
   LitPlate lit_;
+  std::vector<float> ratios_;    // (1 / first, second / first, third / first, known), as its cells
+  std::vector<float> pixels_;    // of each cell of the gain that are looked at, 0 = shows no screen
+  std::vector<Between> across_;  // of each column of the plate
+  int rows_apart_ = 2;           // of those that are looked at
+  std::vector<float> gain_row_;
   std::vector<float> raw_;    // gain of each cell, 0 = not in sight
   std::vector<float> gains_;  // filled and smoothed
   std::vector<float> blurred_;

@@ -29,7 +29,22 @@ void GapFiller::clear() {
 void GapFiller::pull(const Level& fine, Level& coarse) const {
   const auto channels = static_cast<std::size_t>(channels_);
   for (int row = 0; row < coarse.rows; ++row) {
-    for (int column = 0; column < coarse.columns; ++column) {
+    int column = 0;
+    if (channels == 1 && 2 * row + 1 < fine.rows) {
+      const std::size_t from = cell(fine, 2 * row, 0), below = cell(fine, 2 * row + 1, 0);
+      const std::size_t to = cell(coarse, row, 0);
+      for (; 2 * column + 1 < fine.columns; ++column) {
+        const auto i = static_cast<std::size_t>(column);
+        const auto sum = [&](const std::vector<float>& of) {
+          return of[from + 2 * i] + of[from + 2 * i + 1] + of[below + 2 * i] +
+                 of[below + 2 * i + 1];
+        };
+        const float weight = sum(fine.weights), scale = weight > 1 ? 1 / weight : 1;
+        coarse.values[to + i] = sum(fine.values) * scale;
+        coarse.weights[to + i] = weight * scale;
+      }
+    }
+    for (; column < coarse.columns; ++column) {
       float* to = &coarse.values[at(coarse, row, column)];
       std::fill_n(to, channels, 0.0F);
       float weight = 0;

@@ -1,6 +1,7 @@
 // The plate's gain, frame by frame.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 
@@ -47,11 +48,28 @@ std::vector<float> means_over(const CleanPlate& plate, int step) {
   return means;
 }
 
+// 1 in the first `count` lanes, 0 beyond.
 F8 lanes_below(int count) {
   F8 v{};
-  for (int i = 0; i < count; ++i) v[i] = 1;
+  for (int i = 0; i < key_lanes; ++i) v[i] = i < count ? 1.0F : 0.0F;
   return v;
 }
+
+// Of pairs of neighbours: sums of a's in the lower part of each half, of b's in the upper.
+F8 pair_sums(F8 a, F8 b) {
+  return __builtin_shufflevector(a, b, 0, 2, 8, 10, 4, 6, 12, 14) +
+         __builtin_shufflevector(a, b, 1, 3, 9, 11, 5, 7, 13, 15);
+}
+
+// The sum of each.
+F8 sums_of(const std::array<F8, key_lanes>& v) {
+  const F8 a = pair_sums(pair_sums(v[0], v[1]), pair_sums(v[2], v[3]));
+  const F8 b = pair_sums(pair_sums(v[4], v[5]), pair_sums(v[6], v[7]));
+  return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11) +
+         __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
+}
+
+F8 chosen(I8 which, F8 value) { return which ? value : F8{}; }
 
 }  // namespace
 
@@ -120,80 +138,155 @@ PlateLight::PlateLight(CleanPlate plate, PlateUse use)
               static_cast<std::size_t>(filler_.columns()));
   gains_.assign(raw_.size(), 1.0F);
   blurred_ = gains_;
+  prepare();
 }
 
-// The plate at eight pixels, without gain, from (y, x) on, to the nearest cell. Returns how many of
-// them show a screen.
-float PlateLight::cells_at(int y, int x, std::array<F8, 3>& p) const {
+// What does not change from frame to frame.
+void PlateLight::prepare() {
+  ratios_ = bare_.cells;
+  for (std::size_t i = 0; i < ratios_.size(); i += 4) {
+    const bool known = bare_.use == PlateUse::difference || ratios_[i + 3] > 0;
+    const float over = ratios_[i] > 0 ? 1 / ratios_[i] : 1;
+    ratios_[i] = over;
+    ratios_[i + 1] *= over, ratios_[i + 2] *= over;
+    ratios_[i + 3] = known ? 1.0F : 0.0F;
+  }
+  rows_apart_ = bare_.height * bare_.width > 500000 ? 4 : 2;
+  pixels_.resize(raw_.size());
+  std::size_t i = 0;
+  for (int row = 0; row < filler_.rows(); ++row) {
+    for (int column = 0; column < filler_.columns(); ++column, ++i) {
+      const int count = std::min(cell, bare_.width - column * cell);
+      float all = 0, known = 0;
+      for (int y = row * cell + 1; y < std::min(bare_.height, (row + 1) * cell); y += rows_apart_) {
+        all += static_cast<float>(count);
+        for (int x = column * cell; x < column * cell + count; ++x) {
+          known += ratios_[4 * (static_cast<std::size_t>(y / bare_.step) *
+                                    static_cast<std::size_t>(bare_.columns) +
+                                static_cast<std::size_t>(x / bare_.step)) +
+                           3];
+        }
+      }
+      pixels_[i] = all > 0 && known >= 0.5F * all ? all : 0;
+    }
+  }
+  const float reach = static_cast<float>(cell / bare_.step);
+  for (int column = 0; column < bare_.columns; ++column) {
+    const float place = std::clamp((static_cast<float>(column) + 0.5F) / reach - 0.5F, 0.0F,
+                                   static_cast<float>(filler_.columns() - 1));
+    const auto before = static_cast<int>(place);
+    across_.push_back(
+        {before, std::min(before + 1, filler_.columns() - 1), place - static_cast<float>(before)});
+  }
+  gain_row_.resize(static_cast<std::size_t>(filler_.columns()));
+}
+
+// The ratios at eight pixels from (y, x) on, to the nearest cell: 1 / first, and the others over
+// it.
+std::array<F8, 3> PlateLight::ratios_at(int y, int x) const {
   const int last = bare_.columns - 1;
+  const auto cell_at = [&](int column) {
+    return load_four(&ratios_[4 * (static_cast<std::size_t>(y / bare_.step) *
+                                       static_cast<std::size_t>(bare_.columns) +
+                                   static_cast<std::size_t>(std::min(column, last)))]);
+  };
+  std::array<F8, 3> ratios;
   if (bare_.step == 4) {
-    const float* a = bare_.cell(y / 4, x / 4);
-    const float* b = bare_.cell(y / 4, std::min(x / 4 + 1, last));
-    for (std::size_t c = 0; c < 3; ++c) p[c] = F8{a[c], a[c], a[c], a[c], b[c], b[c], b[c], b[c]};
-    return (a[3] > 0 ? 4.0F : 0.0F) + (b[3] > 0 ? 4.0F : 0.0F);
+    const F4 a = cell_at(x / 4), b = cell_at(x / 4 + 1);
+    ratios = {__builtin_shufflevector(a, b, 0, 0, 0, 0, 4, 4, 4, 4),
+              __builtin_shufflevector(a, b, 1, 1, 1, 1, 5, 5, 5, 5),
+              __builtin_shufflevector(a, b, 2, 2, 2, 2, 6, 6, 6, 6)};
+    return ratios;
   }
-  for (int lane = 0; lane < key_lanes; ++lane) {
-    const float* at = bare_.cell(y, std::min(x + lane, last));
-    p[0][lane] = at[0], p[1][lane] = at[1], p[2][lane] = at[2];
+  const auto low = transposed(cell_at(x), cell_at(x + 1), cell_at(x + 2), cell_at(x + 3));
+  const auto high = transposed(cell_at(x + 4), cell_at(x + 5), cell_at(x + 6), cell_at(x + 7));
+  for (std::size_t c = 0; c < 3; ++c)
+    ratios[c] = __builtin_shufflevector(low[c], high[c], 0, 1, 2, 3, 4, 5, 6, 7);
+  return ratios;
+}
+
+// What is seen of one cell, in lanes to be summed.
+struct PlateLight::CellSums {
+  F8 alike{};  // pixels of the plate's colour that are lit by far not more nor less than it
+  F8 gain{}, gain_squared{}, off{}, bright{};  // of those
+  F8 dark{};                                   // pixels in deep shadow
+};
+
+template <class Rows>
+PlateLight::CellSums PlateLight::look_at(const Rows& source, int row, int column) const {
+  static_assert(cell == key_lanes);
+  const int bottom = std::min(bare_.height, (row + 1) * cell);
+  const int count = std::min(cell, bare_.width - column * cell);
+  const I8 inside = lanes_below(count) > 0.0F;
+  const F8 one = all_of(1);
+  CellSums sums;
+  for (int y = row * cell + 1; y < bottom; y += rows_apart_) {
+    const auto ratios = ratios_at(y, column * cell);
+    std::array<F8, 3> c;
+    source.load(y, column * cell, count, c);
+    const F8 q = c[0] * ratios[0];
+    const F8 d1 = c[1] - c[0] * ratios[1], d2 = c[2] - c[0] * ratios[2];
+    const F8 away = (d1 < 0.0F ? -d1 : d1) + (d2 < 0.0F ? -d2 : d2);
+    const I8 coloured = (away < tolerance_ * c[0]) & inside;
+    const I8 alike = coloured & (q > least_gain) & (q < most_gain);
+    sums.dark += chosen(coloured & (q > black) & (q < deep), one);
+    sums.alike += chosen(alike, one);
+    sums.gain += chosen(alike, q);
+    sums.gain_squared += chosen(alike, q * q);
+    sums.off += chosen(alike, away / c[0]);
+    sums.bright += chosen(alike & (c[0] >= clipped_from), one);
   }
-  return key_lanes;
+  return sums;
 }
 
 // Gain of each cell whose pixels have the plate's colour, all about equally bright.
 template <class Rows>
 PlateSight PlateLight::measure(const Rows& source) {
-  static_assert(cell == key_lanes);
-  const int rows_apart = bare_.height * bare_.width > 500000 ? 4 : 2;
-  std::size_t i = 0;
-  float screen = 0, seen = 0, clipped = 0, off = 0, all_known = 0;
-  F8 dark{};
+  F8 screen{}, all_known{}, seen{}, clipped{}, off{}, dark{};
   for (int row = 0; row < filler_.rows(); ++row) {
-    const int bottom = std::min(bare_.height, (row + 1) * cell);
-    for (int column = 0; column < filler_.columns(); ++column, ++i) {
-      raw_[i] = 0;
-      filler_.value(row, column)[0] = 0;
-      filler_.weight(row, column) = 0;
-      const int count = std::min(cell, bare_.width - column * cell);
-      F8 n{}, sum{}, squares{}, bright{}, apart{};
-      float all = 0, known = 0;
-      for (int y = row * cell + 1; y < bottom; y += rows_apart) {
-        std::array<F8, 3> p;
-        known += cells_at(y, column * cell, p);
-        const F8 inside = count == cell ? all_of(1) : lanes_below(count);
-        std::array<F8, 3> c;
-        source.load(y, column * cell, count, c);
-        const F8 q = c[0] / (p[0] > 0.0F ? p[0] : all_of(1));
-        const F8 d1 = c[1] - p[1] * q, d2 = c[2] - p[2] * q;
-        const F8 away = (d1 < 0.0F ? -d1 : d1) + (d2 < 0.0F ? -d2 : d2);
-        const I8 coloured = (away < tolerance_ * c[0]) & (inside > 0.0F);
-        const I8 alike = coloured & (q > least_gain) & (q < most_gain);
-        dark += coloured & (q > black) & (q < deep) ? all_of(1) : F8{};
-        const F8 one = alike ? all_of(1) : F8{};
-        n += one, sum += one * q, squares += one * q * q;
-        apart += alike ? away / c[0] : F8{};
-        bright += c[0] >= clipped_from ? one : F8{};
-        all += static_cast<float>(count);
+    for (int first = 0; first < filler_.columns(); first += key_lanes) {
+      const int cells = std::min(key_lanes, filler_.columns() - first);
+      const std::size_t at =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(filler_.columns()) +
+          static_cast<std::size_t>(first);
+      const auto bytes = static_cast<std::size_t>(cells) * sizeof(float);
+      F8 pixels{};
+      std::memcpy(&pixels, &pixels_[at], bytes);
+      std::array<F8, key_lanes> alike{}, gain{}, squared{}, away{}, bright{};
+      for (int i = 0; i < cells; ++i) {
+        if (!(pixels[i] > 0)) continue;
+        const auto k = static_cast<std::size_t>(i);
+        const CellSums sums = look_at(source, row, first + i);
+        alike[k] = sums.alike, gain[k] = sums.gain, squared[k] = sums.gain_squared;
+        away[k] = sums.off, bright[k] = sums.bright;
+        dark += sums.dark;
       }
-      if (known < 0.5F * all) continue;
-      all_known += all;
-      screen += 1;
-      const float alike = sum_of(n);
-      if (alike < 0.6F * all) continue;
-      const float mean = sum_of(sum) / alike;
-      const float deviation = std::sqrt(std::max(0.0F, sum_of(squares) / alike - mean * mean));
-      if (deviation > 0.02F * mean + spread_) continue;
-      raw_[i] = mean;
-      filler_.value(row, column)[0] = mean;
-      filler_.weight(row, column) = 1;
-      seen += 1, clipped += sum_of(bright) / alike, off += sum_of(apart) / alike;
+      const F8 n = sums_of(alike), zero{}, one = all_of(1);
+      const F8 over = one / (n > 0.0F ? n : one);
+      const F8 mean = sums_of(gain) * over;
+      const F8 variance = sums_of(squared) * over - mean * mean;
+      const F8 most_deviation = 0.02F * mean + spread_;
+      const I8 known = pixels > 0.0F;
+      const I8 good = known & (n >= 0.6F * pixels) & (variance <= most_deviation * most_deviation);
+      const F8 value = chosen(good, mean), weight = chosen(good, one);
+      std::memcpy(&raw_[at], &value, bytes);
+      std::memcpy(filler_.value(row, first), &value, bytes);
+      std::memcpy(&filler_.weight(row, first), &weight, bytes);
+      screen += chosen(known, one), all_known += most(pixels, zero), seen += weight;
+      clipped += chosen(good, sums_of(bright) * over);
+      off += chosen(good, sums_of(away) * over);
     }
   }
+  const auto share = [](F8 part, F8 of) {
+    const float whole = sum_of(of);
+    return whole > 0 ? sum_of(part) / whole : 0.0F;
+  };
   PlateSight sight;
-  sight.has_screen = screen > 0;
-  sight.screen = screen > 0 ? seen / screen : 0;
-  sight.clipped = seen > 0 ? clipped / seen : 0;
-  sight.shadowed = all_known > 0 ? sum_of(dark) / all_known : 0;
-  sight.mismatch = seen > 0 ? off / seen : 0;
+  sight.has_screen = sum_of(screen) > 0;
+  sight.screen = share(seen, screen);
+  sight.clipped = share(clipped, seen);
+  sight.shadowed = share(dark, all_known);
+  sight.mismatch = share(off, seen);
   return sight;
 }
 
@@ -241,46 +334,46 @@ PlateSight PlateLight::update_from(const Rows& rows, bool follow) {
 // Smooths the gain and puts it on the plate.
 void PlateLight::light_up() {
   const int rows = filler_.rows(), columns = filler_.columns();
-  const auto at = [&](int row, int column) {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
-           static_cast<std::size_t>(column);
-  };
+  const auto width = static_cast<std::size_t>(columns);
   for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const float before = filler_.value(row, std::max(0, column - 1))[0];
-      const float after = filler_.value(row, std::min(columns - 1, column + 1))[0];
-      blurred_[at(row, column)] = 0.25F * (before + after) + 0.5F * filler_.value(row, column)[0];
+    const float* from = filler_.value(row, 0);
+    float* to = &blurred_[static_cast<std::size_t>(row) * width];
+    if (columns == 1) {
+      to[0] = from[0];
+      continue;
     }
+    to[0] = 0.75F * from[0] + 0.25F * from[1];
+    for (int i = 1; i + 1 < columns; ++i)
+      to[i] = 0.25F * (from[i - 1] + from[i + 1]) + 0.5F * from[i];
+    to[columns - 1] = 0.75F * from[columns - 1] + 0.25F * from[columns - 2];
   }
   for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const float before = blurred_[at(std::max(0, row - 1), column)];
-      const float after = blurred_[at(std::min(rows - 1, row + 1), column)];
-      gains_[at(row, column)] = 0.25F * (before + after) + 0.5F * blurred_[at(row, column)];
-    }
+    const auto blurred = [&](int at) {
+      return &blurred_[static_cast<std::size_t>(std::clamp(at, 0, rows - 1)) * width];
+    };
+    const float *above = blurred(row - 1), *here = blurred(row), *below = blurred(row + 1);
+    float* to = &gains_[static_cast<std::size_t>(row) * width];
+    for (int i = 0; i < columns; ++i) to[i] = 0.25F * (above[i] + below[i]) + 0.5F * here[i];
   }
   const float reach = static_cast<float>(cell / lit_.step);  // of a gain's cell, in plate cells
-  const auto steps = [&](int at, int cells, int& before, int& after) {
-    const float place = (static_cast<float>(at) + 0.5F) / reach - 0.5F;
-    const float inside = std::clamp(place, 0.0F, static_cast<float>(cells - 1));
-    before = static_cast<int>(inside);
-    after = std::min(before + 1, cells - 1);
-    return inside - static_cast<float>(before);
-  };
   const bool by_excess = lit_.use == PlateUse::screen;
   for (int row = 0; row < lit_.rows; ++row) {
-    int r0, r1, c0, c1;
-    const float v = steps(row, rows, r0, r1);
-    for (int column = 0; column < lit_.columns; ++column) {
-      const float u = steps(column, columns, c0, c1);
-      const float top = gains_[at(r0, c0)] + u * (gains_[at(r0, c1)] - gains_[at(r0, c0)]);
-      const float low = gains_[at(r1, c0)] + u * (gains_[at(r1, c1)] - gains_[at(r1, c0)]);
-      const float gain = top + v * (low - top);
-      const std::size_t i =
-          4 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(lit_.columns) +
-               static_cast<std::size_t>(column));
-      for (std::size_t c = 0; c < 3; ++c) lit_.cells[i + c] = gain * bare_.cells[i + c];
-      lit_.cells[i + 3] = by_excess ? bare_.cells[i + 3] / gain : bare_.cells[i + 3];
+    const float place = std::clamp((static_cast<float>(row) + 0.5F) / reach - 0.5F, 0.0F,
+                                   static_cast<float>(rows - 1));
+    const auto before = static_cast<int>(place);
+    const float down = place - static_cast<float>(before);
+    const float* top = &gains_[static_cast<std::size_t>(before) * width];
+    const float* low = &gains_[static_cast<std::size_t>(std::min(before + 1, rows - 1)) * width];
+    for (std::size_t i = 0; i < width; ++i) gain_row_[i] = top[i] + down * (low[i] - top[i]);
+    const float* from = bare_.cell(row, 0);
+    float* to = &lit_.cells[static_cast<std::size_t>(from - bare_.cells.data())];
+    for (const Between& between : across_) {
+      const float left = gain_row_[static_cast<std::size_t>(between.left)];
+      const float right = gain_row_[static_cast<std::size_t>(between.right)];
+      const float gain = left + between.share * (right - left);
+      const F4 lit = load_four(from) * F4{gain, gain, gain, by_excess ? 1 / gain : 1};
+      std::memcpy(to, &lit, sizeof lit);
+      from += 4, to += 4;
     }
   }
 }
