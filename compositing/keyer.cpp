@@ -121,6 +121,10 @@ void check(const KeySettings& s) {
   within(s.smoothing, 0, 4, "smoothing");
 }
 
+// The camera is looked for in every so many frames; so far it may be off, in pixels.
+constexpr int frames_between_looks = 3;
+constexpr float shift_still_px = 1;
+
 // 1 up to `good`, 0 from `bad` on.
 float falling(float value, float good, float bad) {
   return std::clamp((bad - value) / (bad - good), 0.0F, 1.0F);
@@ -129,13 +133,14 @@ float falling(float value, float good, float bad) {
 }  // namespace
 
 std::string_view name_of(KeyStatus status) {
-  constexpr std::array<std::string_view, 8> names{"good",  "hidden", "clipped", "shadowed",
-                                                  "noisy", "misfit", "unlit",   "no screen"};
+  constexpr std::array<std::string_view, 9> names{
+      "good", "hidden", "clipped", "shadowed", "noisy", "misfit", "moved", "unlit", "no screen"};
   return names[static_cast<std::size_t>(status)];
 }
 
 Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
     : light_(std::move(plate), use_of(settings.method)),
+      watch_(light_.plate()),
       settings_(settings),
       masks_(std::move(masks)) {
   check(settings);
@@ -156,6 +161,7 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
 KeyReport Keyer::key(const capture::Image& frame, HalfImage& keyed) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   const LightRows rows(frame, channels_of(light_.plate().colour));
+  watch(rows);
   scratch_.bare_light.clear();
   if (glances()) {
     bound_screen(light_.lit(),
@@ -168,6 +174,7 @@ KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   const auto order = channels_of(light_.plate().colour);
   const CodeRows rows(frame.rgba.data(), frame.width, order, light_polynomial(frame.transfer));
+  watch(rows);
   scratch_.bare_codes.clear();
   if (glances()) {
     const auto& codes = codes_of(frame.transfer);
@@ -178,6 +185,17 @@ KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
   return report(sight, key_rows(rows, scratch_.bare_codes, keyed));
 }
 
+// One frame may be shaken; a camera that was pushed stays where it is.
+template <class Rows>
+void Keyer::watch(const Rows& rows) {
+  if (until_look_-- > 0) return;
+  until_look_ = frames_between_looks;
+  shift_ = watch_.look(rows);
+  if (!shift_.known) return;
+  const bool off = shift_.size_px() > shift_still_px + 4 * shift_.sigma_px;
+  looks_moved_ = off ? looks_moved_ + 1 : 0;
+}
+
 // Whether pixels may be told to be screen before they are keyed.
 bool Keyer::glances() const {
   return masks_.core.empty() && settings_.method == KeyMethod::screen && settings_.learned &&
@@ -185,7 +203,9 @@ bool Keyer::glances() const {
 }
 
 KeyReport Keyer::follow(const capture::Image& frame) {
-  return report(light_.update(frame, settings_.follows_light), 0);
+  const PlateSight sight = light_.update(frame, settings_.follows_light);
+  watch(LightRows(frame, channels_of(light_.plate().colour)));
+  return report(sight, 0);
 }
 
 // Returns the share of pixels that are neither screen nor person.
@@ -212,6 +232,7 @@ float Keyer::key_rows(const Source& source,
 KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   KeyReport report;
   report.sight = sight;
+  report.shift = shift_;
   report.soft = soft;
   const auto lower = [&](float by, KeyStatus status) {
     if (by < 1 && (report.confidence >= 1 || by < report.confidence)) report.status = status;
@@ -229,6 +250,9 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   }
   lower(falling(sight.mismatch, 0.06F, 0.16F), KeyStatus::misfit);
   lower(falling(soft, 0.15F, 0.45F), KeyStatus::misfit);
+  if (looks_moved_ > 1) {
+    lower(0.5F + 0.4F * falling(shift_.size_px(), shift_still_px, 4), KeyStatus::moved);
+  }
   lower(falling(sight.gain, 1.7F, 2.3F) * falling(-sight.gain, -0.45F, -0.2F), KeyStatus::unlit);
   return report;
 }

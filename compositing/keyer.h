@@ -11,6 +11,7 @@
 #include "compositing/clean_plate.h"
 #include "compositing/key_scratch.h"
 #include "compositing/key_texel.h"
+#include "compositing/plate_watch.h"
 
 namespace compositing {
 
@@ -44,6 +45,7 @@ enum class KeyStatus : std::uint8_t {
   shadowed,  // a shadow on the screen is so deep that it may pass for the person
   noisy,     // the screen's share of a pixel is uncertain
   misfit,    // what is in sight is not the plate: moved, stale, or not this screen
+  moved,     // the camera is not where it was when the plate was taken
   unlit,     // light has changed beyond what is followed
   no_screen  // the plate shows none
 };
@@ -53,7 +55,8 @@ struct KeyReport {
   float confidence = 1;                // 0..1; falls before the picture breaks
   KeyStatus status = KeyStatus::good;  // what lowers it most
   PlateSight sight;
-  float soft = 0;  // share of pixels that are neither screen nor person
+  PlateShift shift;  // against the plate, as it was seen last: in one of every four frames
+  float soft = 0;    // share of pixels that are neither screen nor person
 };
 
 // Keys the frames of one clip, in order. Not thread-safe; several may run side by side.
@@ -85,9 +88,15 @@ class Keyer {
                  std::span<const typename Source::Bounds> bare,
                  capture::HalfImage& keyed);
   bool glances() const;
+  template <class Rows>
+  void watch(const Rows& rows);
   KeyReport report(const PlateSight& sight, float soft) const;
 
   PlateLight light_;
+  PlateWatch watch_;
+  PlateShift shift_;
+  int until_look_ = 0;   // frames
+  int looks_moved_ = 0;  // how many in a row have seen the camera elsewhere
   KeySettings settings_;
   KeyMasks masks_;
   KeyDials dials_;

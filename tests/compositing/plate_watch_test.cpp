@@ -1,0 +1,155 @@
+// Cameras that were pushed since their plate was taken.
+#include "compositing/plate_watch.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "compositing/keyer.h"
+#include "compositing/made_clip.h"
+#include "compositing/made_video_camera.h"
+
+namespace compositing {
+namespace {
+
+using capture::Image;
+
+constexpr int height = 270, width = 480;
+
+// A cloth with folds in a room of boxes, as bright at a place of it.
+std::array<float, 3> room_at(float u, float v) {
+  if (u >= 70 && u < 410 && v >= 20 && v < 255) {
+    const float fold = 1 + 0.05F * std::sin(0.07F * u + 0.02F * v);
+    return {0.04F * fold, 0.4F * fold, 0.06F * fold};
+  }
+  const float box =
+      0.3F + 0.25F * std::sin(std::floor(u / 37) * 5) * std::cos(std::floor(v / 29) * 3);
+  return {box, box, box};
+}
+
+// Through a camera that is pushed so that the picture moves to the right and down.
+Image room(float right, float down, float light = 1) {
+  constexpr int finer = 4;  // samples of a pixel along each side
+  Image image;
+  image.height = height, image.width = width, image.channels = 3;
+  image.pixels.resize(std::size_t{3} * height * width);
+  for (int y = 0; y < finer * height; ++y) {
+    for (int x = 0; x < finer * width; ++x) {
+      const auto place = [](int at) { return (static_cast<float>(at) + 0.5F) / finer; };
+      const auto colour = room_at(place(x) - right, place(y) - down);
+      for (int c = 0; c < 3; ++c) {
+        image.at(y / finer, x / finer, c) +=
+            light / (finer * finer) * colour[static_cast<std::size_t>(c)];
+      }
+    }
+  }
+  return image;
+}
+
+Image filmed(const Image& light, std::uint64_t seed) {
+  const MadeSensor sensor{1e-4F, 1e-6F, false};
+  return light_of({light.height, light.width, photograph_light(light, sensor, seed)});
+}
+
+CleanPlate plate_of_room() {
+  std::vector<Image> shots;
+  for (std::uint64_t i = 0; i < 4; ++i) shots.push_back(filmed(room(0, 0), i));
+  return average_plate(shots);
+}
+
+void put_person(Image& image, float x0) {
+  for (int y = 60; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (std::abs(static_cast<float>(x) - x0) > 55) continue;
+      for (int c = 0; c < 3; ++c)
+        image.at(y, x, c) = 0.2F + 0.1F * std::sin(0.3F * static_cast<float>(x + y * c));
+    }
+  }
+}
+
+PlateShift look(PlateWatch& watch, const Image& frame) {
+  return watch.look(LightRows(frame, channels_of(ScreenColour::green)));
+}
+
+TEST(PlateWatch, MeasuresPushesToAQuarterOfAPixelBehindAPersonAndUnderOtherLight) {
+  PlateWatch watch(plate_of_room());
+  std::uint64_t seed = 100;
+  for (const float light : {1.0F, 0.7F, 1.2F}) {
+    for (const auto& [right, down] : std::vector<std::pair<float, float>>{
+             {0, 0}, {0.5F, 0}, {-1.25F, 0.75F}, {2, -3}, {-4, 4}, {5, 1}}) {
+      Image light_there = room(right, down, light);
+      put_person(light_there, 200 + 40 * light);
+      const PlateShift shift = look(watch, filmed(light_there, ++seed));
+      ASSERT_TRUE(shift.known) << right << ' ' << down << ": " << shift.seen << " of "
+                               << shift.patches;
+      EXPECT_NEAR(shift.right_px, right, 0.25) << down << " under " << light;
+      EXPECT_NEAR(shift.down_px, down, 0.25) << right << " under " << light;
+    }
+  }
+}
+
+TEST(PlateWatch, SaysThatItCannotTellBeforeABareScreenAndBehindACrowd) {
+  const MadeClip even(made_scene("plain"), 5, height, width);
+  std::vector<Image> shots;
+  for (int i = 0; i < 4; ++i) shots.push_back(light_of(even.plate_shot(i)));
+  PlateWatch bare(average_plate(shots));
+  EXPECT_FALSE(look(bare, light_of(even.frame(3).seen)).known);
+  PlateWatch watch(plate_of_room());
+  Image crowd = room(0, 0);
+  for (const float x : {30.0F, 130.0F, 240.0F, 350.0F, 450.0F}) put_person(crowd, x);
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < width; ++x)
+      crowd.at(y, x, 0) = static_cast<float>((x * 7 + y * 13) % 19) / 19;
+  }
+  EXPECT_FALSE(look(watch, filmed(crowd, 3)).known);
+  Image none = room(0, 0);
+  std::fill(none.pixels.begin(), none.pixels.end(), std::nanf(""));
+  EXPECT_FALSE(look(watch, none).known);
+}
+
+TEST(PlateWatch, TakesNoWavingCurtainForAPush) {
+  PlateWatch watch(plate_of_room());
+  for (int i = 0; i < 8; ++i) {
+    Image light = room(0, 0);
+    const Image waved = room(3 * std::sin(static_cast<float>(i)), 0);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < 70; ++x) {
+        for (int c = 0; c < 3; ++c) light.at(y, x, c) = waved.at(y, x, c);
+      }
+    }
+    const PlateShift shift = look(watch, filmed(light, static_cast<std::uint64_t>(i)));
+    EXPECT_TRUE(!shift.known || shift.size_px() < 0.5F) << shift.right_px;
+  }
+}
+
+TEST(PlateWatch, MakesTheKeySayThatTheCameraWasMovedWithinTenFramesAndTakeItBack) {
+  Keyer keyer(plate_of_room(), {});
+  capture::HalfImage keyed;
+  std::uint64_t seed = 500;
+  const auto run = [&](float right, float down, int frames) {
+    KeyReport report;
+    const Image empty = room(right, down);
+    for (int i = 0; i < frames; ++i) {
+      Image light = empty;
+      put_person(light, 180 + static_cast<float>(i));
+      report = keyer.key(filmed(light, ++seed), keyed);
+    }
+    return report;
+  };
+  EXPECT_NE(run(0, 0, 20).status, KeyStatus::moved);
+  const KeyReport pushed = run(3, 1, 10);
+  EXPECT_EQ(pushed.status, KeyStatus::moved);
+  EXPECT_LT(pushed.confidence, 0.75);
+  EXPECT_NEAR(pushed.shift.right_px, 3, 0.3);
+  // A shake of one frame is none.
+  EXPECT_NE(run(0, 0, 10).status, KeyStatus::moved);
+  run(4, 0, 1);
+  EXPECT_NE(run(0, 0, 8).status, KeyStatus::moved);
+}
+
+}  // namespace
+}  // namespace compositing
