@@ -62,7 +62,12 @@ Json persons_json(const std::vector<PersonStatus>& persons) {
                     {"position", {p.position.x, p.position.y, p.position.z}},
                     {"sigma_m", p.sigma_m},
                     {"view_angle_deg", p.view_angle_deg},
-                    {"shallow", p.shallow}});
+                    {"shallow", p.shallow},
+                    {"shape", p.hull ? "hull" : "billboard"},
+                    {"camera", p.camera},
+                    {"error_m", p.error_m},
+                    {"holds", p.holds},
+                    {"left_out", p.left_out}});
   }
   return rows;
 }

@@ -273,11 +273,18 @@ void FrameMaker::stand_persons(capture::Time time, PreparedFrame& frame) {
   if (persons_->empty()) return;
   render::Scene::Pictures pictures;
   render::SceneDescription& description = set_scene_.description;
-  std::size_t instance = set_scene_.first_person;
+  std::size_t instance = set_scene_.first_person, number = 0;
   for (PersonFrame& person : persons_->at(time, frame.job.cam_from_set)) {
-    description.instances[instance++].set_from_object = person.set_from_object;
-    pictures.push_back(std::move(person.picture));
+    for (const auto& place : person.places) {
+      description.instances[instance++].set_from_object = place;
+    }
+    std::ranges::move(person.pictures, std::back_inserter(pictures));
     frame.persons.push_back(std::move(person.status));
+    const auto hull = std::ranges::find(set_scene_.hulls, number, &PersonHull::person);
+    if (!person.hull_cameras.empty() && hull->cameras != person.hull_cameras) {
+      see_hull_by(set_, number, person.hull_cameras, set_scene_);
+    }
+    ++number;
   }
   std::ranges::move(persons_->take_notes(), std::back_inserter(frame.notes));
   description.version = ++scene_version_;

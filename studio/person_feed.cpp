@@ -2,88 +2,82 @@
 #include "studio/person_feed.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
-#include <stdexcept>
+#include <ranges>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "compositing/billboard_place.h"
-#include "compositing/keyed_picture.h"
-#include "studio/clean_plates.h"
+#include "compositing/person_box.h"
+#include "compositing/person_shape.h"
+#include "compositing/visual_hull.h"
+#include "studio/person_camera.h"
 #include "studio/section.h"
 
 namespace studio {
 namespace {
 
-using compositing::Feet;
+using namespace std::chrono_literals;
+using calibrate::Vec3;
 using compositing::FeetStatus;
 
 constexpr double degree = std::numbers::pi / 180;
-// Feet are looked for in a matte whose longer side is at most so long.
-constexpr int matte_side = 640;
 // Below this the key is uncertain, and the show says so.
 constexpr float sure = 0.5F;
+// A camera that was left out is taken back after it has been well for so long.
+constexpr capture::Time trial = 500ms;
 
-std::shared_ptr<const render::LivePicture> clear_picture() {
-  capture::Image clear = capture::make_image(1, 1, 4);
-  return std::make_shared<compositing::KeyedPicture>(
-      std::make_shared<render::VideoTexture>(render::make_video_texture(clear)));
+// Where what is not shown stands: too small to be met, and wherever the person was.
+std::array<float, 12> hidden_at(Vec3 position) {
+  constexpr float size = 1e-4F;
+  const auto p = calibrate::to_float(position);
+  return {size, 0, 0, p.x, 0, size, 0, p.y, 0, 0, size, p.z};
 }
 
-compositing::KeyMasks masks_of(const KeyChoice& key) {
-  compositing::KeyMasks masks;
-  if (key.garbage.empty()) return masks;
-  const capture::Image mask = read_picture(key.garbage, capture::Transfer::linear);
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      masks.garbage.push_back(
-          static_cast<std::uint8_t>(std::clamp(mask.at(y, x) * 255 + 0.5F, 0.0F, 255.0F)));
-    }
-  }
-  return masks;
-}
+double azimuth(Vec3 from, Vec3 to) { return std::atan2(to.y - from.y, to.x - from.x); }
 
-// Alpha of a keyed picture of (height, width, 4), area-averaged `shrink` times smaller.
-capture::Image matte_of(const capture::Image& rgba, int shrink) {
-  capture::Image matte =
-      capture::make_image(std::max(1, rgba.height / shrink), std::max(1, rgba.width / shrink), 1);
-  const float part = 1 / static_cast<float>(shrink * shrink);
-  for (int y = 0; y < matte.height * shrink; ++y) {
-    for (int x = 0; x < matte.width * shrink; ++x) {
-      if (y < rgba.height && x < rgba.width) {
-        matte.at(y / shrink, x / shrink) += part * rgba.at(y, x, 3);
-      }
-    }
-  }
-  return matte;
-}
-
-// From pixels of the matte to those of the picture.
-Feet enlarged(Feet feet, int shrink) {
-  const double times = shrink;
-  feet.q = {(feet.q.x + 0.5) * times - 0.5, (feet.q.y + 0.5) * times - 0.5};
-  feet.sigma_px *= times;
-  for (float& edge : feet.box) edge = (edge + 0.5F) * static_cast<float>(shrink) - 0.5F;
-  return feet;
+std::string words_for(const compositing::ShapeChoice& choice) {
+  return choice.hull ? "the hull" : fmt::format("the billboard of camera {}", choice.camera + 1);
 }
 
 }  // namespace
 
 struct PersonFeed::Person {
+  struct Camera {
+    PersonCameraFeed feed;
+    bool unsure = false;
+    bool late = false;                  // its picture is not of this moment
+    std::optional<capture::Time> well;  // since when, of one that was left out
+    bool is_out() const { return out_for != nullptr; }
+    const char* out_for = nullptr;  // why it is left out
+  };
+
   PersonSettings settings;
-  std::unique_ptr<TimedSource> source;
-  std::optional<compositing::Keyer> keyer;
+  std::vector<Camera> cameras;
   std::optional<compositing::FeetTracker> tracker;
-  std::shared_ptr<const capture::Image> image;  // that `frame.picture` was made from
-  capture::HalfImage keyed;
-  Feet feet;
   std::optional<compositing::Standing> standing;
-  float aspect = 1;  // of its picture: width over height
-  bool unsure = false;
+  std::optional<compositing::ShapeChoice> choice;
+  std::optional<compositing::PersonBox> box;  // of the hull that is chosen
+  std::shared_ptr<const render::LivePicture> clear = clear_picture();
+  std::vector<bool> hidden;  // of its instances
+  bool told = false;         // what it is shown as
   PersonFrame frame;
+
+  bool has_several() const { return cameras.size() > 1; }
+  std::string name_of(std::size_t camera) const {
+    const std::string& name = frame.status.name;
+    return has_several() ? fmt::format("{}, camera {}", name, camera + 1) : name;
+  }
+  Vec3 position() const { return standing ? standing->p_set : settings.position; }
+  void hide(std::size_t instance) {
+    if (!hidden[instance]) frame.places[instance] = hidden_at(position());
+    hidden[instance] = true;
+  }
 };
 
 PersonFeed::PersonFeed(const Set& set, std::optional<capture::Time> start, bool live) {
@@ -91,39 +85,24 @@ PersonFeed::PersonFeed(const Set& set, std::optional<capture::Time> start, bool 
   const std::string base_dir = std::filesystem::absolute(set.path).parent_path().string();
   for (std::size_t i = 0; i < set.persons.size(); ++i) {
     auto person = std::make_shared<Person>();
-    person->settings = set.persons[i];
-    const PersonSettings& s = person->settings;
-    person->frame.picture = clear_picture();
+    const PersonSettings& s = person->settings = set.persons[i];
     person->frame.status.name = s.name.empty() ? fmt::format("person {}", i + 1) : s.name;
-    const VideoSource source{s.source, base_dir, s.loop, s.first, s.colour};
-    try {
-      person->source = std::make_unique<TimedSource>(source, start, live);
-      const capture::CameraInfo& info = person->source->info();
-      if (s.lens && (s.lens->width != info.width || s.lens->height != info.height)) {
-        throw std::invalid_argument(
-            fmt::format("the video's picture is {}x{}, but its lens is for {}x{}", info.width,
-                        info.height, s.lens->width, s.lens->height));
-      }
-      person->aspect = static_cast<float>(info.width) / static_cast<float>(info.height);
-      if (s.by_feet) person->tracker.emplace(*s.lens, s.cam_from_set, s.floor_z);
-    } catch (const std::exception& error) {
-      faults.add(s.place, error.what());
-      continue;
+    for (std::size_t k = 0; k < s.cameras.size(); ++k) {
+      const bool tells_feet = k == 0 && s.by_feet;
+      person->cameras.push_back({PersonCameraFeed(
+          s.cameras[k], {base_dir, start, live, tells_feet || s.may_be_hull(), s.may_be_hull()},
+          faults)});
     }
     try {
-      if (s.key) {
-        const capture::CameraInfo& info = person->source->info();
-        auto plate = read_clean_plate(s.key->plate, source, s.key->footage);
-        if (plate.light.width != info.width || plate.light.height != info.height) {
-          throw std::invalid_argument(fmt::format(
-              "the clean plate {} is {}x{}, but the video {} is {}x{}", s.key->plate,
-              plate.light.width, plate.light.height, s.source, info.width, info.height));
-        }
-        person->keyer.emplace(std::move(plate), s.key->settings, masks_of(*s.key));
-      }
-    } catch (const std::exception& error) {
-      faults.add(s.key->place, error.what());
+      if (s.by_feet) person->tracker.emplace(*s.first().lens, s.first().cam_from_set, s.floor_z);
+    } catch (const std::invalid_argument& error) {
+      faults.add(s.first().place, error.what());
     }
+    const std::size_t billboards = s.cameras.size(), hulls = s.may_be_hull() ? 1 : 0;
+    person->frame.pictures.assign(billboards * (1 + hulls), person->clear);
+    constexpr std::array<float, 12> identity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    person->frame.places.assign(billboards + hulls, identity);
+    person->hidden.assign(billboards + hulls, false);
     persons_.push_back(std::move(person));
   }
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
@@ -131,131 +110,229 @@ PersonFeed::PersonFeed(const Set& set, std::optional<capture::Time> start, bool 
 
 std::vector<std::shared_ptr<const render::LivePicture>> PersonFeed::nothing_yet() const {
   std::vector<std::shared_ptr<const render::LivePicture>> pictures;
-  for (const auto& person : persons_) pictures.push_back(person->frame.picture);
+  for (const auto& person : persons_) {
+    pictures.insert(pictures.end(), person->frame.pictures.size(), person->clear);
+  }
   return pictures;
 }
 
-void PersonFeed::key(Person& person, const capture::Image& image) {
-  PersonStatus& status = person.frame.status;
-  auto texture = textures_.lend();
-  compositing::Keyer& keyer = *person.keyer;
-  // The feet are looked for in the matte: a person who stands by them needs all of it.
-  const bool by_texel = person.settings.key->by_texel && !person.tracker;
-  const compositing::KeyReport report =
-      by_texel ? keyer.follow(image) : keyer.key(image, person.keyed);
-  status.confidence = report.confidence;
-  status.key = compositing::name_of(report.status);
-  const bool unsure = report.confidence < sure;
-  if (unsure && !person.unsure) {
-    notes_.push_back(fmt::format("{}: the key is unsure ({})", status.name, status.key));
+// Keys the camera's newest frame, if it has not been.
+void PersonFeed::show(Person& person, std::size_t index) {
+  Person::Camera& camera = person.cameras[index];
+  if (!camera.feed.show(textures_)) return;
+  const bool unsure = camera.feed.confidence() < sure;
+  if (unsure && !camera.unsure) {
+    notes_.push_back(
+        fmt::format("{}: the key is unsure ({})", person.name_of(index), camera.feed.key()));
   }
-  person.unsure = unsure;
-  if (by_texel) {
-    render::make_video_texture(image, *texture);
-    person.frame.picture = std::make_shared<compositing::TexelKeyedPicture>(
-        std::move(texture), keyer.lit(), keyer.dials());
-    return;
-  }
-  const capture::Image keyed = capture::to_float(person.keyed);
-  render::make_video_texture(keyed, *texture);
-  person.frame.picture = std::make_shared<compositing::KeyedPicture>(std::move(texture));
-  find_feet(person, keyed);
+  camera.unsure = unsure;
+  if (index == 0) stand(person);
 }
 
-void PersonFeed::find_feet(Person& person, const capture::Image& rgba) {
-  person.feet = {};
-  if (!person.settings.lens) return;
-  const int longer = std::max(rgba.width, rgba.height);
-  const int shrink = std::max(1, (longer + matte_side - 1) / matte_side);
-  person.feet = enlarged(compositing::find_feet(matte_of(rgba, shrink)), shrink);
-}
-
-void PersonFeed::stand(Person& person, capture::Time time) {
+void PersonFeed::stand(Person& person) {
   if (!person.tracker) return;
   PersonStatus& status = person.frame.status;
+  const PersonCameraFeed& feed = person.cameras.front().feed;
   person.standing =
-      person.tracker->update(std::chrono::duration<double>(time).count(), person.feet);
-  const bool lost = person.feet.status != FeetStatus::seen;
-  if (lost && status.feet == compositing::name_of(FeetStatus::seen)) {
+      person.tracker->update(std::chrono::duration<double>(feed.time()).count(), feed.feet());
+  const FeetStatus seen = feed.feet().status;
+  if (seen != FeetStatus::seen && status.feet == compositing::name_of(FeetStatus::seen)) {
     notes_.push_back(fmt::format("{}: its feet are {}; it stays where it is", status.name,
-                                 compositing::name_of(person.feet.status)));
+                                 compositing::name_of(seen)));
   }
-  status.feet = compositing::name_of(person.feet.status);
+  status.feet = compositing::name_of(seen);
 }
 
-void PersonFeed::show(Person& person, const capture::Image& image, capture::Time time) {
-  if (person.keyer) {
-    key(person, image);
-  } else {
-    auto texture = textures_.lend();
-    render::make_video_texture(image, *texture);
-    person.frame.picture = std::make_shared<compositing::KeyedPicture>(std::move(texture));
-    if (image.channels == 4) find_feet(person, image);
-  }
-  stand(person, time);
-}
-
+// All sources to the time; keyed is the one that tells the feet.
 void PersonFeed::update(Person& person, capture::Time time) {
-  const std::optional<capture::Frame> frame = person.source->at(time);
-  if (const auto note = person.source->take_note()) {
-    notes_.push_back(fmt::format("{} {}: its last picture stays", person.frame.status.name, *note));
+  for (std::size_t i = 0; i < person.cameras.size(); ++i) {
+    PersonCameraFeed& feed = person.cameras[i].feed;
+    feed.advance(time);
+    if (const auto note = feed.take_note()) {
+      notes_.push_back(fmt::format("{} {}: its last picture stays", person.name_of(i), *note));
+    }
   }
-  const capture::Frame& shown = frame ? *frame : person.source->first();
-  const bool newer = frame ? frame->image != person.image : person.image == nullptr;
-  if (!newer || !shown.image) return;
-  person.image = shown.image;
-  show(person, *shown.image, shown.time);
+  if (person.tracker || !person.has_several()) show(person, 0);
+  const auto age_of = [](const Person::Camera& camera) { return camera.feed.age(); };
+  const capture::Time youngest = std::ranges::min(std::views::transform(person.cameras, age_of));
+  for (Person::Camera& camera : person.cameras) {
+    camera.late = camera.feed.age() > youngest + camera.feed.period() * 3 / 2;
+  }
+}
+
+// Leaves a camera out, or takes it back.
+void PersonFeed::judge(Person& person, std::size_t index, capture::Time time) {
+  Person::Camera& camera = person.cameras[index];
+  const char* wrong = camera.late                 ? "its picture is late"
+                      : camera.feed.sees_nobody() ? "it sees nobody"
+                                                  : nullptr;
+  if (wrong) {
+    if (!camera.is_out()) {
+      notes_.push_back(fmt::format("{}: left out, for {}", person.name_of(index), wrong));
+    }
+    camera.out_for = wrong;
+    camera.well.reset();
+  } else if (camera.is_out()) {
+    if (!camera.well) camera.well = time;
+    if (time - *camera.well < trial) return;
+    camera.out_for = nullptr;
+    notes_.push_back(fmt::format("{}: taken back", person.name_of(index)));
+  }
+}
+
+// What to show, with all that it takes keyed. Cameras that it takes may turn out to see nobody:
+// then it is chosen anew without them.
+void PersonFeed::choose(Person& person, capture::Time time, Vec3 viewer) {
+  const PersonSettings& s = person.settings;
+  const Vec3 at = person.position();
+  std::vector<compositing::ShapeCamera> cameras(person.cameras.size());
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    // Whether somebody is seen again shows only in what is keyed.
+    if (person.cameras[i].is_out() && !person.cameras[i].late) show(person, i);
+    judge(person, i, time);
+    const Vec3 camera = calibrate::position_of(s.cameras[i].cam_from_set);
+    cameras[i] = {azimuth(at, camera), !person.cameras[i].is_out()};
+  }
+  compositing::ShapeQuestion question{s.shape, cameras, azimuth(at, viewer)};
+  question.off_plane_m = s.by_feet ? compositing::off_foot_m : compositing::off_body_m;
+  question.error_m = s.error_m;
+  const auto before = std::exchange(person.choice, std::nullopt);
+  for (bool settled = false; !settled;) {
+    person.choice = choose_shape(question, before);
+    settled = true;
+    std::vector<compositing::OutlinedView> views;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      if (!cameras[i].is_good || !(person.choice->hull || i == person.choice->camera)) continue;
+      show(person, i);
+      judge(person, i, time);
+      if (person.cameras[i].is_out()) cameras[i].is_good = settled = false;
+      const PersonCameraFeed& feed = person.cameras[i].feed;
+      views.push_back({*s.cameras[i].lens, s.cameras[i].cam_from_set, feed.outline()});
+    }
+    if (!person.choice->hull || !settled) continue;
+    person.box = compositing::person_box(views, at);
+    // Nothing of the hull is seen from within its box.
+    if (!person.box || person.box->has(viewer)) question.hull_is_there = settled = false;
+  }
+  // With nobody good, the nearest one's last picture.
+  show(person, person.choice->camera);
+}
+
+// Status of what was chosen, and notes of what changed.
+void PersonFeed::tell(Person& person) {
+  PersonStatus& status = person.frame.status;
+  const compositing::ShapeChoice& now = *person.choice;
+  const PersonSettings& s = person.settings;
+  const bool first = !std::exchange(person.told, true);
+  const bool changed = now.hull != status.hull || static_cast<int>(now.camera) + 1 != status.camera;
+  if (!first && (now.hull != status.hull || (changed && !now.hull))) {
+    notes_.push_back(
+        fmt::format("{}: shown as {} from here, {:.0f} degrees off, for an error of "
+                    "{:.3f} m",
+                    status.name, words_for(now), now.view_rad / degree, now.error_m));
+  }
+  if (!now.holds && status.holds) {
+    notes_.push_back(fmt::format(
+        "{}: seen {:.0f} degrees off camera {}, nothing holds the error of {:g} m: {} has {:.3f} "
+        "m, the hull would have {:.3f} m",
+        status.name, now.view_rad / degree, now.camera + 1, s.error_m, words_for(now), now.error_m,
+        now.hull_error_m));
+  }
+  status.hull = now.hull;
+  status.camera = static_cast<int>(now.camera) + 1;
+  status.error_m = now.error_m;
+  status.holds = now.holds;
+  status.view_angle_deg = now.view_rad / degree;
+  status.left_out.clear();
+  for (std::size_t i = 0; i < person.cameras.size(); ++i) {
+    if (person.cameras[i].is_out()) status.left_out.push_back(static_cast<int>(i) + 1);
+  }
 }
 
 // Upright, and turned to the show's camera as far as the set says.
-void PersonFeed::place(Person& person, const calibrate::Pose& cam_from_set) {
+void PersonFeed::place_billboard(Person& person, Vec3 viewer) {
   const PersonSettings& s = person.settings;
   PersonStatus& status = person.frame.status;
-  const calibrate::Vec3 viewer = calibrate::position_of(cam_from_set);
-  status.position = person.standing ? person.standing->p_set : s.position;
-  status.sigma_m = person.standing ? person.standing->sigma_m : 0;
-  status.held = person.standing && person.standing->held;
-  if (s.by_feet && !person.standing) {
-    person.frame.picture = clear_picture();  // nobody knows where
-    return;
-  }
-  if (s.lens) {
-    std::array<float, 4> box = person.feet.box;
-    if (person.frame.picture && person.image && box[2] <= box[0]) {
-      box = {-0.5F, -0.5F, static_cast<float>(s.lens->width) - 0.5F,
-             static_cast<float>(s.lens->height) - 0.5F};
-    }
-    const auto placed = compositing::place_billboard(*s.lens, s.cam_from_set, status.position, box,
-                                                     viewer, s.turn_rad);
+  const std::size_t index = person.choice ? person.choice->camera : 0;
+  const PersonCamera& camera = s.cameras[index];
+  const PersonCameraFeed& feed = person.cameras[index].feed;
+  const double off_plane = s.by_feet ? compositing::off_foot_m : compositing::off_body_m;
+  auto& place = person.frame.places[index];
+  if (camera.lens) {
+    const auto placed = compositing::place_billboard(
+        *camera.lens, camera.cam_from_set, status.position, feed.person_box(), viewer, s.turn_rad);
     if (!placed) return;  // as it was
-    person.frame.set_from_object = placed->set_from_object;
+    place = placed->set_from_object;
     status.view_angle_deg = placed->view_angle_rad / degree;
     status.shallow = placed->shallow;
-    return;
+  } else {
+    // Faces the way that the set says, and from there turns to the camera.
+    const double to_viewer = std::atan2(viewer.x - s.position.x, -(viewer.y - s.position.y));
+    const compositing::Facing facing = compositing::face(s.yaw_rad, to_viewer, s.turn_rad);
+    status.view_angle_deg = facing.view_angle_rad / degree;
+    status.shallow = facing.shallow;
+    const double turned = facing.azimuth_rad;
+    const auto wide = static_cast<float>(s.height_m) * feed.aspect();
+    const auto c = static_cast<float>(std::cos(turned)),
+               sine = static_cast<float>(std::sin(turned));
+    const auto at = calibrate::to_float(s.position);
+    place = {wide * c,    -sine, 0,
+             at.x,  //
+             wide * sine, c,     0,
+             at.y,  //
+             0,           0,     static_cast<float>(s.height_m),
+             at.z};
   }
-  // Faces the way that the set says, and from there turns to the camera.
-  const double to_viewer = std::atan2(viewer.x - s.position.x, -(viewer.y - s.position.y));
-  const compositing::Facing facing = compositing::face(s.yaw_rad, to_viewer, s.turn_rad);
-  status.view_angle_deg = facing.view_angle_rad / degree;
-  status.shallow = facing.shallow;
-  const double turned = facing.azimuth_rad;
-  const auto wide = static_cast<float>(s.height_m) * person.aspect;
-  const auto c = static_cast<float>(std::cos(turned)), sine = static_cast<float>(std::sin(turned));
-  const auto at = calibrate::to_float(s.position);
-  person.frame.set_from_object = {wide * c,    -sine, 0,
-                                  at.x,  //
-                                  wide * sine, c,     0,
-                                  at.y,  //
-                                  0,           0,     static_cast<float>(s.height_m),
-                                  at.z};
+  status.error_m = compositing::billboard_error_m(status.view_angle_deg * degree, off_plane);
+  status.holds = status.error_m <= s.error_m;
+}
+
+void PersonFeed::place(Person& person, Vec3 viewer) {
+  const PersonSettings& s = person.settings;
+  PersonStatus& status = person.frame.status;
+  PersonFrame& frame = person.frame;
+  status.position = person.position();
+  status.sigma_m = person.standing ? person.standing->sigma_m : 0;
+  status.held = person.standing && person.standing->held;
+  frame.hull_cameras.clear();
+  std::ranges::fill(frame.pictures, person.clear);
+  const bool known = !s.by_feet || person.standing;  // where it is
+  const std::size_t cameras = person.cameras.size();
+  const bool hull = person.choice && person.choice->hull;
+  const std::size_t shown = hull ? cameras : person.choice ? person.choice->camera : 0;
+  status.confidence = 1;
+  for (std::size_t i = 0; i < cameras; ++i) {
+    if (hull ? person.cameras[i].is_out() : i != shown) continue;
+    const PersonCameraFeed& feed = person.cameras[i].feed;
+    if (feed.confidence() <= status.confidence) {
+      status.confidence = feed.confidence();
+      status.key = feed.key();
+    }
+    if (known) frame.pictures[hull ? cameras + i : i] = feed.picture();
+    if (hull) frame.hull_cameras.push_back(i);
+  }
+  if (!known) return;
+  for (std::size_t i = 0; i < frame.places.size(); ++i) {
+    if (i != shown) person.hide(i);
+  }
+  person.hidden[shown] = false;
+  if (!hull) return place_billboard(person, viewer);
+  status.shallow = false;
+  frame.places[cameras] = compositing::placed_box(calibrate::to_float(person.box->lower),
+                                                  calibrate::to_float(person.box->upper));
 }
 
 std::vector<PersonFrame> PersonFeed::at(capture::Time time, const calibrate::Pose& cam_from_set) {
+  const Vec3 viewer = calibrate::position_of(cam_from_set);
   std::vector<PersonFrame> frames;
   for (const auto& person : persons_) {
     update(*person, time);
     const bool was_shallow = person->frame.status.shallow;
-    place(*person, cam_from_set);
+    if (person->has_several()) {
+      choose(*person, time, viewer);
+      tell(*person);
+    }
+    place(*person, viewer);
     const PersonStatus& status = person->frame.status;
     if (status.shallow && !was_shallow) {
       notes_.push_back(

@@ -1,43 +1,50 @@
-// The persons of a set, frame by frame: from their videos to what their billboards show and where
-// they stand.
+// The persons of a set, frame by frame: from their videos to what their billboards and hulls show,
+// and where they stand.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "capture/pool.h"
-#include "compositing/feet.h"
-#include "compositing/keyer.h"
 #include "render/live_picture.h"
 #include "render/video_texture.h"
 #include "studio/set.h"
-#include "studio/timed_source.h"
 
 namespace studio {
 
-// How a person is keyed and where it stands, for people.
+// How a person is keyed, where it stands and what it is shown as, for people.
 struct PersonStatus {
   std::string name;
-  float confidence = 1;         // of the key, 0..1
+  float confidence = 1;         // of the key, 0..1; of several cameras, the least
   std::string key = "none";     // what lowers it most: compositing::name_of; "none" = no key
   std::string feet = "placed";  // compositing::name_of, or "placed" by the set
   bool held = false;            // stands where the feet were seen last
   calibrate::Vec3 position;     // of the feet in the set
   double sigma_m = 0;           // of it, by the matte
-  double view_angle_deg = 0;    // between the person's camera and the show's
+  double view_angle_deg = 0;    // between the show's camera and the person's, the nearest one's
   bool shallow = false;         // more than the billboard turns
+  bool hull = false;            // shown as a hull; else as the billboard of
+  int camera = 1;               // this one, counted from 1; of a hull, the nearest one
+  double error_m = 0;           // of its outline, as compositing/person_shape.h states it
+  bool holds = true;            // error_m is no more than the set asks for
+  std::vector<int> left_out;    // cameras that see nobody or are late, counted from 1
 };
 
+// In the order that add_persons (set_scene.h) has.
 struct PersonFrame {
-  std::shared_ptr<const render::LivePicture> picture;                         // never null
-  std::array<float, 12> set_from_object{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // of its billboard
+  std::vector<std::shared_ptr<const render::LivePicture>> pictures;  // never null
+  std::vector<std::array<float, 12>> places;  // set_from_object of its instances
+  std::vector<std::size_t> hull_cameras;      // that the hull is to be seen by; empty = no hull
   PersonStatus status;
 };
 
-// One thread uses it. A source that ends or stalls holds its last picture.
+// One thread uses it. A source that ends or stalls holds its last picture. Of a person with several
+// cameras, those whose picture is late by more than a frame and a half, or that see nobody, are
+// left out until they have been well for half a second.
 class PersonFeed {
  public:
   // Opens the sources, reads plates and masks. Files begin at `start` of the show's time, or at the
@@ -45,7 +52,7 @@ class PersonFeed {
   PersonFeed(const Set& set, std::optional<capture::Time> start, bool live);
 
   bool empty() const { return persons_.empty(); }
-  // What a scene shows before its first frame: one for each person.
+  // What a scene shows before its first frame.
   std::vector<std::shared_ptr<const render::LivePicture>> nothing_yet() const;
 
   // One for each of the set's persons, as the show's camera stands. Times must not fall.
@@ -58,11 +65,13 @@ class PersonFeed {
   struct Person;
 
   void update(Person& person, capture::Time time);
-  void show(Person& person, const capture::Image& image, capture::Time time);
-  void key(Person& person, const capture::Image& image);
-  static void find_feet(Person& person, const capture::Image& rgba);
-  void stand(Person& person, capture::Time time);
-  void place(Person& person, const calibrate::Pose& cam_from_set);
+  void show(Person& person, std::size_t camera);
+  void stand(Person& person);
+  void choose(Person& person, capture::Time time, calibrate::Vec3 viewer);
+  void judge(Person& person, std::size_t camera, capture::Time time);
+  void tell(Person& person);
+  void place(Person& person, calibrate::Vec3 viewer);
+  void place_billboard(Person& person, calibrate::Vec3 viewer);
 
   std::vector<std::shared_ptr<Person>> persons_;
   capture::Pool<render::VideoTexture> textures_;

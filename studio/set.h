@@ -14,6 +14,7 @@
 #include "capture/colour.h"
 #include "capture/frame.h"
 #include "compositing/keyer.h"
+#include "compositing/person_shape.h"
 #include "render/colour_matrix.h"
 #include "render/environment.h"
 #include "render/frame_job.h"
@@ -177,18 +178,25 @@ struct KeyChoice {
   Place place;
 };
 
-// A person in a video, who stands in the set on a billboard.
-struct PersonSettings {
-  std::string name;
+// A camera that films a person.
+struct PersonCamera {
   std::string source;  // URI
   Place place;
   bool loop = false;
   std::int64_t first = 0;  // frame of the video that it begins with
   capture::Transfer colour = capture::Transfer::rec1886;
   std::optional<KeyChoice> key;         // nothing = the source has alpha, or shows all
-  std::optional<calibrate::Lens> lens;  // of the camera that filmed the person, with its pose
+  std::optional<calibrate::Lens> lens;  // with its pose; further cameras always have both
   calibrate::Pose cam_from_set;
-  bool by_feet = false;  // stands where its feet meet the floor
+};
+
+// A person in a video, who stands in the set.
+struct PersonSettings {
+  std::string name;
+  std::vector<PersonCamera> cameras{PersonCamera{}};  // 1 to 8; the first one tells the feet
+  compositing::PersonShape shape = compositing::PersonShape::automatic;
+  double error_m = 0.05;  // on the person, above which a billboard gives way to the hull
+  bool by_feet = false;   // stands where its feet meet the floor
   double floor_z = 0;
   calibrate::Vec3 position;  // else here: its feet, or without a lens the lower edge's middle
   double height_m = 0;       // without a lens: of the whole picture
@@ -196,6 +204,11 @@ struct PersonSettings {
   double turn_rad = 0;       // how far it turns to the show's camera
   std::array<float, 3> gain{1, 1, 1};
   bool lit = false;
+
+  const PersonCamera& first() const { return cameras.front(); }
+  bool may_be_hull() const {
+    return cameras.size() > 1 && shape != compositing::PersonShape::billboard;
+  }
 };
 
 struct DisplayChoice {

@@ -1,9 +1,15 @@
-// Set files: persons as billboards.
+// Set files: persons.
+#include <algorithm>
 #include <numbers>
+#include <numeric>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "compositing/billboard.h"
+#include "compositing/hull_march.h"
+#include "compositing/visual_hull.h"
 #include "studio/set_scene.h"
 #include "studio/set_sections.h"
 
@@ -45,31 +51,43 @@ KeyChoice read_key(Section table, const SetContext& context) {
   return key;
 }
 
+void read_camera(Section& section, const SetContext& context, PersonCamera& camera) {
+  section.need("source", "the person's video: a file's path or a camera's URI");
+  camera.place = section.place_of("source");
+  read_source_key(section, "source", context.base, camera.source);
+  section.boolean("loop", camera.loop);
+  section.integer("frame", camera.first, std::int64_t{0}, std::int64_t{1} << 40);
+  read_colour(section, camera.colour);
+  if (auto lens = read_lens_key(section, {0, 0}, context.base)) camera.lens = *lens;
+  if (auto table = section.table("pose")) camera.cam_from_set = read_fixed_pose(*table);
+  if (auto table = section.table("key")) camera.key = read_key(*table, context);
+}
+
+bool has_lens(const Section& section) { return section.has("lens") || section.has("model"); }
+
 // Where the person stands, and how the picture is laid there.
-void read_standing(Section& section, const SetContext& context, PersonSettings& person) {
-  const bool has_lens = section.has("lens") || section.has("model");
-  if (has_lens != section.has("pose")) {
+void read_standing(Section& section, PersonSettings& person) {
+  const bool calibrated = has_lens(section);
+  if (calibrated != section.has("pose")) {
     section.fault("", "lens and pose of the person's camera come together");
   }
-  if (auto lens = read_lens_key(section, {0, 0}, context.base)) person.lens = *lens;
-  if (auto table = section.table("pose")) person.cam_from_set = read_fixed_pose(*table);
   std::string feet;
   person.by_feet = section.word("feet", feet, {"auto"});
   section.number("floor", person.floor_z, metres);
-  if (person.by_feet && !has_lens) {
+  if (person.by_feet && !calibrated) {
     section.fault("feet", "needs lens and pose of the person's camera");
   }
   if (person.by_feet == section.has("position")) {
     section.fault("", "must have either feet = \"auto\" or position = [x, y, z]");
   }
   section.vector("position", person.position, metres);
-  if (!has_lens) section.need("height", "of the whole picture in the set, in metres");
-  if (has_lens && section.has("height")) {
+  if (!calibrated) section.need("height", "of the whole picture in the set, in metres");
+  if (calibrated && section.has("height")) {
     section.fault("height", "is told by the camera's lens and pose already");
   }
   section.number("height", person.height_m, {1e-3, 1e4});
   double yaw_deg = 0, turn_deg = 30;
-  if (section.number("yaw", yaw_deg, {-3600, 3600}) && has_lens) {
+  if (section.number("yaw", yaw_deg, {-3600, 3600}) && calibrated) {
     section.fault("yaw", "is told by the camera's pose already");
   }
   section.number("turn", turn_deg, {0, 74});
@@ -77,50 +95,128 @@ void read_standing(Section& section, const SetContext& context, PersonSettings& 
   person.turn_rad = turn_deg * degree;
 }
 
+// The person's further cameras, and what they are for.
+void read_further_cameras(Section& section, const SetContext& context, PersonSettings& person) {
+  if (section.has("camera") && !has_lens(section)) {
+    section.fault("camera", "needs lens and pose of the person's first camera");
+  }
+  std::vector<Section> tables = section.tables("camera");
+  for (Section& further : tables) {
+    if (person.cameras.size() == compositing::most_hull_views) {
+      further.fault("", fmt::format("is one too many: a person has at most {} cameras",
+                                    compositing::most_hull_views));
+      break;
+    }
+    if (!has_lens(further)) further.need("lens", "of this camera: a file, or a table");
+    further.need("pose", "where this camera is in the set");
+    read_camera(further, context, person.cameras.emplace_back());
+    further.finish();
+  }
+  std::string shape = "auto";
+  section.word("shape", shape, {"auto", "billboard", "hull"});
+  if (shape == "billboard") person.shape = compositing::PersonShape::billboard;
+  if (shape == "hull") person.shape = compositing::PersonShape::hull;
+  section.number("error", person.error_m, {1e-3, 10});
+  if (!section.has("camera")) {
+    if (shape == "hull") section.fault("shape", "needs further cameras: [[billboard.camera]]");
+    if (section.has("error"))
+      section.fault("error", "is for further cameras: [[billboard.camera]]");
+    return;
+  }
+  if (person.shape == compositing::PersonShape::billboard) return;
+  if (person.lit) section.fault("lit", "is for billboards: a hull is shown as it was filmed");
+  tables.insert(tables.begin(), section);
+  for (std::size_t i = 0; i < person.cameras.size(); ++i) {
+    if (!person.cameras[i].key || !person.cameras[i].key->by_texel) continue;
+    tables[i].fault("key", "by: a hull needs whole frames keyed: \"frame\"");
+  }
+}
+
+std::string name_of(const PersonSettings& person, std::size_t index) {
+  return person.name.empty() ? fmt::format("person {}", index + 1) : person.name;
+}
+
+render::Material hull_material(const PersonSettings& person,
+                               const std::string& name,
+                               std::uint32_t first_picture,
+                               std::span<const std::size_t> cameras) {
+  std::vector<compositing::HullView> views;
+  for (const std::size_t i : cameras) {
+    const PersonCamera& camera = person.cameras[i];
+    views.push_back({first_picture + static_cast<std::uint32_t>(i),
+                     {camera.lens.value(), camera.cam_from_set}});
+  }
+  compositing::HullSettings settings;
+  settings.gain = person.gain;
+  return compositing::make_hull_material(name, settings, views);
+}
+
 }  // namespace
 
 PersonSettings read_billboard_section(Section section, const SetContext& context) {
   PersonSettings person;
   section.text("name", person.name);
-  section.need("source", "the person's video: a file's path or a camera's URI");
-  person.place = section.place_of("source");
-  read_source_key(section, "source", context.base, person.source);
-  section.boolean("loop", person.loop);
-  section.integer("frame", person.first, std::int64_t{0}, std::int64_t{1} << 40);
-  read_colour(section, person.colour);
+  read_camera(section, context, person.cameras.front());
   section.colour("gain", person.gain, {0, 1e9});
   section.boolean("lit", person.lit);
-  read_standing(section, context, person);
-  if (auto table = section.table("key")) person.key = read_key(*table, context);
+  read_standing(section, person);
+  read_further_cameras(section, context, person);
   section.finish();
   return person;
 }
 
 void add_persons(const Set& set, SetScene& scene, Faults& faults) {
   render::SceneDescription& description = scene.description;
-  scene.first_person = description.instances.size();
-  for (std::size_t i = 0; i < set.persons.size(); ++i) {
-    const PersonSettings& person = set.persons[i];
-    const std::string name = person.name.empty() ? fmt::format("person {}", i + 1) : person.name;
-    const compositing::BillboardSettings shown{static_cast<std::uint32_t>(i), person.gain,
-                                               person.lit};
-    const auto material = static_cast<std::uint32_t>(description.materials.size());
-    try {
-      description.materials.push_back(person.lens
-                                          ? compositing::make_billboard_material(
-                                                name, shown, {*person.lens, person.cam_from_set})
-                                          : compositing::make_billboard_material(name, shown));
-    } catch (const std::invalid_argument& error) {
-      faults.add(person.place, error.what());
-      continue;
-    }
-    description.meshes.push_back(
-        std::make_shared<const render::Mesh>(compositing::make_billboard_mesh(material)));
+  const auto add = [&](const std::string& name, render::Material material, const auto& make_mesh) {
+    const auto index = static_cast<std::uint32_t>(description.materials.size());
+    description.materials.push_back(std::move(material));
+    description.meshes.push_back(std::make_shared<const render::Mesh>(make_mesh(index)));
     render::Instance& instance = description.instances.emplace_back();
     instance.name = name;
     instance.mesh = static_cast<std::uint32_t>(description.meshes.size() - 1);
     instance.moves = true;
+  };
+  scene.first_person = description.instances.size();
+  std::uint32_t picture = 0;
+  for (std::size_t i = 0; i < set.persons.size(); ++i) {
+    const PersonSettings& person = set.persons[i];
+    const std::string name = name_of(person, i);
+    const auto cameras = static_cast<std::uint32_t>(person.cameras.size());
+    for (const PersonCamera& camera : person.cameras) {
+      const compositing::BillboardSettings shown{picture++, person.gain, person.lit};
+      try {
+        add(name,
+            camera.lens ? compositing::make_billboard_material(name, shown,
+                                                               {*camera.lens, camera.cam_from_set})
+                        : compositing::make_billboard_material(name, shown),
+            compositing::make_billboard_mesh);
+      } catch (const std::invalid_argument& error) {
+        faults.add(camera.place, error.what());
+      }
+    }
+    if (!person.may_be_hull() || !faults.sorted().empty()) continue;
+    std::vector<std::size_t> all(cameras);
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    scene.hulls.push_back({i, description.materials.size(), picture, all});
+    try {
+      add(name, hull_material(person, name, picture, all), compositing::make_hull_mesh);
+    } catch (const std::invalid_argument& error) {
+      faults.add(person.first().place, error.what());
+    }
+    picture += cameras;
   }
+}
+
+void see_hull_by(const Set& set,
+                 std::size_t person,
+                 std::span<const std::size_t> cameras,
+                 SetScene& scene) {
+  const auto hull = std::ranges::find(scene.hulls, person, &PersonHull::person);
+  if (hull == scene.hulls.end()) throw std::invalid_argument("the person has no hull");
+  const PersonSettings& settings = set.persons.at(person);
+  scene.description.materials[hull->material] =
+      hull_material(settings, name_of(settings, person), hull->first_picture, cameras);
+  hull->cameras.assign(cameras.begin(), cameras.end());
 }
 
 }  // namespace studio

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,11 +24,21 @@ struct ObjectPart {
   PlacementSettings moved{{}, 0, 0, 1};  // in the object's frame, from where the model has it
 };
 
+// The hull of one of the set's persons: a material that looks at live pictures, one for each of the
+// person's cameras.
+struct PersonHull {
+  std::size_t person = 0;
+  std::size_t material = 0;
+  std::uint32_t first_picture = 0;
+  std::vector<std::size_t> cameras;  // of the person, that it is seen by now
+};
+
 // A set's scene, and what it takes to move things in it.
 struct SetScene {
   render::SceneDescription description;
   std::vector<ObjectPart> parts;   // its first instances, in order
-  std::size_t first_person = 0;    // instance of the set's first person; the others follow
+  std::size_t first_person = 0;    // first instance of the set's persons; see add_persons
+  std::vector<PersonHull> hulls;   // of the persons that may be one
   std::vector<std::string> notes;  // what was not understood of its models, with their files
 };
 
@@ -65,9 +77,17 @@ std::array<float, 12> matrix_of(const PlacementSettings& placement);
 // What describe_scene ends with; adds a fault for each that is shown nowhere.
 void show_videos(const Set& set, SetScene& scene, Faults& faults);
 
-// Adds the set's persons, each a billboard that shows the live picture of its number. Places them
-// nowhere yet.
+// Adds the set's persons in its order, and places them nowhere yet. Each is a billboard for each of
+// its cameras, and, if it may be one, a hull: as many instances. Live pictures go as they do: one
+// for each billboard, and then one for each camera of the hull.
 void add_persons(const Set& set, SetScene& scene, Faults& faults);
+
+// Lets a person's hull be what these of its cameras see, 2 or more. The scene has to be built anew
+// then. Throws std::invalid_argument if the person has no hull, or as make_hull_material.
+void see_hull_by(const Set& set,
+                 std::size_t person,
+                 std::span<const std::size_t> cameras,
+                 SetScene& scene);
 
 // The surfaces that show a video of the scene, as lights. Throws std::invalid_argument as
 // render::sample_area_light.

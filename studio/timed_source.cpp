@@ -1,6 +1,7 @@
 // Videos by the show's time.
 #include "studio/timed_source.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "capture/live_reader.h"
@@ -41,6 +42,9 @@ std::optional<capture::Frame> TimedSource::at(capture::Time time) {
   const bool holds = !frame || stalls || lost;
   if (holds && !holds_) note_ = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
   holds_ = holds;
+  if (frame && !lost) pictured_ = frame->time;
+  age_ = source_.is_still() || !pictured_ ? capture::Time{}
+                                          : std::max(asked - *pictured_, capture::Time{});
   return frame;
 }
 

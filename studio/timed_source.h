@@ -34,6 +34,9 @@ class TimedSource {
   // last one holds, because there is no newer one.
   std::optional<capture::Frame> at(capture::Time time);
   const capture::Frame& first() const { return source_.first(); }
+  // How old its newest picture was at the time that was asked for last; 0 for stills, and before a
+  // file begins.
+  capture::Time age() const { return age_; }
   const capture::CameraInfo& info() const { return source_.info(); }
 
   // Once each time that the source stops giving frames: what to tell, after its name.
@@ -43,6 +46,8 @@ class TimedSource {
   Source source_;
   std::optional<capture::Time> start_;
   bool live_;
+  std::optional<capture::Time> pictured_;  // of the newest frame that was not lost
+  capture::Time age_{};
   bool holds_ = false;  // its last frame, for it stalls or has ended
   std::optional<std::string> note_;
 };

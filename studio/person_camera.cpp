@@ -1,0 +1,170 @@
+// One camera of a person.
+#include "studio/person_camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "compositing/keyed_picture.h"
+#include "compositing/person_box.h"
+#include "studio/clean_plates.h"
+#include "studio/section.h"
+
+namespace studio {
+namespace {
+
+using compositing::Feet;
+
+// Feet are looked for in a matte whose longer side is at most so long.
+constexpr int matte_side = 640;
+constexpr capture::Rational rate_of_unknown{25, 1};
+
+compositing::KeyMasks masks_of(const KeyChoice& key) {
+  compositing::KeyMasks masks;
+  if (key.garbage.empty()) return masks;
+  const capture::Image mask = read_picture(key.garbage, capture::Transfer::linear);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      masks.garbage.push_back(
+          static_cast<std::uint8_t>(std::clamp(mask.at(y, x) * 255 + 0.5F, 0.0F, 255.0F)));
+    }
+  }
+  return masks;
+}
+
+// Alpha of a keyed picture of (height, width, 4), area-averaged `shrink` times smaller.
+capture::Image matte_of(const capture::Image& rgba, int shrink) {
+  capture::Image matte =
+      capture::make_image(std::max(1, rgba.height / shrink), std::max(1, rgba.width / shrink), 1);
+  const float part = 1 / static_cast<float>(shrink * shrink);
+  for (int y = 0; y < matte.height * shrink; ++y) {
+    for (int x = 0; x < matte.width * shrink; ++x) {
+      if (y < rgba.height && x < rgba.width) {
+        matte.at(y / shrink, x / shrink) += part * rgba.at(y, x, 3);
+      }
+    }
+  }
+  return matte;
+}
+
+// From pixels of the matte to those of the picture.
+void enlarge(std::array<float, 4>& box, int shrink) {
+  for (float& edge : box) edge = (edge + 0.5F) * static_cast<float>(shrink) - 0.5F;
+}
+
+Feet enlarged(Feet feet, int shrink) {
+  const double times = shrink;
+  feet.q = {(feet.q.x + 0.5) * times - 0.5, (feet.q.y + 0.5) * times - 0.5};
+  feet.sigma_px *= times;
+  enlarge(feet.box, shrink);
+  return feet;
+}
+
+}  // namespace
+
+std::shared_ptr<const render::LivePicture> clear_picture() {
+  capture::Image clear = capture::make_image(1, 1, 4);
+  return std::make_shared<compositing::KeyedPicture>(
+      std::make_shared<render::VideoTexture>(render::make_video_texture(clear)));
+}
+
+PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
+                                   const Options& options,
+                                   Faults& faults)
+    : settings_(settings), bounded_(options.bounded), picture_(clear_picture()) {
+  const PersonCamera& s = settings_;
+  const VideoSource source{s.source, options.base_dir, s.loop, s.first, s.colour};
+  try {
+    source_ = std::make_unique<TimedSource>(source, options.start, options.live);
+    const capture::CameraInfo& info = source_->info();
+    if (s.lens && (s.lens->width != info.width || s.lens->height != info.height)) {
+      throw std::invalid_argument(
+          fmt::format("the video's picture is {}x{}, but its lens is for {}x{}", info.width,
+                      info.height, s.lens->width, s.lens->height));
+    }
+    aspect_ = static_cast<float>(info.width) / static_cast<float>(info.height);
+    period_ = capture::time_of_frame(1, info.rate.num > 0 ? info.rate : rate_of_unknown);
+  } catch (const std::exception& error) {
+    faults.add(s.place, error.what());
+    return;
+  }
+  if (!s.key) return;
+  try {
+    const capture::CameraInfo& info = source_->info();
+    auto plate = read_clean_plate(s.key->plate, source, s.key->footage);
+    if (plate.light.width != info.width || plate.light.height != info.height) {
+      throw std::invalid_argument(
+          fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", s.key->plate,
+                      plate.light.width, plate.light.height, s.source, info.width, info.height));
+    }
+    keyer_.emplace(std::move(plate), s.key->settings, masks_of(*s.key));
+    by_texel_ = s.key->by_texel && !options.needs_matte;
+  } catch (const std::exception& error) {
+    faults.add(s.key->place, error.what());
+  }
+}
+
+void PersonCameraFeed::advance(capture::Time time) {
+  const std::optional<capture::Frame> frame = source_->at(time);
+  const capture::Frame& newest = frame ? *frame : source_->first();
+  const bool newer = frame ? frame->image != image_ : image_ == nullptr;
+  if (!newer || !newest.image) return;
+  skipped_ = image_ != shown_;
+  image_ = newest.image;
+  time_ = newest.time;
+}
+
+bool PersonCameraFeed::show(capture::Pool<render::VideoTexture>& textures) {
+  if (image_ == shown_) return false;
+  key_frame(textures);
+  shown_ = image_;
+  return true;
+}
+
+void PersonCameraFeed::key_frame(capture::Pool<render::VideoTexture>& textures) {
+  const capture::Image& image = *image_;
+  auto texture = textures.lend();
+  const auto show = [&](const capture::Image& rgba) {
+    render::make_video_texture(rgba, *texture);
+    picture_ = std::make_shared<compositing::KeyedPicture>(std::move(texture), bounded_);
+    if (rgba.channels == 4) look_for_person(rgba);
+  };
+  if (!keyer_) return show(image);
+  if (std::exchange(skipped_, false)) keyer_->restart();
+  const compositing::KeyReport report =
+      by_texel_ ? keyer_->follow(image) : keyer_->key(image, keyed_);
+  confidence_ = report.confidence;
+  key_ = compositing::name_of(report.status);
+  if (!by_texel_) return show(capture::to_float(keyed_));
+  render::make_video_texture(image, *texture);
+  picture_ = std::make_shared<compositing::TexelKeyedPicture>(std::move(texture), keyer_->lit(),
+                                                              keyer_->dials());
+}
+
+void PersonCameraFeed::look_for_person(const capture::Image& rgba) {
+  if (!settings_.lens) return;
+  const int longer = std::max(rgba.width, rgba.height);
+  const int shrink = std::max(1, (longer + matte_side - 1) / matte_side);
+  const capture::Image matte = matte_of(rgba, shrink);
+  has_matte_ = true;
+  feet_ = enlarged(compositing::find_feet(matte), shrink);
+  if (!bounded_) return;
+  outline_ = compositing::outline_box(matte);
+  if (outline_) enlarge(*outline_, shrink);
+}
+
+std::array<float, 4> PersonCameraFeed::whole() const {
+  const auto [width, height] = std::pair(source_->info().width, source_->info().height);
+  return {-0.5F, -0.5F, static_cast<float>(width) - 0.5F, static_cast<float>(height) - 0.5F};
+}
+
+std::array<float, 4> PersonCameraFeed::person_box() const {
+  return shown_ && feet_.box[2] <= feet_.box[0] ? whole() : feet_.box;
+}
+
+std::array<float, 4> PersonCameraFeed::outline() const { return outline_ ? *outline_ : whole(); }
+
+}  // namespace studio

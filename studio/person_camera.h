@@ -1,0 +1,85 @@
+// One camera of a person, frame by frame: its video, keyed, and what it sees of the person.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "capture/half.h"
+#include "capture/pool.h"
+#include "compositing/feet.h"
+#include "compositing/keyer.h"
+#include "render/live_picture.h"
+#include "render/video_texture.h"
+#include "studio/set.h"
+#include "studio/timed_source.h"
+
+namespace studio {
+
+// A picture of nobody.
+std::shared_ptr<const render::LivePicture> clear_picture();
+
+// One thread uses it. A source that ends or stalls holds its last picture.
+class PersonCameraFeed {
+ public:
+  struct Options {
+    std::string base_dir;
+    std::optional<capture::Time> start;  // as TimedSource has it
+    bool live = false;
+    bool needs_matte = false;  // keyed by whole frames whatever the settings
+    bool bounded = false;      // pictures say where they are empty: for hulls
+  };
+  // Opens the source, reads plate and masks. Adds faults at their places; is of no use then.
+  PersonCameraFeed(const PersonCamera& settings, const Options& options, Faults& faults);
+
+  const PersonCamera& settings() const { return settings_; }
+  float aspect() const { return aspect_; }  // of its picture: width over height
+
+  // Goes on to the newest frame at the show's time, and keys nothing yet.
+  void advance(capture::Time time);
+  // Of the newest frame.
+  capture::Time time() const { return time_; }
+  // How old its picture is at the time that was asked for last, and how long a frame lasts.
+  capture::Time age() const { return source_->age(); }
+  capture::Time period() const { return period_; }
+  std::optional<std::string> take_note() { return source_->take_note(); }
+
+  // Keys the newest frame, unless it is already. True if it did.
+  bool show(capture::Pool<render::VideoTexture>& textures);
+
+  // What follows is of the frame that was shown last.
+  const std::shared_ptr<const render::LivePicture>& picture() const { return picture_; }
+  float confidence() const { return confidence_; }
+  std::string_view key() const { return key_; }
+  const compositing::Feet& feet() const { return feet_; }
+  bool sees_nobody() const { return has_matte_ && feet_.status == compositing::FeetStatus::absent; }
+  // Edges of the person, and of all that may be its, in pixels: left, top, right, bottom. The whole
+  // picture where there is no matte.
+  std::array<float, 4> person_box() const;
+  std::array<float, 4> outline() const;
+
+ private:
+  void key_frame(capture::Pool<render::VideoTexture>& textures);
+  void look_for_person(const capture::Image& rgba);
+  std::array<float, 4> whole() const;
+
+  PersonCamera settings_;
+  bool by_texel_ = false, bounded_ = false;
+  std::unique_ptr<TimedSource> source_;
+  std::optional<compositing::Keyer> keyer_;
+  float aspect_ = 1;
+  capture::Time period_{}, time_{};
+  std::shared_ptr<const capture::Image> image_, shown_;  // newest; that the picture was made from
+  bool skipped_ = false;                                 // frames between these two
+  capture::HalfImage keyed_;
+  std::shared_ptr<const render::LivePicture> picture_;
+  float confidence_ = 1;
+  std::string_view key_ = "none";
+  compositing::Feet feet_;
+  bool has_matte_ = false;
+  std::optional<std::array<float, 4>> outline_;
+};
+
+}  // namespace studio
