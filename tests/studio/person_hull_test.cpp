@@ -251,6 +251,30 @@ TEST_F(PersonHullTest, TakesACameraBackOnceItSeesThePerson) {
   EXPECT_THAT(told.notes, Contains(HasSubstr("camera 2: taken back")));
 }
 
+TEST_F(PersonHullTest, IsWhatTheProgramsOwnSetShows) {
+  const Set set = read_set(std::string(PLATELIGHT_SOURCE_DIR) + "/studio/sets/walker.toml");
+  PersonFeed feed(set, std::nullopt, false);
+  for (int i = 0; i < 3; ++i) {
+    const auto persons = feed.at(capture::time_of_frame(i, {25, 1}), set.camera.pose.cam_from_set);
+    ASSERT_EQ(persons.size(), 1U);
+    EXPECT_TRUE(persons[0].status.hull);
+    EXPECT_TRUE(persons[0].status.holds);
+    EXPECT_THAT(persons[0].hull_cameras, ElementsAre(0, 1));
+    EXPECT_EQ(persons[0].pictures.size(), 4U);
+    EXPECT_EQ(persons[0].places.size(), 3U);
+    // About the walker, and hardly larger.
+    const auto& box = persons[0].places[2];
+    const calibrate::Vec3 feet = persons[0].status.position;
+    EXPECT_LT(box[3], feet.x);
+    EXPECT_GT(box[3] + box[0], feet.x);
+    EXPECT_LT(box[7], feet.y);
+    EXPECT_GT(box[7] + box[5], feet.y);
+    EXPECT_NEAR(box[11], 0.001, 1e-4);
+    EXPECT_NEAR(box[11] + box[10], 1.73, 0.25);
+  }
+  EXPECT_THAT(feed.take_notes(), IsEmpty());
+}
+
 TEST_F(PersonHullTest, HoldsTheLastHullWhereAllCamerasEnd) {
   const Told told = run(walker_set(
       30,
