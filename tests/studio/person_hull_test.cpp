@@ -275,6 +275,28 @@ TEST_F(PersonHullTest, IsWhatTheProgramsOwnSetShows) {
   EXPECT_THAT(feed.take_notes(), IsEmpty());
 }
 
+// Pictures and instances of persons before and after it are their own.
+TEST_F(PersonHullTest, IsTheSameAmongOthers) {
+  const std::string other =
+      "[[billboard]]\nsource = \"grey:50,25,0\"\nheight = 2\nposition = [0, -20, 0]\n";
+  const std::string walker = walker_from({filmed_from(0), filmed_from(60)});
+  const std::string cut = walker_from({filmed_from(0), filmed_from(60, walking, walking + 2)});
+  for (const std::string& persons : {walker, cut}) {
+    const auto pictures_of = [&](const std::string& all, std::size_t at) {
+      Show show(walker_set(30, all, 6));
+      std::vector<std::vector<capture::Half>> pictures;
+      show.run([&](const ShownFrame& shown) {
+        EXPECT_EQ(shown.prepared.persons.at(at).hull, persons == walker || pictures.size() < 3);
+        pictures.push_back(shown.result->rgba.pixels);
+      });
+      return pictures;
+    };
+    const auto alone = pictures_of(persons, 0);
+    EXPECT_EQ(pictures_of(other + persons, 1), alone);
+    EXPECT_EQ(pictures_of(persons + other, 0), alone);
+  }
+}
+
 TEST_F(PersonHullTest, HoldsTheLastHullWhereAllCamerasEnd) {
   const Told told = run(walker_set(
       30,

@@ -14,6 +14,7 @@
 #include "studio/probe_source.h"
 #include "studio/quantiles.h"
 #include "studio/rolling_bracket.h"
+#include "studio/timed_source.h"
 #include "tests/studio/made_show.h"
 
 namespace studio {
@@ -50,6 +51,28 @@ TEST(Source, ShowsASinglePictureForEver) {
   Source source = grey_source(1, 25);
   EXPECT_TRUE(source.is_still());
   EXPECT_TRUE(source.at(std::chrono::hours(100)));
+}
+
+TEST(TimedSource, SaysHowOldItsNewestPictureIs) {
+  register_grey_camera();
+  const auto source_of = [](const char* uri) {
+    return TimedSource({uri, "", false, 0, capture::Transfer::linear}, capture::Time{1s}, false);
+  };
+  TimedSource ending = source_of("grey:3,10,0");
+  EXPECT_TRUE(ending.at(500ms));
+  EXPECT_EQ(ending.age(), 0s);  // not begun
+  EXPECT_TRUE(ending.at(1s + 130ms));
+  EXPECT_EQ(ending.age(), 30ms);
+  EXPECT_FALSE(ending.at(2s));
+  EXPECT_EQ(ending.age(), 900ms);                 // of what was given last
+  TimedSource losing = source_of("grey:9,10,2");  // every second one is lost
+  EXPECT_TRUE(losing.at(1s + 200ms));
+  EXPECT_EQ(losing.age(), 0s);
+  EXPECT_TRUE(losing.at(1s + 350ms));
+  EXPECT_EQ(losing.age(), 150ms);
+  TimedSource still = source_of("grey:1,10,0");
+  EXPECT_TRUE(still.at(100s));
+  EXPECT_EQ(still.age(), 0s);
 }
 
 TEST(Source, GivesWhatHasComeOfALiveCameraWithoutWaiting) {
