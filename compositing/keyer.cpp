@@ -233,6 +233,7 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   KeyReport report;
   report.sight = sight;
   report.shift = shift_;
+  report.moved = looks_moved_ > 1;
   report.soft = soft;
   const auto lower = [&](float by, KeyStatus status) {
     if (by < 1 && (report.confidence >= 1 || by < report.confidence)) report.status = status;
@@ -250,7 +251,7 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   }
   lower(falling(sight.mismatch, 0.06F, 0.16F), KeyStatus::misfit);
   lower(falling(soft, 0.15F, 0.45F), KeyStatus::misfit);
-  if (looks_moved_ > 1) {
+  if (report.moved) {
     lower(0.5F + 0.4F * falling(shift_.size_px(), shift_still_px, 4), KeyStatus::moved);
   }
   lower(falling(sight.gain, 1.7F, 2.3F) * falling(-sight.gain, -0.45F, -0.2F), KeyStatus::unlit);

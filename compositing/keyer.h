@@ -55,8 +55,9 @@ struct KeyReport {
   float confidence = 1;                // 0..1; falls before the picture breaks
   KeyStatus status = KeyStatus::good;  // what lowers it most
   PlateSight sight;
-  PlateShift shift;  // against the plate, as it was seen last: in one of every four frames
-  float soft = 0;    // share of pixels that are neither screen nor person
+  PlateShift shift;    // against the plate, as it was seen last: in one of every four frames
+  bool moved = false;  // the camera, by more than one look
+  float soft = 0;      // share of pixels that are neither screen nor person
 };
 
 // Keys the frames of one clip, in order. Not thread-safe; several may run side by side.

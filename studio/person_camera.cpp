@@ -138,6 +138,8 @@ void PersonCameraFeed::key_frame(capture::Pool<render::VideoTexture>& textures) 
       by_texel_ ? keyer_->follow(image) : keyer_->key(image, keyed_);
   confidence_ = report.confidence;
   key_ = compositing::name_of(report.status);
+  moved_px_.reset();
+  if (report.moved) moved_px_ = {report.shift.right_px, report.shift.down_px};
   if (!by_texel_) return show(capture::to_float(keyed_));
   render::make_video_texture(image, *texture);
   picture_ = std::make_shared<compositing::TexelKeyedPicture>(std::move(texture), keyer_->lit(),

@@ -53,6 +53,8 @@ class PersonCameraFeed {
   const std::shared_ptr<const render::LivePicture>& picture() const { return picture_; }
   float confidence() const { return confidence_; }
   std::string_view key() const { return key_; }
+  // How far the picture has gone from its plate, if the camera was moved: right and down, pixels.
+  std::optional<std::array<float, 2>> moved_px() const { return moved_px_; }
   const compositing::Feet& feet() const { return feet_; }
   bool sees_nobody() const { return has_matte_ && feet_.status == compositing::FeetStatus::absent; }
   // Edges of the person, and of all that may be its, in pixels: left, top, right, bottom. The whole
@@ -77,6 +79,7 @@ class PersonCameraFeed {
   std::shared_ptr<const render::LivePicture> picture_;
   float confidence_ = 1;
   std::string_view key_ = "none";
+  std::optional<std::array<float, 2>> moved_px_;
   compositing::Feet feet_;
   bool has_matte_ = false;
   std::optional<std::array<float, 4>> outline_;

@@ -51,8 +51,9 @@ struct PersonFeed::Person {
   struct Camera {
     PersonCameraFeed feed;
     bool unsure = false;
-    bool late = false;                  // its picture is not of this moment
-    std::optional<capture::Time> well;  // since when, of one that was left out
+    bool moved = false;
+    bool late = false;                    // its picture is not of this moment
+    std::optional<capture::Time> well{};  // since when, of one that was left out
     bool is_out() const { return out_for != nullptr; }
     const char* out_for = nullptr;  // why it is left out
   };
@@ -126,6 +127,15 @@ void PersonFeed::show(Person& person, std::size_t index) {
         fmt::format("{}: the key is unsure ({})", person.name_of(index), camera.feed.key()));
   }
   camera.unsure = unsure;
+  const auto moved = camera.feed.moved_px();
+  if (moved && !camera.moved) {
+    notes_.push_back(fmt::format(
+        "{}: its camera was moved: the picture is {:.1f} px further right and {:.1f} px further "
+        "down "
+        "than its clean plate. Take the plate anew (platelight key plate), and its pose",
+        person.name_of(index), (*moved)[0], (*moved)[1]));
+  }
+  camera.moved = moved.has_value();
   if (index == 0) stand(person);
 }
 

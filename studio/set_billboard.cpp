@@ -42,10 +42,10 @@ KeyChoice read_key(Section table, const SetContext& context) {
   table.number("core", settings.core, {0.1, 1});
   if (!(settings.screen < settings.core)) table.fault("core", "must be more than screen");
   table.number("edge", settings.edge, {-1, 1});
-  table.number("despill", settings.despill, {0, 4});
+  table.number("despill", settings.despill, {0, 2});
   table.boolean("learned", settings.learned);
   table.boolean("follows_light", settings.follows_light);
-  table.number("smoothing", settings.smoothing, {0, 10});
+  table.number("smoothing", settings.smoothing, {0, 4});
   table.file("garbage", context.base, key.garbage);
   table.finish();
   return key;

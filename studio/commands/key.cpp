@@ -176,8 +176,8 @@ Command key_command() {
         arguments.option("--screen", o->screen, 0, 0.9, "alpha below which the screen is clear");
         arguments.option("--core", o->core, 0.1, 1, "alpha above which the person is whole");
         arguments.option("--edge", o->edge, -1, 1, "thinner to fuller");
-        arguments.option("--despill", o->despill, 0, 4, "none, 1 all of the likely spill, up to 4");
-        arguments.option("--smoothing", o->smoothing, 0, 10, "of alpha over frames");
+        arguments.option("--despill", o->despill, 0, 2, "none, 1 all of the likely spill, up to 2");
+        arguments.option("--smoothing", o->smoothing, 0, 4, "of alpha over frames");
         return [o](Console& console) { key(*o, console); };
       }};
 }

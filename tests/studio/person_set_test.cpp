@@ -91,6 +91,47 @@ class Walker final : public capture::Camera {
   std::int64_t frames_, number_ = 0;
 };
 
+// Nobody before a green cloth between grey panels; a picture that is pushed from frame 8 on.
+class PushedCamera final : public capture::Camera {
+ public:
+  static constexpr int width = 240, height = 160;
+  PushedCamera() {
+    info_.width = width;
+    info_.height = height;
+    info_.rate = {25, 1};
+    info_.frames = 40;
+  }
+  const capture::CameraInfo& info() const override { return info_; }
+  capture::CameraStatistics statistics() const override { return {}; }
+
+  static capture::Image picture(int right) {
+    capture::Image image = capture::make_image(height, width);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const int u = x - right;
+        const bool cloth = u > 60 && u < 180;
+        const float panel = 0.1F + 0.07F * static_cast<float>((u / 14 * 3 + y / 11 * 5) % 7);
+        for (int c = 0; c < 3; ++c)
+          image.at(y, x, c) = cloth ? screen[static_cast<std::size_t>(c)] : panel;
+      }
+    }
+    return image;
+  }
+  std::optional<capture::Frame> next() override {
+    if (number_ == info_.frames) return std::nullopt;
+    capture::Frame frame;
+    frame.number = number_;
+    frame.time = capture::time_of_frame(number_, info_.rate);
+    frame.image = std::make_shared<capture::Image>(picture(number_ < 8 ? 0 : 3));
+    ++number_;
+    return frame;
+  }
+
+ private:
+  capture::CameraInfo info_;
+  std::int64_t number_ = 0;
+};
+
 constexpr const char* walker = R"([[billboard]]
 name = "walker"
 source = "walker:20"
@@ -106,6 +147,9 @@ class PersonSetTest : public MadeShowTest {
     MadeShowTest::SetUpTestSuite();
     capture::register_camera("walker", [](std::string_view rest, const capture::CameraOptions&) {
       return std::make_unique<Walker>(std::stol(std::string(rest)));
+    });
+    capture::register_camera("pushed", [](std::string_view, const capture::CameraOptions&) {
+      return std::make_unique<PushedCamera>();
     });
   }
   void SetUp() override {
@@ -262,6 +306,27 @@ TEST_F(PersonSetTest, HoldsItsLastPictureAfterTheEndAndSaysSo) {
   show.run([&](const ShownFrame& shown) { last = shown.prepared.persons[0].position; });
   EXPECT_NEAR(last.y, feet_at(3).y, 0.06);
   EXPECT_THAT(show.status()->notes, testing::Contains(HasSubstr("has ended")));
+}
+
+TEST_F(PersonSetTest, SaysOnceThatACameraWasPushedAndHowFar) {
+  capture::write_exr((dir_ / "room.exr").string(), PushedCamera::picture(0));
+  Show show(made_set("grey:24,25,0",
+                     "[[billboard]]\nname = \"guest\"\nsource = \"pushed:\"\nheight = 2\n"
+                     "position = [0, 0, 0]\nkey = { plate = \"room.exr\" }\n"));
+  std::vector<std::int64_t> told;
+  std::string note;
+  show.run([&](const ShownFrame& shown) {
+    for (const std::string& line : shown.prepared.notes) {
+      if (line.find("was moved") == std::string::npos) continue;
+      told.push_back(static_cast<std::int64_t>(shown.prepared.job.frame));
+      note = line;
+    }
+  });
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_GE(told[0], 8);
+  EXPECT_LE(told[0], 17);
+  EXPECT_THAT(note, HasSubstr("guest"));
+  EXPECT_THAT(note, HasSubstr("3.0 px further right"));
 }
 
 TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
