@@ -128,7 +128,6 @@ class PlateLight {
   std::vector<Between> across_;  // of each column of the plate
   int rows_apart_ = 2;           // of those that are looked at
   std::vector<float> gain_row_;
-  std::vector<float> raw_;    // gain of each cell, 0 = not in sight
   std::vector<float> gains_;  // filled and smoothed
   std::vector<float> blurred_;
   GapFiller filler_;

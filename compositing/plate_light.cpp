@@ -134,9 +134,8 @@ PlateLight::PlateLight(CleanPlate plate, PlateUse use)
   tolerance_ = 0.035F + 3 * share;
   spread_ = 0.025F + 1.3F * share;
   lit_ = bare_;
-  raw_.resize(static_cast<std::size_t>(filler_.rows()) *
-              static_cast<std::size_t>(filler_.columns()));
-  gains_.assign(raw_.size(), 1.0F);
+  gains_.assign(
+      static_cast<std::size_t>(filler_.rows()) * static_cast<std::size_t>(filler_.columns()), 1.0F);
   blurred_ = gains_;
   prepare();
 }
@@ -152,7 +151,7 @@ void PlateLight::prepare() {
     ratios_[i + 3] = known ? 1.0F : 0.0F;
   }
   rows_apart_ = bare_.height * bare_.width > 500000 ? 4 : 2;
-  pixels_.resize(raw_.size());
+  pixels_.resize(gains_.size());
   std::size_t i = 0;
   for (int row = 0; row < filler_.rows(); ++row) {
     for (int column = 0; column < filler_.columns(); ++column, ++i) {
@@ -269,7 +268,6 @@ PlateSight PlateLight::measure(const Rows& source) {
       const I8 known = pixels > 0.0F;
       const I8 good = known & (n >= 0.6F * pixels) & (variance <= most_deviation * most_deviation);
       const F8 value = chosen(good, mean), weight = chosen(good, one);
-      std::memcpy(&raw_[at], &value, bytes);
       std::memcpy(filler_.value(row, first), &value, bytes);
       std::memcpy(&filler_.weight(row, first), &weight, bytes);
       screen += chosen(known, one), all_known += most(pixels, zero), seen += weight;
@@ -324,7 +322,7 @@ PlateSight PlateLight::update_from(const Rows& rows, bool follow) {
         sum += filler_.value(row, column)[0];
       }
     }
-    sight.gain = sum / static_cast<float>(raw_.size());
+    sight.gain = sum / static_cast<float>(gains_.size());
     if (follow) light_up();
   }
   if (!follow) std::copy(bare_.cells.begin(), bare_.cells.end(), lit_.cells.begin());
