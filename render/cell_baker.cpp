@@ -198,7 +198,7 @@ void CellBaker::for_each_shader(int count, F&& call) {
 void CellBaker::shade_points(int count, bool grid) {
   if (count == 0) return;
   const Scene& scene = *frame_->inputs.scene;
-  const ShadeContext context{&scene.description(), &scene, scene.pictures()};
+  const ShadeContext context{&scene.description(), &scene, scene.pictures(), scene.prepared()};
   lobes_.clear();
   pushing_ = nullptr;
   for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
@@ -223,7 +223,7 @@ void CellBaker::shade_points(int count, bool grid) {
 void CellBaker::run_background(std::span<ShadePoint* const> leaving) {
   if (leaving.empty()) return;
   const Scene& scene = *frame_->inputs.scene;
-  const ShadeContext context{&scene.description(), &scene, scene.pictures()};
+  const ShadeContext context{&scene.description(), &scene, scene.pictures(), scene.prepared()};
   for (ShadePoint* p : leaving) {
     clear_answer(*p);
     p->hit = {};

@@ -13,6 +13,10 @@ class LivePicture {
   // from the picture's top left: the mean of a square that is footprint_uv squared of the picture's
   // area. Beyond the picture there is nothing; nor is there where numbers are not finite.
   virtual std::array<float, 4> look_up(float u, float v, float footprint_uv) const = 0;
+  // The alpha of look_up(), or of one about as wide where that is quicker to find.
+  virtual float quick_alpha(float u, float v, float footprint_uv) const {
+    return look_up(u, v, footprint_uv)[3];
+  }
   // What no alpha in the rectangle from (u0, v0) to (u1, v1) exceeds, whatever the footprint of a
   // look-up whose square, widened three times, lies in it. 1 where it would take long to say.
   virtual float most_alpha(float u0, float v0, float u1, float v1) const {

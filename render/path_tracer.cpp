@@ -381,8 +381,8 @@ std::optional<Layer> PathTracer::layer_at(const Walk& w, const HitPoint& hit) co
   if (!materials_[hit.material].picture) return std::nullopt;
   const SceneDescription& description = scene_.description();
   return scene_.shader_of(hit.material)
-      .layer({&description, &scene_, scene_.pictures()}, description.materials[hit.material], hit,
-             w.direction, w.kind, 0);
+      .layer({&description, &scene_, scene_.pictures(), scene_.prepared()},
+             description.materials[hit.material], hit, w.direction, w.kind, 0);
 }
 
 // Goes on behind a picture that is not lit. False if there is nothing more to see.

@@ -121,7 +121,8 @@ class SampledLight {
 
   void shade(int count, Workspace& w) const {
     NoRays mirrors;
-    const ShadeContext context{&scene_.description(), &scene_, scene_.pictures()};
+    const ShadeContext context{&scene_.description(), &scene_, scene_.pictures(),
+                               scene_.prepared()};
     std::array<ShadePoint*, stream_rays> group;
     std::fill_n(w.shaded.begin(), count, std::uint8_t{0});
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {

@@ -171,7 +171,7 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
       hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
                 RTCHitN_v(args->hit, n, lane), incoming);
-  const ShadeContext context{&description, nullptr, pictures};
+  const ShadeContext context{&description, nullptr, pictures, prepared};
   return compiled->shaders[hit.material]->transmittance(
       context, description.materials[hit.material], hit, incoming, kind);
 }
@@ -272,6 +272,7 @@ Scene::Scene(SceneDescription description, Pictures pictures) : impl_(std::make_
   impl_->description = std::move(description);
   impl_->compiled = std::move(compiled);
   impl_->assemble();
+  impl_->prepare(nullptr);
 }
 
 Scene::Scene(SceneDescription description, const Scene& before, Pictures pictures)
@@ -290,6 +291,7 @@ Scene::Scene(SceneDescription description, const Scene& before, Pictures picture
   }
   impl_->description = std::move(description);
   impl_->assemble();
+  impl_->prepare(before.impl_.get());
 }
 
 Scene::~Scene() = default;
@@ -354,6 +356,7 @@ Scene::Bounds Scene::blocker_bounds() const { return impl_->blocker_bounds; }
 const std::vector<Scene::Bounds>& Scene::blocker_boxes() const { return impl_->blocker_boxes; }
 std::size_t Scene::skipped_triangles() const { return impl_->compiled->skipped; }
 const Scene::Pictures& Scene::pictures() const { return impl_->pictures; }
+const std::vector<PreparedSurface>& Scene::prepared() const { return impl_->prepared; }
 bool Scene::shows_pictures(std::uint32_t instance) const {
   return !impl_->compiled->pictures_of_mesh[impl_->description.instances[instance].mesh].empty();
 }

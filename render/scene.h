@@ -19,6 +19,7 @@ namespace render {
 
 class BackgroundShader;
 class LivePicture;
+struct PreparedSurface;
 class Shader;
 struct Glass;
 
@@ -145,7 +146,8 @@ class Scene {
   const std::vector<Bounds>& blocker_boxes() const;
   std::size_t skipped_triangles() const;
   const Pictures& pictures() const;
-  bool shows_pictures(std::uint32_t instance) const;  // whether any is live on it
+  const std::vector<PreparedSurface>& prepared() const;  // by Shader::prepare()
+  bool shows_pictures(std::uint32_t instance) const;     // whether any is live on it
   // Where the moving instances of a scene stand, what they show, and what else it is made of.
   struct Places {
     std::uint64_t parts = 0;  // differs between scenes that share nothing

@@ -109,9 +109,12 @@ void Scene::Compiled::build(const SceneDescription& description) {
 void Scene::Compiled::find_pictures(const SceneDescription& description) {
   for (const auto& mesh : description.meshes) {
     std::vector<std::size_t>& shown = pictures_of_mesh.emplace_back();
+    std::vector<std::uint32_t>& by = shown_by_material.emplace_back();
     for (const std::uint32_t material : mesh->materials) {
-      for (const std::size_t picture :
-           shaders[material]->pictures_of(description.materials[material])) {
+      if (std::ranges::find(by, material) != by.end()) continue;
+      const auto pictures = shaders[material]->pictures_of(description.materials[material]);
+      if (!pictures.empty()) by.push_back(material);
+      for (const std::size_t picture : pictures) {
         if (std::ranges::find(shown, picture) == shown.end()) shown.push_back(picture);
       }
     }
@@ -182,6 +185,33 @@ void Scene::Impl::assemble() {
   for (const Bounds& box : blocker_boxes) blocker_bounds = joined(blocker_bounds, box);
   rtcCommitScene(scene);
   is_built(c.device);
+}
+
+// What is as it was in the scene before is prepared already.
+void Scene::Impl::prepare(const Impl* before) {
+  if (before && before->places.parts != places.parts) before = nullptr;
+  std::size_t moving = 0;
+  for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
+    const Instance& instance = description.instances[i];
+    if (!instance.moves) continue;
+    const std::size_t place = moving++;
+    const bool same = before &&
+                      before->places.set_from_object[place] == places.set_from_object[place] &&
+                      before->places.pictures[place] == places.pictures[place];
+    for (const std::uint32_t material : compiled->shown_by_material[instance.mesh]) {
+      PreparedSurface surface{i, material, nullptr};
+      if (same) {
+        const auto known = std::ranges::find_if(before->prepared, [&](const PreparedSurface& s) {
+          return s.instance == i && s.material == material;
+        });
+        if (known != before->prepared.end()) surface.prepared = known->prepared;
+      } else {
+        surface.prepared = compiled->shaders[material]->prepare(description.materials[material],
+                                                                instance.set_from_object, pictures);
+      }
+      if (surface.prepared) prepared.push_back(std::move(surface));
+    }
+  }
 }
 
 void Scene::Compiled::add_parts(const SceneDescription& description,

@@ -49,6 +49,7 @@ struct Scene::Compiled {
   std::vector<std::array<float, 9>> normal_matrices;    // per instance; of what moves, as it began
   std::vector<Bounds> mesh_bounds;                      // of meshes that move, in their own frame
   std::vector<std::vector<std::size_t>> pictures_of_mesh;     // of the scene's, that it shows
+  std::vector<std::vector<std::uint32_t>> shown_by_material;  // per mesh: those that show them
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds;  // of what does not move
   std::vector<Bounds> blocker_boxes;                          // of it
   std::size_t skipped = 0;
@@ -94,6 +95,7 @@ struct Scene::Impl {
   std::vector<std::uint32_t> instance_of_geometry;
   Places places;
   Pictures pictures;
+  std::vector<PreparedSurface> prepared;
   std::vector<std::array<float, 9>> normal_matrices;  // per instance
   std::vector<std::uint8_t> mirrored;                 // per instance: inside out by its matrix
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds, blocker_bounds = no_bounds;
@@ -104,6 +106,7 @@ struct Scene::Impl {
   }
 
   void assemble();
+  void prepare(const Impl* before);
   void add_instance(std::uint32_t instance, RTCScene inner);
 
   const Part& part(unsigned geom_id, unsigned inst_id, std::uint32_t& instance) const {

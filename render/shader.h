@@ -95,10 +95,32 @@ class RaySink {
   virtual void push(const ShadePoint& from, const NewRay& ray) = 0;
 };
 
+// What a shader has found out beforehand about an instance and the pictures on it: what it may ask
+// at every point without finding it again. Immutable, and refers to nothing but pictures.
+class Prepared {
+ public:
+  virtual ~Prepared() = default;
+};
+struct PreparedSurface {
+  std::uint32_t instance = 0, material = 0;
+  std::shared_ptr<const Prepared> prepared;
+};
+
 struct ShadeContext {
   const SceneDescription* scene = nullptr;
   const Scene* compiled = nullptr;  // for shade()
   std::span<const std::shared_ptr<const LivePicture>> pictures = {};
+  std::span<const PreparedSurface> prepared = {};
+
+  // What Shader::prepare() gave for the surface, or null.
+  const Prepared* prepared_for(const HitPoint& hit) const {
+    for (const PreparedSurface& surface : prepared) {
+      if (surface.instance == hit.instance && surface.material == hit.material) {
+        return surface.prepared.get();
+      }
+    }
+    return nullptr;
+  }
 };
 
 // What a picture adds to what is behind it, and the share of that which it lets pass.
@@ -134,6 +156,16 @@ class Shader {
   virtual std::vector<std::size_t> pictures_of(const Material& material) const {
     static_cast<void>(material);
     return {};
+  }
+  // Called when a scene is made, for every instance that shows live pictures by the material,
+  // unless the scene before had it at the same place with the same ones: at most once a frame. All
+  // that pictures_of() names are there.
+  virtual std::shared_ptr<const Prepared> prepare(
+      const Material& material,
+      const std::array<float, 12>& set_from_object,
+      std::span<const std::shared_ptr<const LivePicture>> pictures) const {
+    static_cast<void>(material), static_cast<void>(set_from_object), static_cast<void>(pictures);
+    return nullptr;
   }
   // Of shaders that glow or are matte, and let light pass straight on: what shade() gives, for the
   // reference's paths. `incoming`: unit, direction of the ray, which is of that kind;
