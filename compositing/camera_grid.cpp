@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -11,16 +10,6 @@ namespace compositing {
 namespace {
 
 using calibrate::Vec3f;
-
-GridPlace grid_at(const CameraGrid& camera,
-                  std::span<const std::byte> places,
-                  std::uint32_t row,
-                  std::uint32_t column) {
-  GridPlace place;
-  const std::size_t index = std::size_t{row} * camera.columns + column;
-  std::memcpy(&place, places.data() + index * sizeof place, sizeof place);
-  return place;
-}
 
 // x/z and y/z of what the picture's rim and inside show.
 struct Window {
@@ -121,21 +110,10 @@ std::optional<LookUp> seen_by_camera(const CameraGrid& c,
   if (!(z > 1e-4F)) return std::nullopt;
   const float gx = (p_cam.x / z - c.first[0]) * c.steps_a_unit[0];
   const float gy = (p_cam.y / z - c.first[1]) * c.steps_a_unit[1];
-  const auto last_x = static_cast<float>(c.columns - 1), last_y = static_cast<float>(c.rows - 1);
-  if (!(gx >= 0 && gx <= last_x && gy >= 0 && gy <= last_y)) return std::nullopt;
-  const std::uint32_t column = std::min(static_cast<std::uint32_t>(gx), c.columns - 2);
-  const std::uint32_t row = std::min(static_cast<std::uint32_t>(gy), c.rows - 2);
-  const float fx = gx - static_cast<float>(column), fy = gy - static_cast<float>(row);
-  const GridPlace p00 = grid_at(c, places, row, column), p01 = grid_at(c, places, row, column + 1);
-  const GridPlace p10 = grid_at(c, places, row + 1, column);
-  const GridPlace p11 = grid_at(c, places, row + 1, column + 1);
-  const auto mixed = [&](float a, float b, float d, float e) {
-    return (a * (1 - fx) + b * fx) * (1 - fy) + (d * (1 - fx) + e * fx) * fy;
-  };
-  const GridPlace place{mixed(p00.u, p01.u, p10.u, p11.u), mixed(p00.v, p01.v, p10.v, p11.v)};
+  const auto place = place_in_grid(c, places, gx, gy);
   // Where the lens does not see, the grid holds no numbers.
-  if (!(std::isfinite(place.u) && std::isfinite(place.v))) return std::nullopt;
-  return LookUp{place, c.uv_per_tangent / z};
+  if (!place || !std::isfinite(place->u) || !std::isfinite(place->v)) return std::nullopt;
+  return LookUp{*place, c.uv_per_tangent / z};
 }
 
 }  // namespace compositing

@@ -1,9 +1,11 @@
 // A calibrated camera inside a material: its lens as a grid of places, which travels as bytes.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 #include <span>
 #include <vector>
@@ -57,6 +59,28 @@ struct LookUp {
 
 calibrate::Vec3f in_camera(const CameraGrid& camera, calibrate::Vec3f p_set);
 calibrate::Vec3f turned_to_camera(const CameraGrid& camera, calibrate::Vec3f v_set);
+
+// The place at `gx`, `gy` steps from the grid's first; nothing beyond it, and no numbers where the
+// lens does not see.
+inline std::optional<GridPlace> place_in_grid(const CameraGrid& c,
+                                              std::span<const std::byte> places,
+                                              float gx,
+                                              float gy) {
+  const auto last_x = static_cast<float>(c.columns - 1), last_y = static_cast<float>(c.rows - 1);
+  if (!(gx >= 0 && gx <= last_x && gy >= 0 && gy <= last_y)) return std::nullopt;
+  const std::uint32_t column = std::min(static_cast<std::uint32_t>(gx), c.columns - 2);
+  const std::uint32_t row = std::min(static_cast<std::uint32_t>(gy), c.rows - 2);
+  const float fx = gx - static_cast<float>(column), fy = gy - static_cast<float>(row);
+  std::array<GridPlace, 2> upper, lower;
+  const std::size_t index = std::size_t{row} * c.columns + column;
+  std::memcpy(&upper, places.data() + index * sizeof(GridPlace), sizeof upper);
+  std::memcpy(&lower, places.data() + (index + c.columns) * sizeof(GridPlace), sizeof lower);
+  const auto mixed = [&](float a, float b, float d, float e) {
+    return (a * (1 - fx) + b * fx) * (1 - fy) + (d * (1 - fx) + e * fx) * fy;
+  };
+  return GridPlace{mixed(upper[0].u, upper[1].u, lower[0].u, lower[1].u),
+                   mixed(upper[0].v, upper[1].v, lower[0].v, lower[1].v)};
+}
 
 // Through the camera's lens; nothing where it does not see. `places` begins with the grid's.
 std::optional<LookUp> seen_by_camera(const CameraGrid& camera,

@@ -2,6 +2,7 @@
 #include "compositing/keyed_picture.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <span>
 #include <stdexcept>
@@ -71,6 +72,9 @@ std::array<float, 4> filtered(const render::VideoTexture& texture,
 KeyedPicture::KeyedPicture(std::shared_ptr<const render::VideoTexture> texture, bool bounded)
     : texture_(std::move(texture)) {
   check_frame(texture_);
+  side_texels_ =
+      std::sqrt(static_cast<float>(texture_->width()) * static_cast<float>(texture_->height()));
+  aspect_ = aspect_of(*texture_);
   if (!bounded) return;
   const capture::Image& image = texture_->levels.front();
   Bounds level{image.width, image.height, {}};
@@ -107,7 +111,8 @@ float KeyedPicture::most_alpha(float u0, float v0, float u1, float v1) const {
   const int width = bounds_[0].width, height = bounds_[0].height;
   const int x0 = texel(u0, width, -1), x1 = texel(u1, width, 1);
   const int y0 = texel(v0, height, -1), y1 = texel(v1, height, 1);
-  std::size_t k = 0;
+  const auto longest = static_cast<unsigned>(std::max(x1 - x0, y1 - y0));
+  std::size_t k = longest > 1 ? static_cast<std::size_t>(std::bit_width(longest)) - 1 : 0;
   while ((x1 >> k) - (x0 >> k) > 1 || (y1 >> k) - (y0 >> k) > 1) ++k;
   const Bounds& level = bounds_[k];
   std::uint8_t most = 0;
@@ -119,8 +124,33 @@ float KeyedPicture::most_alpha(float u0, float v0, float u1, float v1) const {
   return static_cast<float>(most) / 255;
 }
 
+float KeyedPicture::quick_alpha(float u, float v, float footprint_uv) const {
+  const float edge = 2 * footprint_uv;
+  const bool whole = u >= edge && u <= 1 - edge && v >= edge && v <= 1 - edge;
+  const float inside = whole && edge >= 0 ? 1 : share_inside(u, v, footprint_uv, aspect_);
+  if (!(inside > 0)) return 0;
+  // The level whose texels are half to all of the width.
+  const float texels = std::min(footprint_uv * side_texels_, 1e6F);
+  std::size_t k = 0;
+  if (texels >= 2) k = static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(texels))) - 1;
+  const capture::Image& level = texture_->levels[std::min(k, texture_->levels.size() - 1)];
+  if (level.channels != 4) return inside;
+  const auto last_x = static_cast<float>(level.width - 1);
+  const auto last_y = static_cast<float>(level.height - 1);
+  const float x = std::clamp(u * static_cast<float>(level.width) - 0.5F, 0.0F, last_x);
+  const float y = std::clamp(v * static_cast<float>(level.height) - 0.5F, 0.0F, last_y);
+  const auto x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const std::size_t right = x0 + 1 < level.width ? 4 : 0;
+  const float* upper = &level.pixels[level.index(y0, x0)] + 3;
+  const float* lower = &level.pixels[level.index(std::min(y0 + 1, level.height - 1), x0)] + 3;
+  const float above = upper[0] + fx * (upper[right] - upper[0]);
+  const float below = lower[0] + fx * (lower[right] - lower[0]);
+  return std::clamp((above + fy * (below - above)) * inside, 0.0F, 1.0F);
+}
+
 std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv) const {
-  const float inside = share_inside(u, v, footprint_uv, aspect_of(*texture_));
+  const float inside = share_inside(u, v, footprint_uv, aspect_);
   if (!(inside > 0)) return {};
   std::array<float, 4> rgba = filtered(*texture_, u, v, footprint_uv);
   for (float& value : rgba) value = std::max(value * inside, 0.0F);

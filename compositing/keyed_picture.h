@@ -20,6 +20,8 @@ class KeyedPicture final : public render::LivePicture {
   explicit KeyedPicture(std::shared_ptr<const render::VideoTexture> texture, bool bounded = false);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
+  // Bilinear in one level.
+  float quick_alpha(float u, float v, float footprint_uv) const override;
   float most_alpha(float u0, float v0, float u1, float v1) const override;
 
  private:
@@ -31,6 +33,8 @@ class KeyedPicture final : public render::LivePicture {
 
   std::shared_ptr<const render::VideoTexture> texture_;
   std::vector<Bounds> bounds_;  // by k
+  float side_texels_ = 0;       // of a square of as many texels
+  float aspect_ = 0;            // height over width
 };
 
 // The same of a frame that is not keyed yet: filtered first, then keyed once. For persons that few

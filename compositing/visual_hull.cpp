@@ -52,8 +52,11 @@ const char* fault_of(const HullBlock& block) {
   throw std::invalid_argument("hull \"" + name + "\": " + reason);
 }
 
-HullMarch march_of(const ShadeContext& context, const Material& material, const HullBlock& block) {
-  return {block, std::span(material.parameters).subspan(sizeof block), context.pictures};
+// Cells are there of whatever shows pictures (render::Scene).
+HullMarch march_of(const ShadeContext& context, const HitPoint& hit) {
+  const Material& material = context.scene->materials[hit.material];
+  return {*static_cast<const HullCells*>(context.prepared_for(hit)),
+          std::span(material.parameters).subspan(sizeof(HullBlock)), context.pictures};
 }
 
 // How far it is from a place in the box or on its rim, along a unit direction, to where it ends.
@@ -112,7 +115,7 @@ float clearness(const Box& box, std::size_t view, Vec3f place, float width_m) {
   if (!(distance > clear_m)) return 1;
   const Vec3f direction = to_camera * (1 / distance);
   const float far_m = std::min(way_in_box(box.set_from_object, place, direction), distance);
-  return 1 - box.march.find({place, direction, width_m, 0}, clear_m, far_m, 2).alpha;
+  return 1 - box.march.opacity({place, direction, width_m, 0}, clear_m, far_m, 2);
 }
 
 // Colour at a place, times `alpha`: the cameras' foregrounds without their own alpha.
@@ -148,9 +151,8 @@ Vec3f light_at(const Box& box, Vec3f place, Vec3f direction, float width_m, floa
 }
 
 Seen seen_by(const ShadeContext& context, const HitPoint& hit, const HullRay& ray, RayKind kind) {
-  const Material& material = context.scene->materials[hit.material];
-  const HullBlock block = block_of(material);
-  const HullMarch march = march_of(context, material, block);
+  const HullMarch march = march_of(context, hit);
+  const HullBlock& block = march.block();
   const auto& set_from_object = context.scene->instances[hit.instance].set_from_object;
   HullMarch::Crossing crossing =
       march.find(ray, 0, way_in_box(set_from_object, ray.origin, ray.direction));
@@ -178,6 +180,7 @@ class HullShader final : public render::Shader {
       if (const char* fault = compositing::fault_of(view.camera)) refuse(name, fault);
       if (view.camera.columns == 0 || !render::is_finite(view.position) ||
           !(view.px_per_tangent > 0 && std::isfinite(view.px_per_tangent)) ||
+          !(view.root_aspect > 0 && std::isfinite(1 / view.root_aspect)) ||
           !(view.camera.uv_per_tangent > 0)) {
         refuse(name, "its camera is not finite");
       }
@@ -219,6 +222,15 @@ class HullShader final : public render::Shader {
     return pictures;
   }
 
+  std::shared_ptr<const render::Prepared> prepare(
+      const Material& material,
+      const std::array<float, 12>& set_from_object,
+      std::span<const std::shared_ptr<const render::LivePicture>> pictures) const override {
+    return std::make_shared<HullCells>(block_of(material),
+                                       std::span(material.parameters).subspan(sizeof(HullBlock)),
+                                       set_from_object, pictures);
+  }
+
   std::optional<Layer> layer(const ShadeContext& context,
                              const Material&,
                              const HitPoint& hit,
@@ -231,19 +243,18 @@ class HullShader final : public render::Shader {
 
   // The box is seen where rays enter it, and where they leave it is a hole.
   Vec3f transmittance(const ShadeContext& context,
-                      const Material& material,
+                      const Material&,
                       const HitPoint& hit,
                       Vec3f incoming,
                       RayKind kind) const override {
     if (hit.back) return grey(1);
     if (kind != RayKind::shadow) return {};
-    const HullBlock block = block_of(material);
     const auto& set_from_object = context.scene->instances[hit.instance].set_from_object;
     const float scale = length(incoming);
     if (!(scale > 0)) return grey(1);
     const HullRay ray{hit.position, incoming * (1 / scale)};
     const float far_m = way_in_box(set_from_object, ray.origin, ray.direction);
-    return grey(1 - march_of(context, material, block).find(ray, 0, far_m).alpha);
+    return grey(1 - march_of(context, hit).opacity(ray, 0, far_m));
   }
 };
 
@@ -271,6 +282,7 @@ Material make_hull_material(std::string name,
     view.camera = grid.camera;
     view.px_per_tangent = grid.camera.uv_per_tangent * std::sqrt(static_cast<float>(lens.width) *
                                                                  static_cast<float>(lens.height));
+    view.root_aspect = std::sqrt(static_cast<float>(lens.height) / static_cast<float>(lens.width));
     view.position = calibrate::to_float(calibrate::position_of(views[i].camera.cam_from_set));
     places.insert(places.end(), grid.places.begin(), grid.places.end());
   }

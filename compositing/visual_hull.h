@@ -21,7 +21,8 @@ struct HullSettings {
 };
 
 // A live picture (render::Scene::pictures) and the camera that it is of. Those that know bounds of
-// their alpha (KeyedPicture, `bounded`) are several times as quick.
+// their alpha (KeyedPicture, `bounded`) are many times as quick: what is empty is found once a
+// frame, when the scene is made (HullCells); nobody has to ask for it.
 struct HullView {
   std::uint32_t picture = 0;
   BillboardCamera camera;
