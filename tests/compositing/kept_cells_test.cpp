@@ -104,8 +104,8 @@ TEST(LitCells, AreColdAndWarmTheSameAfterRandomEdits) {
         room.show(made_video(90, 160, frame));
         break;
       case 4:
-        room.directions.sensitivity.assign(96 * 72, 1.0F);
-        room.directions.sensitivity[below(96 * 72)] = 0.5F;
+        room.directions.sensitivity.assign(room.directions.z.size(), 1.0F);
+        room.directions.sensitivity[below(room.directions.z.size())] = 0.5F;
         break;
       case 5: {
         auto& level = room.environment.smoothed.back().pixels;
