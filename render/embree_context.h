@@ -12,6 +12,7 @@ struct TraceContext {
   RTCIntersectContext context;
   const Scene* scene;
   RayKind kind = RayKind::camera;
+  bool past_pictures = false;  // surfaces that show live pictures are not there
   // Shadow rays: per ray id, share of light so far. Null: any surface that is not a hole blocks.
   float* transmittance_r = nullptr;
   float* transmittance_g = nullptr;

@@ -29,12 +29,13 @@ struct Effort {
   int light_samples = 64;  // lights in the table
   int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
-  bool cull_lights = true;          // skip shadow rays that no object can block
-  float accuracy = 0.97F;  // rays whose share of the pixel falls below 1 - accuracy are cut
-  bool dark_cuts = false;  // cut rays see nothing, instead of the environment: for charts
-  int max_depth = 64;      // safety net; counted when hit
-  int max_rays = 65536;    // that surfaces send on for a pixel; another safety net
-  int tile_size = 32;      // pixels, a multiple of 16
+  int bounce_lamps = 0;     // stand for light between dull surfaces (BouncedLight); 0 = none is
+  bool cull_lights = true;  // skip shadow rays that no object can block
+  float accuracy = 0.97F;   // rays whose share of the pixel falls below 1 - accuracy are cut
+  bool dark_cuts = false;   // cut rays see nothing, instead of the environment: for charts
+  int max_depth = 64;       // safety net; counted when hit
+  int max_rays = 65536;     // that surfaces send on for a pixel; another safety net
+  int tile_size = 32;       // pixels, a multiple of 16
   friend bool operator==(const Effort&, const Effort&) = default;
 };
 

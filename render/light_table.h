@@ -37,6 +37,9 @@ struct LocalLight {
   // Of the glowing surface: where lobes are rough enough to mirror its lamps, they do not meet the
   // surface itself as well. no_instance: lobes do not mirror the lamp.
   std::uint32_t instance = no_instance, material = 0;
+  // 1 = it stands for what a surface sends back of other light (BouncedLight): a reference leaves
+  // it out, and follows light between surfaces instead.
+  std::uint32_t bounced = 0;
   friend bool operator==(const LocalLight&, const LocalLight&) = default;
 };
 

@@ -321,16 +321,20 @@ capture::Image render_reference(const FrameInputs& inputs,
   const DirectionTable& directions = *inputs.directions;
   if (plate.width != directions.width || plate.height != directions.height || plate.channels != 3)
     throw std::invalid_argument("the plate must have three channels and the lens's size");
+  // Lamps of bounced light stand for what paths between surfaces find.
+  std::vector<LocalLight> lamps = job.lights.lamps;
+  const bool bounced = std::erase_if(lamps, [](const LocalLight& l) { return l.bounced != 0; }) > 0;
+  const bool bounces = settings.bounces || bounced;
   PathRules rules;
   rules.max_depth = settings.max_depth;
-  if (settings.bounces) {
+  if (bounces) {
     rules.diffuse_bounces = true;
     rules.scattered_mask = rules.lobe_blockers = mask_virtual | mask_real_blocker;
   }
   const EnvironmentSampler environment(*inputs.environment);
-  const PathTracer tracer(*inputs.scene, environment, job.lights.lamps, rules, inputs.videos);
+  const PathTracer tracer(*inputs.scene, environment, lamps, rules, inputs.videos);
   const Plate behind_glass(plate, inputs.lens, job.cam_from_set);
-  const Composite composite(tracer, settings.bounces, behind_glass);
+  const Composite composite(tracer, bounces, behind_glass);
   const PixelRays rays(directions, job.cam_from_set);
   const auto pixel_of = [&](int x, int y, std::uint32_t index, std::uint32_t seed, int first,
                             int count) {

@@ -13,7 +13,8 @@ struct ReferenceSettings {
   int max_depth = 128;  // then Russian roulette has long ended them, but for those in glass
   std::uint32_t seed = 1;
   // Bounces of light between surfaces. Off: virtual objects see the environment, and each other
-  // only by mirror and glass, as the live kernel does. On: everything (the photograph).
+  // only by mirror and glass, as the live kernel does. On: everything (the photograph). A job with
+  // lamps of bounced light has them on, and those lamps left out.
   bool bounces = false;
 };
 

@@ -208,12 +208,21 @@ bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned 
   return description.instances[met].kind == ObjectKind::virtual_object;
 }
 
+// Whether the ray is one for which the live picture that it meets is not there.
+bool Scene::Impl::is_past_picture(const RTCFilterFunctionNArguments* args) const {
+  const auto& context = *reinterpret_cast<const TraceContext*>(args->context);
+  const auto& met = *static_cast<const Part*>(args->geometryUserPtr);
+  return context.past_pictures && !compiled->pictures_of_mesh[met.mesh].empty();
+}
+
 void Scene::Impl::filter_closest(const RTCFilterFunctionNArguments* args) {
   const Impl& impl = of(args);
   const auto& context = *reinterpret_cast<const TraceContext*>(args->context);
+  const bool past_picture = impl.is_past_picture(args);
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
-    if (impl.passes(args, i, context.kind) == Vec3f{1, 1, 1} || impl.stands_back(args, i)) {
+    if (past_picture || impl.passes(args, i, context.kind) == Vec3f{1, 1, 1} ||
+        impl.stands_back(args, i)) {
       args->valid[i] = 0;
     }
   }
@@ -224,8 +233,13 @@ void Scene::Impl::filter_any(const RTCFilterFunctionNArguments* args) {
   const auto& part = *static_cast<const Part*>(args->geometryUserPtr);
   const auto& context = *reinterpret_cast<const TraceContext*>(args->context);
   const Mesh& mesh = *impl.description.meshes[part.mesh];
+  const bool past_picture = impl.is_past_picture(args);
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
+    if (past_picture) {
+      args->valid[i] = 0;
+      continue;
+    }
     const std::uint32_t prim = RTCHitN_primID(args->hit, args->N, i);
     const std::uint32_t t = part.triangle_of_prim.empty() ? prim : part.triangle_of_prim[prim];
     const auto& anywhere = impl.compiled->shadow[material_of(mesh, t)];

@@ -133,6 +133,7 @@ struct Scene::Impl {
   };
   FilteredRay ray_of(const RTCFilterFunctionNArguments* args, unsigned lane) const;
   Vec3f passes(const RTCFilterFunctionNArguments* args, unsigned lane, RayKind kind) const;
+  bool is_past_picture(const RTCFilterFunctionNArguments* args) const;
   bool stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const;
 };
 

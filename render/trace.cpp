@@ -16,9 +16,15 @@ void prepare_thread() {
   _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
 }
 
-std::optional<TracedHit> closest_hit(
-    const Scene& scene, Vec3f origin, Vec3f direction, float near_m, unsigned mask, RayKind kind) {
+std::optional<TracedHit> closest_hit(const Scene& scene,
+                                     Vec3f origin,
+                                     Vec3f direction,
+                                     float near_m,
+                                     unsigned mask,
+                                     RayKind kind,
+                                     LivePictures pictures) {
   TraceContext context(scene, kind, false);
+  context.past_pictures = pictures == LivePictures::passed;
   RTCRayHit ray{};
   ray.ray = {.org_x = origin.x,
              .org_y = origin.y,
@@ -40,9 +46,15 @@ std::optional<TracedHit> closest_hit(
                    ray.hit.instID[0], ray.hit.u,      ray.hit.v};
 }
 
-Vec3f transmittance(
-    const Scene& scene, Vec3f origin, Vec3f direction, float near_m, float far_m, unsigned mask) {
+Vec3f transmittance(const Scene& scene,
+                    Vec3f origin,
+                    Vec3f direction,
+                    float near_m,
+                    float far_m,
+                    unsigned mask,
+                    LivePictures pictures) {
   TraceContext context(scene, RayKind::shadow, false);
+  context.past_pictures = pictures == LivePictures::passed;
   Vec3f share{1, 1, 1};
   context.transmittance_r = &share.x;
   context.transmittance_g = &share.y;

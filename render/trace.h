@@ -20,13 +20,26 @@ struct TracedHit {
   float u = 0, v = 0;
 };
 
+// Whether rays meet surfaces that show live pictures.
+enum class LivePictures : std::uint8_t { met, passed };
+
 // The nearest hit beyond `near_m`, holes passed.
-std::optional<TracedHit> closest_hit(
-    const Scene& scene, Vec3f origin, Vec3f direction, float near_m, unsigned mask, RayKind kind);
+std::optional<TracedHit> closest_hit(const Scene& scene,
+                                     Vec3f origin,
+                                     Vec3f direction,
+                                     float near_m,
+                                     unsigned mask,
+                                     RayKind kind,
+                                     LivePictures pictures = LivePictures::met);
 
 // RGB share of light that passes from origin to far_m along direction: 0 = blocked.
-Vec3f transmittance(
-    const Scene& scene, Vec3f origin, Vec3f direction, float near_m, float far_m, unsigned mask);
+Vec3f transmittance(const Scene& scene,
+                    Vec3f origin,
+                    Vec3f direction,
+                    float near_m,
+                    float far_m,
+                    unsigned mask,
+                    LivePictures pictures = LivePictures::met);
 
 // A start point moved off the surface, against hitting it again: scaled to the size of coordinates,
 // the point's and its triangle's.

@@ -16,6 +16,7 @@ Json effort_json(const render::Effort& effort) {
           {"glint_contrast", effort.glint_contrast},
           {"light_samples", effort.light_samples},
           {"interleave", effort.interleave},
+          {"bounce_lamps", effort.bounce_lamps},
           {"adaptive_visibility", effort.adaptive_visibility},
           {"cull_lights", effort.cull_lights},
           {"accuracy", effort.accuracy},

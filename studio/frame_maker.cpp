@@ -251,6 +251,8 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     job.lights.lamps.insert(job.lights.lamps.end(), lamps_.begin(), lamps_.end());
     const auto shining = videos_->lamps(videos);
     job.lights.lamps.insert(job.lights.lamps.end(), shining.begin(), shining.end());
+    const auto bounced = bounces_.follow(*scene_, job.lights, {.lamps = job.effort.bounce_lamps});
+    job.lights.lamps.insert(job.lights.lamps.end(), bounced.begin(), bounced.end());
     for (VideoFrame& video : videos) {
       job.textures.push_back({static_cast<std::uint32_t>(job.textures.size()), video.time});
       prepared.video_frames.push_back(video.texture.get());

@@ -13,6 +13,7 @@
 #include "calibrate/lens.h"
 #include "calibrate/track.h"
 #include "capture/image.h"
+#include "render/bounced_light.h"
 #include "render/renderer.h"
 #include "studio/light_feed.h"
 #include "studio/person_feed.h"
@@ -140,6 +141,7 @@ class FrameMaker {
   std::shared_ptr<const calibrate::DirectionTable> directions_;
   std::shared_ptr<const calibrate::Lens> lens_;
   std::vector<render::LocalLight> lamps_;
+  render::BounceFollower bounces_;
   std::uint64_t scene_version_ = 0;
   std::future<Change> change_;               // on its way
   std::vector<std::string> notes_;           // for the next frame

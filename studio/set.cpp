@@ -130,6 +130,7 @@ render::Effort read_effort_section(Section section) {
   section.integer("light_samples", effort.light_samples, 1, 4096);
   section.integer("interleave", effort.interleave, 1, 4);
   if (effort.interleave == 3) section.fault("interleave", "must be 1, 2 or 4");
+  section.integer("bounce_lamps", effort.bounce_lamps, 0, 1024);
   section.boolean("adaptive_visibility", effort.adaptive_visibility);
   section.boolean("cull_lights", effort.cull_lights);
   section.number("accuracy", effort.accuracy, {0, 1});

@@ -18,13 +18,14 @@ FrameJob made_job() {
   job.lens = 3;
   job.scene_version = 17;
   job.effort.interleave = 4;
+  job.effort.bounce_lamps = 12;
   job.effort.adaptive_visibility = false;
   job.effort.aa_tolerance = 0.25F;
   job.effort.glint_contrast = 0.75F;
   job.textures = {{0, capture::Time(1)}, {1, capture::Time(2)}};
   job.lights.lights = {{{0, 0, 1}, {1, 2, 3}, 0.1F}, {{1, 0, 0}, {4, 5, 6}, 0.2F}};
   job.lights.lights[1].compact = 1;
-  job.lights.lamps = {{{1, 2, 3}, {0, 0, -1}, {7, 8, 9}, {1, 1, 2}, 0.25F, 1}};
+  job.lights.lamps = {{{1, 2, 3}, {0, 0, -1}, {7, 8, 9}, {1, 1, 2}, 0.25F, 1, 4, 5, 1}};
   job.lights.version = 5;
   job.match = {1.5F, 0.1F, -0.2F, 0.3F, 1, -0.1F, 0.05F, 0.15F, 0.5F};
   return job;
