@@ -185,13 +185,14 @@ KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
   return report(sight, key_rows(rows, scratch_.bare_codes, keyed));
 }
 
-// One frame may be shaken; a camera that was pushed stays where it is.
+// One frame may be shaken; a camera that was pushed stays where it is, also while nothing tells.
 template <class Rows>
 void Keyer::watch(const Rows& rows) {
   if (until_look_-- > 0) return;
   until_look_ = frames_between_looks;
-  shift_ = watch_.look(rows);
-  if (!shift_.known) return;
+  const PlateShift seen = watch_.look(rows);
+  if (!seen.known) return;
+  shift_ = seen;
   const bool off = shift_.size_px() > shift_still_px + 4 * shift_.sigma_px;
   looks_moved_ = off ? looks_moved_ + 1 : 0;
 }

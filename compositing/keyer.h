@@ -55,7 +55,7 @@ struct KeyReport {
   float confidence = 1;                // 0..1; falls before the picture breaks
   KeyStatus status = KeyStatus::good;  // what lowers it most
   PlateSight sight;
-  PlateShift shift;    // against the plate, as it was seen last: in one of every four frames
+  PlateShift shift;    // against the plate, as it was known last: looked for in every fourth frame
   bool moved = false;  // the camera, by more than one look
   float soft = 0;      // share of pixels that are neither screen nor person
 };

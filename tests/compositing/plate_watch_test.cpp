@@ -151,5 +151,27 @@ TEST(PlateWatch, MakesTheKeySayThatTheCameraWasMovedWithinTenFramesAndTakeItBack
   EXPECT_NE(run(0, 0, 8).status, KeyStatus::moved);
 }
 
+// A crowd that hides what is followed does not put the camera back.
+TEST(PlateWatch, MakesTheKeyNoSurerOfAMovedCameraWhenACrowdHidesIt) {
+  Keyer keyer(plate_of_room(), {});
+  capture::HalfImage keyed;
+  std::uint64_t seed = 700;
+  const Image pushed = room(4, 2);
+  KeyReport seen;
+  for (int i = 0; i < 10; ++i) seen = keyer.key(filmed(pushed, ++seed), keyed);
+  ASSERT_TRUE(seen.moved);
+  Image crowd = pushed;
+  for (const float x : {30.0F, 130.0F, 350.0F, 450.0F}) put_person(crowd, x);
+  for (int y = 0; y < 60; ++y) {
+    for (int x = 0; x < width; ++x)
+      crowd.at(y, x, 0) = static_cast<float>((x * 7 + y * 13) % 19) / 19;
+  }
+  KeyReport hidden;
+  for (int i = 0; i < 4; ++i) hidden = keyer.key(filmed(crowd, ++seed), keyed);
+  EXPECT_TRUE(hidden.moved);
+  EXPECT_LE(hidden.confidence, seen.confidence + 1e-3F) << name_of(hidden.status);
+  EXPECT_NEAR(hidden.shift.right_px, 4, 0.3);
+}
+
 }  // namespace
 }  // namespace compositing
