@@ -368,6 +368,7 @@ bool CellWalk::next(Piece& piece) {
     }
     float leaves = to_m_;
     for (std::size_t a = 0; a < 3; ++a) {
+      if (way_[a] == 0) continue;
       const unsigned corner = ((cell[a] >> shift) + (way_[a] > 0 ? 1U : 0U)) << shift;
       const float at = (static_cast<float>(corner) - begin_[a]) * metres_[a];
       leaves = at < leaves ? at : leaves;  // nor where it is no number

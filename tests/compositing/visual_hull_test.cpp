@@ -252,6 +252,29 @@ TEST(HullMarch, FindsWhatSamplingEverywhereFindsThroughBentLenses) {
   expect_what_sampling_finds(person, 0.25F, 0);
 }
 
+// Rays down the box's axes, as of a sun overhead, meet no more cells than there are.
+TEST(CellWalk, TakesNoMorePiecesAlongAnAxisThanThereAreCells) {
+  const Filmed person = filmed({0, 60, 120}, walker_from);
+  const render::Material material = make_hull_material("person", {}, person.views);
+  HullBlock block;
+  std::memcpy(&block, material.parameters.data(), sizeof block);
+  const HullCells cells(block, std::span(material.parameters).subspan(sizeof block),
+                        placed_box(lower, upper), person.pictures);
+  for (const float width_m : {0.0F, 0.04F, 0.15F}) {
+    for (const Vec3f direction : {Vec3f{1, 0, 0}, Vec3f{0, -1, 0}, Vec3f{0, 0, 1}, Vec3f{0, 0, -1},
+                                  normalize(Vec3f{0, 0.6F, 0.8F})}) {
+      const Vec3f middle{0.02F, 0.03F, 0.91F};
+      const float half_m = 0.75F;
+      CellWalk walk(cells, middle - direction * half_m, direction, 0, 2 * half_m, width_m);
+      CellWalk::Piece piece;
+      int pieces = 0;
+      while (walk.next(piece)) ++pieces;
+      EXPECT_LE(pieces, 64) << width_m << " along " << direction.x << ' ' << direction.y << ' '
+                            << direction.z;
+    }
+  }
+}
+
 TEST(Hull, IsAsSoftAsItsPictures) {
   const auto soft = even_picture({0.1F, 0.2F, 0.3F, 0.4F});
   Filmed person = filmed({0, 60}, [&](const BillboardCamera& c) {
