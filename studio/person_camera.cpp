@@ -22,10 +22,16 @@ using compositing::Feet;
 constexpr int matte_side = 640;
 constexpr capture::Rational rate_of_unknown{25, 1};
 
-compositing::KeyMasks masks_of(const KeyChoice& key) {
+// For videos of that size.
+compositing::KeyMasks masks_of(const KeyChoice& key, int width, int height) {
   compositing::KeyMasks masks;
   if (key.garbage.empty()) return masks;
   const capture::Image mask = read_picture(key.garbage, capture::Transfer::linear);
+  if (mask.width != width || mask.height != height) {
+    throw std::invalid_argument(
+        fmt::format("the garbage mask {} is {}x{}, but the video is {}x{}: draw it in that size",
+                    key.garbage, mask.width, mask.height, width, height));
+  }
   for (int y = 0; y < mask.height; ++y) {
     for (int x = 0; x < mask.width; ++x) {
       masks.garbage.push_back(
@@ -100,7 +106,7 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
           fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", s.key->plate,
                       plate.light.width, plate.light.height, s.source, info.width, info.height));
     }
-    keyer_.emplace(std::move(plate), s.key->settings, masks_of(*s.key));
+    keyer_.emplace(std::move(plate), s.key->settings, masks_of(*s.key, info.width, info.height));
     by_texel_ = s.key->by_texel && !options.needs_matte;
   } catch (const std::exception& error) {
     faults.add(s.key->place, error.what());

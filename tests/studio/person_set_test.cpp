@@ -350,6 +350,9 @@ TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
   expect_refusal("feet = \"auto\"", "feet = \"auto\"\nheight = 2", "told by the camera's lens");
   expect_refusal("plate.exr", "missing.exr", "missing.exr");
   expect_refusal("key = {", "key = { core = 0.2, screen = 0.4, ", "must be more than screen");
+  // As many pixels, but turned.
+  capture::write_exr((dir_ / "turned.exr").string(), capture::make_image(480, 360));
+  expect_refusal("key = {", "key = { garbage = \"turned.exr\", ", "turned.exr is 360x480");
   write_plate(64, 48);
   expect_refusal("walker\"", "walker\"", "64x48");
   expect_refusal("walker\"", "walker\"", "480x360");
