@@ -39,6 +39,8 @@ class PersonCameraFeed {
 
   // Goes on to the newest frame at the show's time, and keys nothing yet.
   void advance(capture::Time time);
+  // Whether any frame has come with a picture.
+  bool has_picture() const { return image_ != nullptr; }
   // Of the newest frame.
   capture::Time time() const { return time_; }
   // How old its picture is at the time that was asked for last, and how long a frame lasts.

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
-#include <ranges>
 #include <string_view>
 #include <utility>
 
@@ -163,10 +162,14 @@ void PersonFeed::update(Person& person, capture::Time time) {
     }
   }
   if (person.tracker || !person.has_several()) show(person, 0);
-  const auto age_of = [](const Person::Camera& camera) { return camera.feed.age(); };
-  const capture::Time youngest = std::ranges::min(std::views::transform(person.cameras, age_of));
+  // What has given no picture yet has no age.
+  capture::Time youngest = capture::Time::max();
+  for (const Person::Camera& camera : person.cameras) {
+    if (camera.feed.has_picture()) youngest = std::min(youngest, camera.feed.age());
+  }
   for (Person::Camera& camera : person.cameras) {
-    camera.late = camera.feed.age() > youngest + camera.feed.period() * 3 / 2;
+    const PersonCameraFeed& feed = camera.feed;
+    camera.late = !feed.has_picture() || feed.age() > youngest + feed.period() * 3 / 2;
   }
 }
 

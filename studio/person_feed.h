@@ -43,8 +43,8 @@ struct PersonFrame {
 };
 
 // One thread uses it. A source that ends or stalls holds its last picture. Of a person with several
-// cameras, those whose picture is late by more than a frame and a half, or that see nobody, are
-// left out until they have been well for half a second.
+// cameras, those whose picture is late by more than a frame and a half or has never come, or that
+// see nobody, are left out until they have been well for half a second.
 class PersonFeed {
  public:
   // Opens the sources, reads plates and masks. Files begin at `start` of the show's time, or at the

@@ -4,11 +4,16 @@
 
 #include <cmath>
 #include <fstream>
+#include <memory>
 #include <numbers>
+#include <optional>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "calibrate/track.h"
+#include "capture/camera.h"
 #include "compositing/made_walker_camera.h"
 #include "compositing/person_shape.h"
 #include "studio/charts/silhouette.h"
@@ -50,6 +55,27 @@ std::string walker_from(const std::vector<std::string>& cameras, const std::stri
   }
   return text;
 }
+
+// A made walker of which the first frames do not arrive, and so have no picture.
+class LateWalker final : public capture::Camera {
+ public:
+  static constexpr int lost = 3;
+  explicit LateWalker(std::unique_ptr<capture::Camera> walker) : walker_(std::move(walker)) {}
+  const capture::CameraInfo& info() const override { return walker_->info(); }
+  capture::CameraStatistics statistics() const override { return walker_->statistics(); }
+  std::optional<capture::Frame> next() override {
+    auto frame = walker_->next();
+    if (frame && given_++ < lost) {
+      frame->image = nullptr;
+      frame->status = capture::FrameStatus::lost;
+    }
+    return frame;
+  }
+
+ private:
+  std::unique_ptr<capture::Camera> walker_;
+  int given_ = 0;
+};
 
 class PersonHullTest : public MadeShowTest {
  protected:
@@ -249,6 +275,26 @@ TEST_F(PersonHullTest, TakesACameraBackOnceItSeesThePerson) {
   EXPECT_THAT(told.persons.back().left_out, IsEmpty());
   EXPECT_THAT(told.notes, Contains(HasSubstr("camera 2: left out, for it sees nobody")));
   EXPECT_THAT(told.notes, Contains(HasSubstr("camera 2: taken back")));
+}
+
+// Of a camera that has given nothing yet the hull would be empty.
+TEST_F(PersonHullTest, LeavesACameraOutUntilItsFirstPicture) {
+  capture::register_camera(
+      "late_walker", [](std::string_view rest, const capture::CameraOptions& options) {
+        const std::string uri = "made_walker:" + std::string(rest);
+        const bool key = !options.frame;  // the frames that its plate is made from all arrive
+        auto walker = capture::open_camera(uri, options);
+        return key ? std::move(walker)
+                   : std::unique_ptr<capture::Camera>(new LateWalker(std::move(walker)));
+      });
+  std::string late = filmed_from(60);
+  late.replace(late.find("made_walker"), 11, "late_walker");
+  const Told told = run(walker_set(30, walker_from({filmed_from(0), late}), 20));
+  ASSERT_EQ(told.persons.size(), 20U);
+  EXPECT_FALSE(told.persons.front().hull);
+  EXPECT_THAT(told.persons.front().left_out, ElementsAre(2));
+  EXPECT_THAT(told.notes, Contains(HasSubstr("camera 2: left out")));
+  EXPECT_TRUE(told.persons.back().hull);
 }
 
 TEST_F(PersonHullTest, IsWhatTheProgramsOwnSetShows) {
