@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "studio/charts/bounce_lamps.h"
 #include "studio/charts/light_stressors.h"
 #include "studio/charts/matte_shot.h"
 #include "studio/charts/screen_lamps.h"
@@ -94,6 +95,8 @@ class LightsChart {
     chart.stressors = LightStressors(quick_, console_, shot_, sky_, truth_).measure();
     progress("lamps on a screen", 0.9);
     add_screen_lamps(quick_, chart);
+    progress("light between surfaces", 0.95);
+    add_bounce_lamps(quick_, chart);
     return chart;
   }
 

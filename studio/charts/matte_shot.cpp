@@ -1,7 +1,10 @@
 // The matte car.
 #include "studio/charts/matte_shot.h"
 
+#include <algorithm>
+
 #include "render/sampled_light.h"
+#include "render/standard.h"
 
 namespace studio {
 
@@ -12,6 +15,14 @@ BenchLight light_of(const render::Environment& sky, const render::LightTableSett
 
 render::PictureError error_of(const capture::Image& picture, const Truth& truth) {
   return render::picture_error(picture, truth.references, truth.mask);
+}
+
+render::Material make_grey_material(const std::string& name) {
+  render::StandardParameters parameters;
+  std::fill_n(parameters.base_color, 3, grey_albedo);
+  parameters.roughness = 1;
+  parameters.specular = 0;
+  return render::make_standard_material(name, parameters);
 }
 
 MatteShot::MatteShot(int width, int height)

@@ -1,6 +1,8 @@
 // What the charts of lights measure with: a shot in which nothing but the light errs.
 #pragma once
 
+#include <string>
+
 #include "studio/bench_scene.h"
 #include "studio/picture_error.h"
 
@@ -23,6 +25,10 @@ inline constexpr int default_lights = render::Effort{}.light_samples;
 BenchLight light_of(const render::Environment& sky, const render::LightTableSettings& settings);
 
 render::PictureError error_of(const capture::Image& picture, const Truth& truth);
+
+// Lambert's.
+inline constexpr float grey_albedo = 0.5F;
+render::Material make_grey_material(const std::string& name);
 
 // A shot of the matte car through the centres of its pixels. Nothing but the light errs there: no
 // edges, no mirrors.

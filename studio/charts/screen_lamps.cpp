@@ -24,17 +24,8 @@ using render::Vec3f;
 
 constexpr int many_lamps = 33;    // along a side: what fewer are measured against
 constexpr int default_lamps = 5;  // as a set has them if it says nothing else
-constexpr float albedo = 0.5F;
-constexpr float radiance = 3;  // of the screen over the bare floor
+constexpr float radiance = 3;     // of the screen over the bare floor
 constexpr float floor_side_m = 6;
-
-render::Material make_grey(const std::string& name) {
-  render::StandardParameters parameters;
-  std::fill_n(parameters.base_color, 3, albedo);
-  parameters.roughness = 1;
-  parameters.specular = 0;
-  return render::make_standard_material(name, parameters);
-}
 
 render::Environment make_night() {
   render::Environment night;
@@ -49,7 +40,7 @@ constexpr std::array<Vec3f, 4> corners{
 
 render::PaperScene make_bare_floor() {
   render::PaperScene made;
-  made.scene.materials = {make_grey("floor"), make_grey("screen")};
+  made.scene.materials = {make_grey_material("floor"), make_grey_material("screen")};
   auto floor = std::make_shared<render::Mesh>();
   floor->positions = {{-floor_side_m, -floor_side_m, 0},
                       {floor_side_m, -floor_side_m, 0},
@@ -106,7 +97,7 @@ Truth floor_truth(const BenchScene& shot) {
         continue;
       }
       truth.mask.at(y, x) = 1;
-      const double shown = double{albedo} / std::numbers::pi * floor_irradiance(p);
+      const double shown = double{grey_albedo} / std::numbers::pi * floor_irradiance(p);
       for (int c = 0; c < 3; ++c) picture.at(y, x, c) = static_cast<float>(shown);
     }
   }
@@ -170,7 +161,7 @@ ChartPoint point_of(const std::string& scene,
 render::PaperScene make_grey_room() {
   render::PaperScene room = render::made_paper_scene("tv_room_lit");
   for (render::Material& material : room.scene.materials) {
-    if (material.name != "screen") material = make_grey(material.name);
+    if (material.name != "screen") material = make_grey_material(material.name);
   }
   room.environment = make_night();
   return room;

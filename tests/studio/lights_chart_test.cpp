@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "studio/charts/bounce_lamps.h"
 #include "studio/charts/screen_lamps.h"
 #include "tests/studio/quick_chart.h"
 
@@ -23,10 +24,12 @@ const Chart& quick_chart() {
 
 double lights_of(const ChartPoint& p) { return std::get<double>(p.settings.at(0).second); }
 
-// All but the screens' lamps, which have tests of their own.
+// All but lamps on screens and of bounced light, which have tests of their own.
 std::vector<ChartPoint> points_of_tables() {
   std::vector<ChartPoint> points = quick_chart().points;
-  std::erase_if(points, [](const ChartPoint& p) { return p.method == "lamps on a screen"; });
+  std::erase_if(points, [](const ChartPoint& p) {
+    return p.method == "lamps on a screen" || p.method == "lamps of bounced light";
+  });
   return points;
 }
 
@@ -115,6 +118,17 @@ TEST(LightsChart, HasScreensErringLessWithMoreLampsAndLittleByDefault) {
   const auto& closed_form = errors.rbegin()->second;
   EXPECT_LT(closed_form.at(25), 0.005);
   EXPECT_LT(closed_form.at(25), closed_form.at(1) / 10);
+}
+
+TEST(LightsChart, HasARoomNearTheReferenceWithLampsOfBouncedLightAndFarWithout) {
+  Chart chart;
+  add_bounce_lamps(true, chart);
+  ASSERT_EQ(chart.points.size(), 2U);
+  EXPECT_TRUE(chart.points[0].by_default);
+  EXPECT_EQ(lights_of(chart.points[0]), 0);
+  EXPECT_GT(chart.points[0].error, 0.2) << "the room must need that light";
+  EXPECT_LT(chart.points[1].error, 0.6 * chart.points[0].error);
+  EXPECT_GT(figure(chart.points[1].figures, "placing_ms"), 0);
 }
 
 }  // namespace

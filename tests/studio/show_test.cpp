@@ -65,6 +65,28 @@ TEST_F(ShowTest, PassesOverFramesOfAPlateThatIsFaster) {
   EXPECT_EQ(times_s, (std::vector<double>{0, 0.05, 0.1, 0.15}));
 }
 
+// The cube stands on the real floor: what it sends there moves with it, in the very next frame.
+TEST_F(ShowTest, LightsTheSetByWhatItsSurfacesSendOn) {
+  const Set set = made_set("grey:6,25,0", "bounce_lamps = 12\n");
+  FrameMaker maker(set);
+  const auto bounced = [&](std::int64_t frame) {
+    std::vector<render::LocalLight> lamps = maker.make(frame).value().job.lights.lamps;
+    std::erase_if(lamps, [](const render::LocalLight& lamp) { return lamp.bounced == 0; });
+    return lamps;
+  };
+  const auto before = bounced(0);
+  ASSERT_EQ(before.size(), 12U);
+  EXPECT_EQ(bounced(1), before);
+  maker.move_object("cube", {{3, 0, 0}, 0, 0, 1});
+  const auto after = bounced(2);
+  ASSERT_EQ(after.size(), 12U);
+  for (const render::LocalLight& lamp : after) EXPECT_GT(lamp.position.x, 1.9F);
+
+  const Pictures lit = pictures_of(set, {}, 0ms);
+  EXPECT_EQ(pictures_of(set, {}, 7ms), lit);
+  EXPECT_NE(lit, pictures_of(made_set("grey:6,25,0"), {}, 0ms));
+}
+
 TEST_F(ShowTest, CountsFramesThatThePlateLost) {
   Show show(made_set("grey:9,25,3"));
   show.run();

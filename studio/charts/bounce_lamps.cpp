@@ -1,0 +1,82 @@
+// Light between surfaces, by so many lamps.
+#include "studio/charts/bounce_lamps.h"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "render/bounced_light.h"
+#include "render/kept_transport.h"
+#include "render/paper_scenes.h"
+#include "render/reference.h"
+#include "studio/charts/matte_shot.h"
+#include "studio/paper_shot.h"
+
+namespace studio {
+namespace {
+
+double time_ms(const std::function<void()>& work, int runs) {
+  double least = 0;
+  for (int i = 0; i < runs; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    const std::chrono::duration<double, std::milli> taken =
+        std::chrono::steady_clock::now() - start;
+    least = i == 0 ? taken.count() : std::min(least, taken.count());
+  }
+  return least;
+}
+
+}  // namespace
+
+void add_bounce_lamps(bool quick, Chart& chart) {
+  const int width = quick ? 64 : 240, height = quick ? 48 : 180, runs = quick ? 1 : 3;
+  const std::vector<int> counts =
+      quick ? std::vector{0, 16} : std::vector{0, 4, 8, 16, 32, 64, 128, 256};
+  render::PaperScene room = render::made_paper_scene("tv_room");
+  for (render::Material& material : room.scene.materials) {
+    material = make_grey_material(material.name);
+  }
+  BenchScene shot = make_paper_shot(std::move(room), width, height).shot;
+  const Truth truth = truth_of(shot.plate, [&](std::uint32_t seed) {
+    return render::render_reference(shot.inputs(), shot.job, shot.plate,
+                                    {.samples = quick ? 32 : 256, .seed = seed, .bounces = true});
+  });
+  const render::LightTable table = shot.job.lights;
+  for (const int count : counts) {
+    render::BouncedLight bounced;
+    const double placing_ms = time_ms(
+        [&] { bounced = render::BouncedLight(*shot.scene, table, {.lamps = count}); }, runs);
+    const std::vector<render::LocalLight> lamps = bounced.lamps(table);
+    shot.job.lights = table;
+    shot.job.lights.lamps.insert(shot.job.lights.lamps.end(), lamps.begin(), lamps.end());
+    render::FrameInputs inputs = shot.inputs();
+    render::FrameResult result;
+    const auto frame = [&] { render_frame(inputs, shot.job, shot.half_plate, result); };
+    ChartPoint point;
+    point.time_ms = placing_ms + time_ms(frame, runs);
+    const render::PictureError error = error_of(capture::to_float(result.rgba), truth);
+    render::KeptTransport kept;
+    inputs.kept = &kept;
+    frame();
+    // Light that lives: cells are lit anew, not shown again.
+    const auto live = [&] {
+      for (auto& light : shot.job.lights.lights) light.irradiance *= 1.0001F;
+      frame();
+    };
+    point.scene = "grey TV room with light between surfaces, against the reference with all of it";
+    point.method = "lamps of bounced light";
+    point.settings = {{"bounce_lamps", static_cast<double>(count)}};
+    point.by_default = count == render::Effort{}.bounce_lamps;
+    point.label = fmt::format("{}{}", count, point.by_default ? ": default" : "");
+    point.error = error.relative_rms;
+    point.error_p99 = error.p99;
+    point.figures = {{"placing_ms", placing_ms}, {"still_ms", time_ms(live, runs)}};
+    chart.points.push_back(std::move(point));
+  }
+}
+
+}  // namespace studio
