@@ -57,6 +57,8 @@ void CellBaker::bake(const FrameContext& frame,
                       std::min(cell_size, table.height - y0)};
   if (frame.inputs.count_rays) transport.counts.resize(cell_pixels);
   counting_ = frame.inputs.count_rays ? transport.counts.data() : nullptr;
+  compares_centres_ = effort_.aa_samples > 1;
+  compares_further_ = effort_.aa_tolerance > 0 || counting_ != nullptr;
   samples_.fill({});
   base_.fill({});
   light_.fill({});

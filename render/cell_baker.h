@@ -214,6 +214,11 @@ class CellBaker final : public RaySink {
   std::array<std::int16_t, stream_rays> lender_;       // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<CellTransport::EnvironmentTerm> sorted_places_;
+  struct KeyedPlace {
+    std::uint64_t texels;  // that it lies between
+    CellTransport::EnvironmentTerm term;
+  };
+  std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
   std::vector<PointLamp> reached_;
   std::vector<CellTransport::LightTerm> lamp_terms_;  // many times the transport's
@@ -244,6 +249,8 @@ class CellBaker final : public RaySink {
   RenderStatistics* statistics_ = nullptr;
   CellTransport* transport_ = nullptr;
   RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for
+  // Whether anything is decided by what samples see: centres', further ones'.
+  bool compares_centres_ = false, compares_further_ = false;
   int x0_ = 0, y0_ = 0;
   int block_ = 1;      // pixels a side that share a camera ray
   CellMask inside_{};  // pixels that have one

@@ -16,6 +16,10 @@ constexpr float plate_contrast =
     0.4F;                         // by which virtual things are taken to differ from the plate
 constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
 constexpr Scene::Surface no_hit{~0U, ~0U};
+// Of so few further samples, the one in the middle of the pattern would be the centre's once more.
+constexpr int few_samples = 4;
+constexpr int pattern_middle = 1;
+constexpr std::size_t own_centre = 4;  // of a pixel's neighbours, row by row
 
 Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
@@ -213,13 +217,18 @@ void CellBaker::finish_further(int count) {
   }
 }
 
-// More camera rays in pixels that an edge crosses. The centre's own sample makes room for them.
-// Pixels that are still uncertain take more, three times as many as they have, and again.
+// More camera rays in pixels that an edge crosses. The centre's own sample makes room for them; at
+// a stage of few rays it is the one of them that goes through the middle. Pixels that are still
+// uncertain take more, three times as many as they have, and again.
 void CellBaker::sample_edges() {
+  const bool takes_centre = effort_.aa_samples <= few_samples;
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (edge_[k] == Edge::none) continue;
     squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
     borrowed_[k] = {};
+    if (!takes_centre) continue;
+    borrowed_[k][own_centre] = 1;
+    add_further(k, samples_[k]);
   }
   int first = 0;
   for (int end = effort_.aa_samples; end <= samples_max; first = end, end *= 4) {
@@ -230,6 +239,7 @@ void CellBaker::sample_edges() {
       if (!(chosen[k / 64] >> (k % 64) & 1)) continue;
       const int x = static_cast<int>(k % cell_size), y = static_cast<int>(k / cell_size);
       for (int i = first; i < end; ++i) {
+        if (takes_centre && i == pattern_middle) continue;
         further_[static_cast<std::size_t>(count)] = {static_cast<std::uint16_t>(k),
                                                      static_cast<std::uint16_t>(i)};
         set_camera_ray(

@@ -158,10 +158,12 @@ void CellBaker::add_environment(std::size_t slot,
   const std::size_t count =
       one_of_many ? find_diffused_samples(*frame_->planned, direction, spread, places)
                   : find_map_samples(*frame_->planned, direction, roughness, spread, places);
+  const bool decides = slot < cell_pixels ? compares_centres_ : compares_further_;
   for (std::size_t i = 0; i < count; ++i) {
     const auto& [x, y, share, level] = places[i];
     transport_->environment.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
                                        static_cast<std::uint16_t>(level)});
+    if (!decides) continue;
     samples_[slot].added += weight * radiance_at(*frame_->planned_levels[level], x, y) * share;
   }
 }

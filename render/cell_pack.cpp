@@ -98,10 +98,14 @@ void CellBaker::pack_environment() {
     return std::uint64_t{e.slot} << 48 | std::uint64_t{e.level} << 40 | row << 20 | column;
   };
   sort_by_slot(terms, sorted_places_, [&](auto of_slot) {
-    std::ranges::sort(of_slot, [&](const Term& a, const Term& b) {
-      const std::uint64_t ka = key(a), kb = key(b);
-      return ka != kb ? ka < kb : a.x != b.x ? a.x < b.x : a.y < b.y;
+    keyed_places_.clear();
+    for (const Term& e : of_slot) keyed_places_.push_back({key(e), e});
+    std::ranges::sort(keyed_places_, [](const KeyedPlace& a, const KeyedPlace& b) {
+      return a.texels != b.texels   ? a.texels < b.texels
+             : a.term.x != b.term.x ? a.term.x < b.term.x
+                                    : a.term.y < b.term.y;
     });
+    std::ranges::transform(keyed_places_, of_slot.begin(), &KeyedPlace::term);
   });
   std::size_t kept = 0;
   float share = 0;  // how much the last one stands for

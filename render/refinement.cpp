@@ -21,12 +21,11 @@ Effort effort_of_stage(const Effort& effort, int stage) {
   // Of a block, the pixel that stands for all would see the same share of the lights everywhere.
   if (blocks) coarse.interleave = 1;
   if (stage > one_ray_stage) {
-    const auto at_least = [](float value) {
-      return value > 0 ? std::max(value, coarse_contrast) : 0.0F;
-    };
     coarse.aa_samples = std::min(effort.aa_samples, 4);
-    coarse.aa_tolerance = at_least(effort.aa_tolerance);
-    coarse.glint_contrast = at_least(effort.glint_contrast);
+    coarse.aa_tolerance = 0;  // more of them where these are uncertain come with the next stage
+    if (effort.glint_contrast > 0) {
+      coarse.glint_contrast = std::max(effort.glint_contrast, coarse_contrast);
+    }
   } else {
     coarse.aa_samples = 1;
   }
