@@ -23,7 +23,7 @@ constexpr std::array<double, render::refinement_stages> expected_cost{1, 2, 6, 1
 // Of the cells, as many are found in a frame with a ray a pixel however long they take.
 constexpr double least = 0.01;
 // A stage that takes less than this times the one before takes its place.
-constexpr double worth_a_stage = 2;
+constexpr double worth_a_stage = 2.5;
 // A few rays at edges, which is to be there within a second: where it can, only those stages come
 // first that take a small part of its time.
 constexpr std::size_t anti_aliased = one_ray_stage + 1;
