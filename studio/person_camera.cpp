@@ -34,8 +34,14 @@ compositing::KeyMasks masks_of(const KeyChoice& key, int width, int height) {
   }
   for (int y = 0; y < mask.height; ++y) {
     for (int x = 0; x < mask.width; ++x) {
+      const float white = mask.at(y, x);
+      if (!std::isfinite(white)) {
+        throw std::invalid_argument(fmt::format(
+            "the garbage mask {} holds no number at column {}, row {}: draw it from 0 to 1",
+            key.garbage, x, y));
+      }
       masks.garbage.push_back(
-          static_cast<std::uint8_t>(std::clamp(mask.at(y, x) * 255 + 0.5F, 0.0F, 255.0F)));
+          static_cast<std::uint8_t>(std::clamp(white * 255 + 0.5F, 0.0F, 255.0F)));
     }
   }
   return masks;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <span>
 
 #include "calibrate/lens.h"
@@ -353,6 +354,10 @@ TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
   // As many pixels, but turned.
   capture::write_exr((dir_ / "turned.exr").string(), capture::make_image(480, 360));
   expect_refusal("key = {", "key = { garbage = \"turned.exr\", ", "turned.exr is 360x480");
+  capture::Image broken = capture::make_image(360, 480);
+  broken.at(7, 31) = std::numeric_limits<float>::quiet_NaN();
+  capture::write_exr((dir_ / "broken.exr").string(), broken);
+  expect_refusal("key = {", "key = { garbage = \"broken.exr\", ", "no number at column 31, row 7");
   write_plate(64, 48);
   expect_refusal("walker\"", "walker\"", "64x48");
   expect_refusal("walker\"", "walker\"", "480x360");
