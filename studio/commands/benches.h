@@ -25,6 +25,10 @@ void bench_papers(const PapersBench& bench, Console& console);
 // `pictures`: a directory for what is shown at the end of the drag and a second later, or none.
 void bench_drag(const std::string& scene, const std::string& pictures, Console& console);
 
+// Time a frame, and of bare Embree over the same rays, from 100,000 triangles to 800,000 that are
+// all in sight, on all threads and on one; the best of `runs`.
+void bench_growth(int runs, Console& console);
+
 struct CyclesBench {
   std::string
       directory;         // for the scenes as files, both renderers' pictures, and what Blender says
