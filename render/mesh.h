@@ -22,6 +22,9 @@ struct Mesh {
   std::vector<std::array<float, 4>> tangents;  // per vertex, xyz + handedness; empty = none
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint32_t> materials;  // per triangle, or one for all: of the scene
+  // Of a mesh that deforms: where its vertices are at rest, which all its shapes share. Its tree is
+  // built for them, and then fitted to `positions`. Null: it does not deform.
+  std::shared_ptr<const std::vector<Vec3f>> rest;
 };
 
 // 8-bit texels, 1 to 4 channels, repeated in both directions, with mip levels.

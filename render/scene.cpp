@@ -25,6 +25,9 @@ void check(const SceneDescription& scene) {
         bad_size(mesh.tangents.size())) {
       fail("mesh " + std::to_string(i) + ": per-vertex arrays differ in length");
     }
+    if (mesh.rest && mesh.rest->size() != n) {
+      fail("mesh " + std::to_string(i) + ": has not as many vertices as at rest");
+    }
     if (mesh.materials.size() != 1 && mesh.materials.size() != mesh.triangles.size()) {
       fail("mesh " + std::to_string(i) + ": needs one material, or one per triangle");
     }
@@ -43,6 +46,9 @@ void check(const SceneDescription& scene) {
     if (instance.mesh >= scene.meshes.size()) fail("object " + instance.name + ": mesh is missing");
     for (const float value : instance.set_from_object) {
       if (!std::isfinite(value)) fail("object " + instance.name + ": pose is not finite");
+    }
+    if (scene.meshes[instance.mesh]->rest && !instance.moves) {
+      fail("object " + instance.name + ": its mesh deforms, but it is not one that moves");
     }
   }
 }
@@ -257,11 +263,16 @@ void Scene::Impl::filter_any(const RTCFilterFunctionNArguments* args) {
 
 namespace {
 
-// Whether two scenes differ in nothing but where moving instances stand.
+// Whether two scenes differ in nothing but where moving instances stand, and in shapes of meshes
+// that deform.
 bool differ_in_moves_only(const SceneDescription& a, const SceneDescription& b) {
-  if (a.meshes != b.meshes || a.textures != b.textures || a.materials != b.materials ||
-      a.background != b.background || a.videos != b.videos ||
-      a.instances.size() != b.instances.size()) {
+  if (a.textures != b.textures || a.materials != b.materials || a.background != b.background ||
+      a.videos != b.videos || a.instances.size() != b.instances.size()) {
+    return false;
+  }
+  if (!std::ranges::equal(a.meshes, b.meshes, [](const auto& x, const auto& y) {
+        return x == y || (x->rest && y->rest && x->materials == y->materials);
+      })) {
     return false;
   }
   return std::ranges::equal(a.instances, b.instances, [](Instance x, const Instance& y) {
@@ -285,7 +296,7 @@ Scene::Scene(SceneDescription description, Pictures pictures) : impl_(std::make_
   compiled->id = impl_->id = next_id();
   impl_->description = std::move(description);
   impl_->compiled = std::move(compiled);
-  impl_->assemble();
+  impl_->assemble(nullptr);
   impl_->prepare(nullptr);
 }
 
@@ -304,7 +315,7 @@ Scene::Scene(SceneDescription description, const Scene& before, Pictures picture
     impl_->compiled = std::move(compiled);
   }
   impl_->description = std::move(description);
-  impl_->assemble();
+  impl_->assemble(before.impl_.get());
   impl_->prepare(before.impl_.get());
 }
 
@@ -368,7 +379,7 @@ Scene::Bounds Scene::virtual_bounds() const { return impl_->virtual_bounds; }
 Scene::Bounds Scene::bounds() const { return impl_->all_bounds; }
 Scene::Bounds Scene::blocker_bounds() const { return impl_->blocker_bounds; }
 const std::vector<Scene::Bounds>& Scene::blocker_boxes() const { return impl_->blocker_boxes; }
-std::size_t Scene::skipped_triangles() const { return impl_->compiled->skipped; }
+std::size_t Scene::skipped_triangles() const { return impl_->skipped; }
 const Scene::Pictures& Scene::pictures() const { return impl_->pictures; }
 const std::vector<PreparedSurface>& Scene::prepared() const { return impl_->prepared; }
 bool Scene::shows_pictures(std::uint32_t instance) const {
@@ -381,7 +392,7 @@ std::optional<std::vector<Scene::Bounds>> Scene::moved(const Places& before, con
   std::vector<Bounds> where;
   for (std::size_t i = 0; i < now.bounds.size(); ++i) {
     if (before.set_from_object[i] == now.set_from_object[i] &&
-        before.pictures[i] == now.pictures[i]) {
+        before.pictures[i] == now.pictures[i] && before.shapes[i] == now.shapes[i]) {
       continue;
     }
     for (const Bounds& bounds : {before.bounds[i], now.bounds[i]}) {

@@ -95,12 +95,14 @@ inline Vec3f turn_of_normal(const HitPoint& hit, Vec3f step) {
 class Scene {
  public:
   // Throws std::invalid_argument for indices out of range, std::runtime_error if Embree fails.
-  // Triangles that are not finite are left out and counted.
-  // Instances that show a live picture must be ones that move.
+  // Triangles that are not finite, or farther away than 1.8e18, are left out and counted.
+  // Instances that show a live picture, or a mesh that deforms, must be ones that move.
   using Pictures = std::vector<std::shared_ptr<const LivePicture>>;
   explicit Scene(SceneDescription description, Pictures pictures = {});
   // The same scene, bit for bit, at next to no cost where it differs from `before` only in where
-  // moving instances stand and in its pictures.
+  // moving instances stand and in its pictures; and at little where meshes that deform (Mesh::rest)
+  // have other shapes. One that has other triangles, or another rest, has its own tree built anew;
+  // with other materials, the whole scene is.
   Scene(SceneDescription description, const Scene& before, Pictures pictures = {});
   ~Scene();
   Scene(const Scene&) = delete;
@@ -144,7 +146,7 @@ class Scene {
   // it.
   Bounds blocker_bounds() const;
   const std::vector<Bounds>& blocker_boxes() const;
-  std::size_t skipped_triangles() const;
+  std::size_t skipped_triangles() const;  // left out
   const Pictures& pictures() const;
   const std::vector<PreparedSurface>& prepared() const;  // by Shader::prepare()
   bool shows_pictures(std::uint32_t instance) const;     // whether any is live on it
@@ -153,15 +155,18 @@ class Scene {
     std::uint64_t parts = 0;  // differs between scenes that share nothing
     std::vector<std::array<float, 12>> set_from_object;
     std::vector<Bounds> bounds;
-    std::vector<Pictures> pictures;  // that each shows
+    std::vector<Pictures> pictures;                   // that each shows
+    std::vector<std::shared_ptr<const Mesh>> shapes;  // of each; null: it does not deform
   };
   const Places& places() const;
-  // Bounds, before and after, of what stands elsewhere in `now` or shows another picture; nothing
-  // if more than that differs.
+  // Bounds, before and after, of what stands elsewhere in `now`, has another shape or shows another
+  // picture; nothing if more than that differs.
   static std::optional<std::vector<Bounds>> moved(const Places& before, const Places& now);
 
  private:
   struct Part;
+  struct MeshTree;
+  class TreePool;
   struct Compiled;
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -5,7 +5,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x33435350;  // "PSC3"
+constexpr std::uint32_t scene_magic = 0x34435350;  // "PSC4"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);
@@ -14,6 +14,8 @@ void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.tangents);
   out.put_all(mesh.triangles);
   out.put_all(mesh.materials);
+  out.put(static_cast<std::uint8_t>(mesh.rest != nullptr));
+  if (mesh.rest) out.put_all(*mesh.rest);
 }
 
 Mesh get_mesh(ByteReader& in) {
@@ -24,6 +26,11 @@ Mesh get_mesh(ByteReader& in) {
   in.get_all(mesh.tangents);
   in.get_all(mesh.triangles);
   in.get_all(mesh.materials);
+  if (in.get<std::uint8_t>() != 0) {
+    std::vector<Vec3f> rest;
+    in.get_all(rest);
+    mesh.rest = std::make_shared<const std::vector<Vec3f>>(std::move(rest));
+  }
   return mesh;
 }
 
@@ -100,7 +107,7 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
   in.get(scene.version);
   scene.background = in.get_text();
   constexpr std::size_t count_size = sizeof(std::uint64_t);
-  for (std::size_t n = in.get_count(6 * count_size); n > 0; --n) {
+  for (std::size_t n = in.get_count(6 * count_size + 1); n > 0; --n) {
     scene.meshes.push_back(std::make_shared<const Mesh>(get_mesh(in)));
   }
   for (std::size_t n = in.get_count(3 * sizeof(int) + 1 + count_size); n > 0; --n) {

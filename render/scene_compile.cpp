@@ -14,15 +14,6 @@ unsigned mask_of(const Instance& instance) {
          (instance.occludes ? mask_occluder : 0U);
 }
 
-Scene::Bounds bounds_of(const Mesh& mesh, const std::array<float, 12>& m) {
-  Scene::Bounds bounds = no_bounds;
-  for (const Vec3f& position : mesh.positions) {
-    const Vec3f p = transform_point(m, position);
-    if (is_finite(p)) bounds = joined(bounds, {p, p});
-  }
-  return bounds;
-}
-
 // A box around a box that is moved.
 Scene::Bounds placed_bounds(const Scene::Bounds& box, const std::array<float, 12>& m) {
   if (!(box.lower.x <= box.upper.x)) return no_bounds;
@@ -36,14 +27,14 @@ Scene::Bounds placed_bounds(const Scene::Bounds& box, const std::array<float, 12
   return bounds;
 }
 
-bool is_built(RTCDevice device) {
+}  // namespace
+
+void check_built(RTCDevice device) {
   const RTCError error = rtcGetDeviceError(device);
-  if (error == RTC_ERROR_NONE) return true;
+  if (error == RTC_ERROR_NONE) return;
   throw std::runtime_error("Embree could not build the scene (error " +
                            std::to_string(static_cast<int>(error)) + "): is memory short?");
 }
-
-}  // namespace
 
 void Scene::Compiled::build(const SceneDescription& description) {
   kept_meshes = description.meshes;
@@ -75,14 +66,15 @@ void Scene::Compiled::build(const SceneDescription& description) {
       may_stand_back[instance.mesh] = 1;
     }
   }
-  mesh_scenes.assign(meshes, nullptr);
-  parts_of_mesh.resize(meshes);
+  trees.resize(meshes);
+  pool = std::make_shared<TreePool>(meshes);
   find_pictures(description);
   for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
     const Instance& instance = description.instances[i];
     const Mesh& mesh = *description.meshes[instance.mesh];
     normal_matrices.push_back(normal_matrix(instance.set_from_object));
-    if (instance.moves) {
+    if (mesh.rest) {  // its bounds are its shape's
+    } else if (instance.moves) {
       mesh_bounds[instance.mesh] = bounds_of(mesh, Instance{}.set_from_object);
     } else {
       const Bounds bounds = bounds_of(mesh, instance.set_from_object);
@@ -93,17 +85,26 @@ void Scene::Compiled::build(const SceneDescription& description) {
     }
     real_blockers |= instance.kind == ObjectKind::stand_in && instance.blocks_light;
     if (mesh.triangles.empty()) continue;
-    if (instanced[instance.mesh] == 0) {
-      add_parts(description, instance.mesh, i, mask_of(instance), placed);
-    } else if (RTCScene& inner = mesh_scenes[instance.mesh]; !inner) {
-      inner = rtcNewScene(device);
-      add_parts(description, instance.mesh, Part::none, ~0U, inner);
-      rtcCommitScene(inner);
+    if (mesh.rest) {
+      filters |= std::ranges::any_of(mesh.materials, [&](auto m) { return filtered[m] != 0; });
+    } else if (instanced[instance.mesh] == 0) {
+      const auto left_out = untraceable_triangles(mesh.positions, mesh.triangles);
+      skipped += left_out.size();
+      add_parts(description, instance.mesh, left_out, {placed, parts, i, mask_of(instance)});
+    } else if (!trees[instance.mesh]) {
+      auto tree = std::make_shared<MeshTree>();
+      tree->mesh = description.meshes[instance.mesh];
+      tree->skipped = untraceable_triangles(mesh.positions, mesh.triangles);
+      skipped += tree->skipped.size();
+      build_tree(description, instance.mesh, false, *tree);
+      filters |= std::ranges::any_of(tree->parts, [](const auto& part) { return part->filtered; });
+      trees[instance.mesh] = std::move(tree);
     }
   }
+  filters |= std::ranges::any_of(parts, [](const auto& part) { return part->filtered; });
   if (two_level) rtcCommitScene(placed);
   blocker_boxes = find_blocker_boxes(description);
-  is_built(device);
+  check_built(device);
 }
 
 void Scene::Compiled::find_pictures(const SceneDescription& description) {
@@ -142,18 +143,35 @@ void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
   instance_of_geometry.push_back(instance);
 }
 
+// Of meshes that deform, those that the scene before has are its own.
+void Scene::Impl::find_trees(const Impl* before) {
+  if (before && before->compiled != compiled) before = nullptr;
+  trees = compiled->trees;
+  skipped = compiled->skipped;
+  std::vector<std::uint8_t> used(trees.size(), 0);
+  for (const Instance& instance : description.instances) used[instance.mesh] = 1;
+  for (std::uint32_t i = 0; i < trees.size(); ++i) {
+    const std::shared_ptr<const Mesh>& mesh = description.meshes[i];
+    if (!mesh->rest || mesh->triangles.empty() || used[i] == 0) continue;
+    const bool same = before && before->description.meshes[i] == mesh;
+    trees[i] = same ? before->trees[i] : compiled->fit_tree(description, i);
+    skipped += trees[i]->skipped.size();
+  }
+}
+
 // Puts the scene together from what is compiled.
-void Scene::Impl::assemble() {
+void Scene::Impl::assemble(const Impl* before) {
+  find_trees(before);
   const Compiled& c = *compiled;
   places.parts = c.id;
   if (c.two_level) {
     scene = rtcNewScene(c.device);
     rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
-    if (!c.part_of_geometry.empty()) add_instance(Part::none, c.placed);
+    if (!c.parts.empty()) add_instance(Part::none, c.placed);
   } else {
     scene = c.placed;
     rtcRetainScene(scene);
-    instance_of_geometry.assign(c.part_of_geometry.size(), Part::none);
+    instance_of_geometry.assign(c.parts.size(), Part::none);
   }
   virtual_bounds = c.virtual_bounds;
   all_bounds = c.all_bounds;
@@ -162,11 +180,16 @@ void Scene::Impl::assemble() {
   for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
     const Instance& instance = description.instances[i];
     mirrored.push_back(determinant(instance.set_from_object) < 0 ? 1 : 0);
-    if (RTCScene inner = c.mesh_scenes[instance.mesh]) add_instance(i, inner);
+    const std::shared_ptr<const Mesh>& mesh = description.meshes[instance.mesh];
+    const MeshTree* tree = trees[instance.mesh].get();
+    if (tree) add_instance(i, tree->scene);
     if (!instance.moves) continue;
     normal_matrices[i] = normal_matrix(instance.set_from_object);
-    const Bounds bounds = placed_bounds(c.mesh_bounds[instance.mesh], instance.set_from_object);
+    const Bounds own =
+        mesh->rest ? (tree ? tree->bounds : no_bounds) : c.mesh_bounds[instance.mesh];
+    const Bounds bounds = placed_bounds(own, instance.set_from_object);
     places.set_from_object.push_back(instance.set_from_object);
+    places.shapes.push_back(mesh->rest ? mesh : nullptr);
     Pictures& shown = places.pictures.emplace_back();
     for (const std::size_t picture : c.pictures_of_mesh[instance.mesh]) {
       if (picture >= pictures.size() || !pictures[picture]) {
@@ -184,7 +207,7 @@ void Scene::Impl::assemble() {
   }
   for (const Bounds& box : blocker_boxes) blocker_bounds = joined(blocker_bounds, box);
   rtcCommitScene(scene);
-  is_built(c.device);
+  check_built(c.device);
 }
 
 // What is as it was in the scene before is prepared already.
@@ -212,100 +235,6 @@ void Scene::Impl::prepare(const Impl* before) {
       if (surface.prepared) prepared.push_back(std::move(surface));
     }
   }
-}
-
-void Scene::Compiled::add_parts(const SceneDescription& description,
-                                std::uint32_t mesh_index,
-                                std::uint32_t instance,
-                                unsigned mask,
-                                RTCScene target) {
-  const Mesh& mesh = *description.meshes[mesh_index];
-  std::vector<std::uint32_t> opaque, with_filter;
-  opaque.reserve(mesh.triangles.size());
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto& [a, b, c] = mesh.triangles[t];
-    if (!is_finite(mesh.positions[a]) || !is_finite(mesh.positions[b]) ||
-        !is_finite(mesh.positions[c])) {
-      ++skipped;
-      continue;
-    }
-    (filtered[material_of(mesh, t)] ? with_filter : opaque).push_back(t);
-  }
-  const bool all = with_filter.empty() && opaque.size() == mesh.triangles.size();
-  if (!opaque.empty())
-    add_part(description, mesh_index, instance, mask, target, false, opaque, all);
-  if (!with_filter.empty()) {
-    filters = true;
-    add_part(description, mesh_index, instance, mask, target, true, with_filter, false);
-  }
-}
-
-void Scene::Compiled::add_part(const SceneDescription& description,
-                               std::uint32_t mesh_index,
-                               std::uint32_t instance,
-                               unsigned mask,
-                               RTCScene target,
-                               bool with_filter,
-                               const std::vector<std::uint32_t>& triangles,
-                               bool all) {
-  const Mesh& mesh = *description.meshes[mesh_index];
-  auto part = std::make_unique<Part>();
-  part->mesh = mesh_index;
-  part->instance = instance;
-  if (!all) part->triangle_of_prim = triangles;
-
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* positions = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
-                                                                RTC_FORMAT_FLOAT3, sizeof(Vec3f),
-                                                                mesh.positions.size()));
-  using Triangle = std::array<std::uint32_t, 3>;
-  Triangle* indices = nullptr;
-  if (all) {
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                               mesh.triangles.data(), 0, sizeof(Triangle), mesh.triangles.size());
-  } else {
-    indices = static_cast<Triangle*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Triangle), triangles.size()));
-  }
-  if (!positions || (!indices && !all)) throw std::runtime_error("not enough memory for a mesh");
-  if (!all) {
-    for (std::size_t i = 0; i < triangles.size(); ++i) indices[i] = mesh.triangles[triangles[i]];
-  }
-  if (instance == Part::none) {
-    std::copy(mesh.positions.begin(), mesh.positions.end(), positions);
-  } else {
-    const auto& m = description.instances[instance].set_from_object;
-    std::transform(mesh.positions.begin(), mesh.positions.end(), positions,
-                   [&m](Vec3f p) { return transform_point(m, p); });
-    part->normals.reserve(mesh.normals.size());
-    for (const Vec3f& n : mesh.normals) {
-      part->normals.push_back(transform_normal(normal_matrices[instance], n));
-    }
-  }
-  // Vertices that no triangle of ours uses may hold anything; Embree must not see NaN there.
-  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-    if (!is_finite(positions[i])) positions[i] = {};
-  }
-  part->positions = positions;
-  rtcSetGeometryMask(geometry, mask);
-  rtcSetGeometryUserData(geometry, part.get());
-  const bool holes = std::ranges::any_of(
-      triangles, [&](std::uint32_t t) { return !shadow[material_of(mesh, t)]; });
-  if ((with_filter && holes) || may_stand_back[mesh_index]) {
-    rtcSetGeometryIntersectFilterFunction(geometry, Impl::filter_closest);
-  }
-  if (with_filter) rtcSetGeometryOccludedFilterFunction(geometry, Impl::filter_any);
-  rtcCommitGeometry(geometry);
-  if (instance == Part::none) {
-    auto& inner = parts_of_mesh[mesh_index];
-    rtcAttachGeometryByID(target, geometry, static_cast<unsigned>(inner.size()));
-    inner.push_back(part.get());
-  } else {
-    rtcAttachGeometryByID(target, geometry, static_cast<unsigned>(part_of_geometry.size()));
-    part_of_geometry.push_back(part.get());
-  }
-  rtcReleaseGeometry(geometry);
-  parts.push_back(std::move(part));
 }
 
 }  // namespace render
