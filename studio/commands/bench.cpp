@@ -85,12 +85,12 @@ Command bench_command() {
       "platelight bench kernel --json kernel.json",
       [](Arguments& arguments) -> std::function<void(Console&)> {
         auto o = std::make_shared<BenchOptions>();
-        arguments.positional("WHAT", o->what,
-                             "kernel, growth (with triangles and threads), papers (both papers' "
-                             "scenes), drag (a part "
-                             "of them that moves), cycles (the same pictures in Blender's Cycles), "
-                             "inputs (plate, probe, light table), hdr (a live "
-                             "probe's frames), or load (models)");
+        arguments.positional(
+            "WHAT", o->what,
+            "kernel, growth (with triangles and threads), papers (both papers' scenes), drag (a "
+            "part of them that moves), deform (a cloth), cycles (the same pictures in Blender's "
+            "Cycles), inputs (plate, probe, light table), hdr (a live probe's frames), or load "
+            "(models)");
         arguments.repeated("--model", o->files, "load: a model's file; without one, a made one");
         arguments.option("--set", o->set, "the set file whose inputs are measured");
         arguments.option(
@@ -109,6 +109,7 @@ Command bench_command() {
           if (o->what == "kernel") return bench_kernel(runs, console);
           if (o->what == "growth") return bench_growth(runs, console);
           if (o->what == "hdr") return bench_hdr(runs, console);
+          if (o->what == "deform") return bench_deform(runs, console);
           if (o->what == "drag") return bench_drag(o->scene, o->pictures, console);
           if (o->what == "papers") {
             return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene},
@@ -122,11 +123,10 @@ Command bench_command() {
                                 console);
           }
           if (o->what != "inputs") {
-            throw UsageError(
-                fmt::format("there is no benchmark of \"{}\": there are kernel, growth, papers, "
-                            "drag, cycles, inputs, "
-                            "hdr and load",
-                            o->what));
+            throw UsageError(fmt::format(
+                "there is no benchmark of \"{}\": there are kernel, growth, papers, drag, deform, "
+                "cycles, inputs, hdr and load",
+                o->what));
           }
           if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");
           bench_inputs(o->set, runs, console);

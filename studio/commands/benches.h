@@ -29,6 +29,10 @@ void bench_drag(const std::string& scene, const std::string& pictures, Console& 
 // all in sight, on all threads and on one; the best of `runs`.
 void bench_growth(int runs, Console& console);
 
+// A cloth of 200,000 triangles that waves and curls up: what it takes to fit its tree, or build it
+// anew, and how fast rays are then, the best of `runs`.
+void bench_deform(int runs, Console& console);
+
 struct CyclesBench {
   std::string
       directory;         // for the scenes as files, both renderers' pictures, and what Blender says
