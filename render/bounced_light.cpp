@@ -548,7 +548,7 @@ std::vector<LocalLight> BouncedLight::lamps(const LightTable& now) const {
 BounceFollower::Plan BounceFollower::plan_of(const Scene& scene,
                                              const LightTable& table,
                                              const BounceSettings& settings) {
-  Plan plan{scene.places().parts, {}, table.lights, table.lamps, settings};
+  Plan plan{scene.places().parts, {}, scene.places().shapes, table.lights, table.lamps, settings};
   const auto& instances = scene.description().instances;
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
     if (instances[i].moves && !scene.shows_pictures(i)) {

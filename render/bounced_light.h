@@ -1,7 +1,9 @@
 // Light that dull surfaces send on to each other, as small lamps that stand where light falls.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "render/light_table.h"
@@ -67,6 +69,7 @@ class BounceFollower {
   struct Plan {  // all that BouncedLight depends on
     std::uint64_t parts = 0;
     std::vector<std::array<float, 12>> places;
+    std::vector<std::shared_ptr<const Mesh>> shapes;  // of meshes that deform
     std::vector<DirectionalLight> lights;
     std::vector<LocalLight> lamps;
     BounceSettings settings;

@@ -234,6 +234,19 @@ TEST(BounceLamps, AreFoundAnewWhereSomethingMovesOrThePlanChanges) {
   const Scene moved(description, still);
   EXPECT_EQ(follower.follow(moved, table, settings),
             BouncedLight(moved, table, settings).lamps(table));
+  // Or where what deforms has another shape.
+  auto shape = std::make_shared<Mesh>(*description.meshes[1]);
+  shape->rest = std::make_shared<const std::vector<Vec3f>>(shape->positions);
+  description.meshes[1] = shape;
+  const Scene at_rest(description, moved);
+  follower.follow(at_rest, table, settings);
+  auto bent = std::make_shared<Mesh>(*shape);
+  for (Vec3f& p : bent->positions) p.z += 0.3F * p.x;
+  description.meshes[1] = bent;
+  const Scene deformed(description, at_rest);
+  EXPECT_EQ(follower.follow(deformed, table, settings),
+            BouncedLight(deformed, table, settings).lamps(table));
+
   LightTable planned = table;
   planned.lights[0].planned = planned.lights[0].irradiance = {1, 10, 20};
   EXPECT_EQ(follower.follow(moved, planned, settings),
