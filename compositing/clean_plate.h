@@ -3,11 +3,13 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "capture/colour.h"
 #include "capture/image.h"
+#include "capture/pool.h"
 #include "compositing/gap_filler.h"
 #include "compositing/key_lanes.h"
 #include "compositing/screen_colour.h"
@@ -94,7 +96,9 @@ class PlateLight {
   explicit PlateLight(CleanPlate plate, PlateUse use = PlateUse::screen);
 
   const CleanPlate& plate() const { return plate_; }
-  const LitPlate& lit() const { return lit_; }
+  const LitPlate& lit() const { return *lit_; }
+  // The same, not touched by later updates while it is held.
+  std::shared_ptr<const LitPlate> shared_lit() const { return lit_; }
 
   // Follows a frame; `follow` false: the plate as it was taken. Allocates nothing. Throws
   // std::invalid_argument naming both sizes if the frame's is not the plate's.
@@ -113,6 +117,7 @@ class PlateLight {
   std::array<F8, 3> ratios_at(int y, int x) const;
   void prepare();
   void light_up();
+  void renew();
 
   // Two cells of the gain that a column of the plate lies between.
   struct Between {
@@ -122,13 +127,16 @@ class PlateLight {
 
   CleanPlate plate_;
   LitPlate bare_;  // without gain
-  LitPlate lit_;
+  capture::Pool<LitPlate> plates_;
+  std::shared_ptr<LitPlate> lit_;
+  bool gained_ = false;          // whether it has a gain on it
   std::vector<float> ratios_;    // (1 / first, second / first, third / first, known), as its cells
   std::vector<float> pixels_;    // of each cell of the gain that are looked at, 0 = shows no screen
   std::vector<Between> across_;  // of each column of the plate
   int rows_apart_ = 2;           // of those that are looked at
   std::vector<float> gain_row_;
-  std::vector<float> gains_;  // filled and smoothed
+  std::vector<float> cell_gains_, over_gains_;  // of a row of the plate
+  std::vector<float> gains_;                    // filled and smoothed
   std::vector<float> blurred_;
   GapFiller filler_;
   float tolerance_ = 0;  // of colour, against the primary

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
@@ -50,6 +51,31 @@ inline F8 most(F8 a, F8 b) {
 }
 #endif
 
+// a * b + c, rounded once where processors can.
+inline F8 times_plus(F8 a, F8 b, F8 c) {
+#if defined(__FMA__)
+  return std::bit_cast<F8>(_mm256_fmadd_ps(std::bit_cast<__m256>(a), std::bit_cast<__m256>(b),
+                                           std::bit_cast<__m256>(c)));
+#else
+  return a * b + c;
+#endif
+}
+inline float times_plus(float a, float b, float c) {
+#if defined(__FMA__)
+  return std::fma(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+// c - a * b
+inline F8 less_times(F8 c, F8 a, F8 b) { return times_plus(-a, b, c); }
+inline float less_times(float c, float a, float b) { return times_plus(-a, b, c); }
+// `share` of the way from a to b.
+template <class V>
+[[gnu::always_inline]] inline V between(V a, V b, V share) {
+  return times_plus(share, b - a, a);
+}
+
 // Whether any bit of the lanes is set.
 inline bool any_of(I8 lanes) {
 #if defined(__AVX__)
@@ -94,10 +120,13 @@ inline std::array<F4, 4> transposed(F4 a, F4 b, F4 c, F4 d) {
 // Light of a transfer curve by a polynomial: value * p(value), within 2e-4 of it over 0..1.
 struct LightPolynomial {
   std::array<float, 6> factors{};
-  F8 operator()(F8 v) const {
-    F8 sum = all_of(factors[5]);
-    for (std::size_t i = 5; i-- > 0;) sum = sum * v + factors[i];
-    return sum * v;
+  // Side by side, for each step waits for the one before.
+  void apply(std::array<F8, 3>& v) const {
+    std::array<F8, 3> sum{all_of(factors[5]), all_of(factors[5]), all_of(factors[5])};
+    for (std::size_t i = 5; i-- > 0;) {
+      for (std::size_t c = 0; c < 3; ++c) sum[c] = times_plus(sum[c], v[c], all_of(factors[i]));
+    }
+    for (std::size_t c = 0; c < 3; ++c) v[c] = sum[c] * v[c];
   }
 };
 
@@ -131,13 +160,17 @@ class LightRows {
     for (F8& c : channels) c = (c > 0.0F) & (c < 1e9F) ? c : F8{};
   }
 
-  // Whether eight pixels lie within bounds.
-  bool within(int y, int x, const LightBounds& bounds) const {
-    std::array<F8, 3> c;
-    load_raw(at(y, x), c);
-    const I8 inside = (c[0] >= bounds.least) & (c[0] <= bounds.most[0]) & (c[1] <= bounds.most[1]) &
-                      (c[2] <= bounds.most[2]);
-    return !any_of(~inside);
+  // Which of `rows` rows from y on have eight pixels, from x on, within bounds: a bit each.
+  unsigned rows_within(int y, int x, int rows, const LightBounds& bounds) const {
+    unsigned within = 0;
+    for (int row = 0; row < rows; ++row) {
+      std::array<F8, 3> c;
+      load_raw(at(y + row, x), c);
+      const I8 inside = (c[0] >= bounds.least) & (c[0] <= bounds.most[0]) &
+                        (c[1] <= bounds.most[1]) & (c[2] <= bounds.most[2]);
+      within |= static_cast<unsigned>(!any_of(~inside)) << row;
+    }
+    return within;
   }
 
  private:
@@ -189,9 +222,7 @@ class CodeRows {
   }
 
   void load(int y, int x, int count, std::array<F8, 3>& channels) const {
-    const std::uint8_t* from =
-        codes_ + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                      static_cast<std::size_t>(x));
+    const std::uint8_t* from = at(y, x);
     I8 texels;
     if (count == key_lanes) {
       std::memcpy(&texels, from, sizeof texels);
@@ -202,37 +233,53 @@ class CodeRows {
         texels[i] = texel;
       }
     }
-    for (std::size_t c = 0; c < 3; ++c) {
-      channels[c] = light_(to_float_lanes((texels >> shifts_[c]) & 255));
-    }
+    for (std::size_t c = 0; c < 3; ++c) channels[c] = to_float_lanes((texels >> shifts_[c]) & 255);
+    light_.apply(channels);
   }
 
-  // Whether eight pixels lie within bounds: the greatest codes of each channel, then the least.
-  bool within(int y, int x, const CodeBounds& bounds) const {
+  // Which of `rows` rows from y on, eight at most, have eight pixels, from x on, within bounds: a
+  // bit each.
+  unsigned rows_within(int y, int x, int rows, const CodeBounds& bounds) const {
+    const std::uint8_t* from = at(y, x);
+    const std::size_t down = 4 * static_cast<std::size_t>(width_);
+    unsigned within = 0;
 #if defined(__AVX2__)
-    const auto* from =
-        codes_ + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                      static_cast<std::size_t>(x));
-    const __m256i texels = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
-    const __m256i over = _mm256_subs_epu8(texels, _mm256_set1_epi32(static_cast<int>(bounds.most)));
-    const __m256i under =
-        _mm256_subs_epu8(_mm256_set1_epi32(static_cast<int>(bounds.least)), texels);
-    const __m256i off = _mm256_or_si256(over, under);
-    return _mm256_testz_si256(off, off) != 0;
-#else
-    const auto* from =
-        codes_ + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                      static_cast<std::size_t>(x));
-    for (int i = 0; i < 4 * key_lanes; ++i) {
-      const int shift = 8 * (i % 4);
-      if (from[i] > (bounds.most >> shift & 255) || from[i] < (bounds.least >> shift & 255))
-        return false;
+    const __m256i most = _mm256_set1_epi32(static_cast<int>(bounds.most));
+    const __m256i least = _mm256_set1_epi32(static_cast<int>(bounds.least));
+    const auto outside = [&](int row) {
+      const __m256i texels = _mm256_loadu_si256(
+          reinterpret_cast<const __m256i*>(from + static_cast<std::size_t>(row) * down));
+      return _mm256_or_si256(_mm256_subs_epu8(texels, most), _mm256_subs_epu8(least, texels));
+    };
+    if (rows == 8) {
+      __m256i any = outside(0);
+      for (int row = 1; row < 8; ++row) any = _mm256_or_si256(any, outside(row));
+      if (_mm256_testz_si256(any, any) != 0) return 0xFF;
     }
-    return true;
+    for (int row = 0; row < rows; ++row) {
+      const __m256i off = outside(row);
+      within |= static_cast<unsigned>(_mm256_testz_si256(off, off)) << row;
+    }
+#else
+    for (int row = 0; row < rows; ++row, from += down) {
+      bool inside = true;
+      for (int i = 0; i < 4 * key_lanes; ++i) {
+        const int shift = 8 * (i % 4);
+        inside &= from[i] <= (bounds.most >> shift & 255);
+        inside &= from[i] >= (bounds.least >> shift & 255);
+      }
+      within |= static_cast<unsigned>(inside) << row;
+    }
 #endif
+    return within;
   }
 
  private:
+  const std::uint8_t* at(int y, int x) const {
+    return codes_ + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                         static_cast<std::size_t>(x));
+  }
+
   const std::uint8_t* codes_;
   int width_;
   std::array<int, 3> shifts_{};

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -10,20 +11,32 @@
 
 namespace compositing {
 
-// Eight pixels of a row on their way.
+// Eight pixels of a row on their way; set before they are read.
 struct KeyBlock {
-  int x = 0;
-  int count = 0;                       // of pixels that are in the frame
-  std::array<F8, 3> light{}, plate{};  // in the keyer's order
-  F8 plate_last{};                     // the last value of the plate's cell
-  TexelShare<F8> share{};
-  TexelMatte<F8> matte{};
+  int x;
+  int count;                       // of pixels that are in the frame
+  std::array<F8, 3> light, plate;  // in the keyer's order
+  TexelMatte<F8> matte;
+  F8 before;  // alpha of the frame before
+};
+
+// What smoothed alpha of eight pixels was in the frame before.
+enum class KeyPast : std::uint8_t {
+  clear,  // 0
+  faint,  // haze, which counts as none
+  mixed,
+  whole  // 1
 };
 
 struct KeyScratch {
-  std::array<std::vector<KeyBlock>, 2> blocks;  // of two rows
-  std::vector<float> change;                    // of alpha, of three rows
-  std::vector<std::uint16_t> previous;  // smoothed alpha, 1 = 65535, rows padded to whole blocks
+  std::array<std::vector<int>, 8> places;        // x of blocks that are not bare, of eight rows
+  std::array<std::vector<KeyBlock>, 2> waiting;  // of two rows, for the one below
+  std::vector<float> change;                     // of alpha, of three rows
+  std::array<std::vector<int>, 3> changed;       // x of blocks whose change may not be 0
+  std::vector<KeyPast> past;                     // for each 8x8 pixels, one of each row
+  std::vector<std::uint16_t> previous;  // smoothed alpha where it is mixed or faint, 1 = 65535,
+                                        // rows padded to whole blocks
+  std::vector<std::uint8_t> written;    // as KeyedFrame has it, for pictures that do not
   std::vector<CodeBounds> bare_codes;   // what is screen, of each 8x8 pixels; empty: nothing
   std::vector<LightBounds> bare_light;
   bool has_previous = false;

@@ -80,8 +80,8 @@ class KeyTable {
   template <class V>
   [[gnu::always_inline]] TableEntry<V> at(const Square<V>& square) const {
     const auto both = words(square.index);
-    return {between<V>(both.alpha, square.across_shares, square.across_lights),
-            between<V>(both.plate, square.across_shares, square.across_lights)};
+    return {blended<V>(both.alpha, square.across_shares, square.across_lights),
+            blended<V>(both.plate, square.across_shares, square.across_lights)};
   }
 
  private:
@@ -123,12 +123,11 @@ class KeyTable {
   }
 
   template <class V, class I>
-  [[gnu::always_inline]] static V between(I codes, V u, V v) {
+  [[gnu::always_inline]] static V blended(I codes, V u, V v) {
     const V a = to_float_lanes(codes & 255), b = to_float_lanes((codes >> 8) & 255);
     const V c = to_float_lanes((codes >> 16) & 255);
     const V d = to_float_lanes((codes >> 24) & 255);
-    const V low = a + v * (b - a), high = c + v * (d - c);
-    return (low + u * (high - low)) * (1.0F / 255);
+    return between(between(a, b, v), between(c, d, v), u) * (1.0F / 255);
   }
 
   std::vector<std::uint64_t> words_;

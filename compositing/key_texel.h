@@ -51,9 +51,9 @@ template <bool two_primaries, class V>
   texel.share = screen_excess<two_primaries>(c[0], c[1], c[2]) * over_excess;
   if (dials.table == nullptr) return texel;
   // Of two primaries, the greater rest stands for the second channel.
-  V second = c[1] - texel.share * p[1];
-  if constexpr (two_primaries) second = most(second, c[0] - texel.share * p[0]);
-  const V third = c[2] - texel.share * p[2];
+  V second = less_times(c[1], texel.share, p[1]);
+  if constexpr (two_primaries) second = most(second, less_times(c[0], texel.share, p[0]));
+  const V third = less_times(c[2], texel.share, p[2]);
   texel.square =
       KeyTable::square_of(place_in_table(texel.share, second * over_excess, third * over_excess));
   return texel;
@@ -74,10 +74,10 @@ template <class V>
   }
   V spill = most(plate - (one - alpha), zero);
   alpha = least(most((alpha - dials.black) * dials.scale, zero), one);
-  alpha = alpha + dials.edge * alpha * (one - alpha);
+  if (dials.edge != 0) alpha = alpha + dials.edge * alpha * (one - alpha);
   // What the dials have made more of the person than it is keeps no more of the screen for that.
   const V mixed = least(most((plate - 0.3F) * (1 / 0.3F), zero), one);
-  spill = most(spill, mixed * plate - (one - alpha));
+  spill = most(spill, times_plus(mixed, plate, alpha - one));
   return {alpha, spill};
 }
 
@@ -97,15 +97,17 @@ template <bool two_primaries, class V>
                                                           const TexelMatte<V>& matte,
                                                           float despill) {
   const V zero = lanes_like(matte.alpha, 0), one = lanes_like(matte.alpha, 1);
-  const V taken = one - matte.alpha + (despill < 1 ? despill : 1.0F) * matte.spill;
-  V f0 = most(c[0] - taken * p[0], zero), f1 = most(c[1] - taken * p[1], zero);
-  V f2 = most(c[2] - taken * p[2], zero);
+  const V taken =
+      times_plus(lanes_like(zero, despill < 1 ? despill : 1.0F), matte.spill, one - matte.alpha);
+  V f0 = most(less_times(c[0], taken, p[0]), zero), f1 = most(less_times(c[1], taken, p[1]), zero);
+  V f2 = most(less_times(c[2], taken, p[2]), zero);
   if constexpr (!two_primaries) {
     // No more of the primary than of the greater of the two others, or, beyond 1, than their mean.
     const float harder = despill > 1 ? despill - 1 : 0;
     const float kept = despill < 1 ? 1 - despill : 0;
-    const V limit = most(f1, f2) + harder * (0.5F * (f1 + f2) - most(f1, f2));
-    f0 = least(f0, limit + kept * f0);
+    V limit = most(f1, f2);
+    if (harder > 0) limit = limit + harder * (0.5F * (f1 + f2) - limit);
+    f0 = least(f0, kept > 0 ? limit + kept * f0 : limit);
   }
   f0 = matte.alpha > 0.0F ? f0 : zero;
   f1 = matte.alpha > 0.0F ? f1 : zero;

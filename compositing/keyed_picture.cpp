@@ -31,6 +31,15 @@ float aspect_of(const render::VideoTexture& texture) {
   return static_cast<float>(texture.height()) / static_cast<float>(texture.width());
 }
 
+// share_inside(), at once where it is all: its square reaches half a side, times the root of a
+// picture's aspect.
+float inside_of(float u, float v, float footprint_uv, float aspect) {
+  const float edge = 2 * footprint_uv;
+  const bool whole = edge >= 0 && u >= edge && u <= 1 - edge && v >= edge && v <= 1 - edge &&
+                     aspect > 0.0625F && aspect < 16;
+  return whole ? 1.0F : share_inside(u, v, footprint_uv, aspect);
+}
+
 void check_frame(const std::shared_ptr<const render::VideoTexture>& texture) {
   if (!texture || texture->levels.empty() || texture->levels.front().empty()) {
     throw std::invalid_argument("a keyed picture needs a frame");
@@ -125,9 +134,7 @@ float KeyedPicture::most_alpha(float u0, float v0, float u1, float v1) const {
 }
 
 float KeyedPicture::quick_alpha(float u, float v, float footprint_uv) const {
-  const float edge = 2 * footprint_uv;
-  const bool whole = u >= edge && u <= 1 - edge && v >= edge && v <= 1 - edge;
-  const float inside = whole && edge >= 0 ? 1 : share_inside(u, v, footprint_uv, aspect_);
+  const float inside = inside_of(u, v, footprint_uv, aspect_);
   if (!(inside > 0)) return 0;
   // The level whose texels are half to all of the width.
   const float texels = std::min(footprint_uv * side_texels_, 1e6F);
@@ -159,25 +166,26 @@ std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv)
 }
 
 TexelKeyedPicture::TexelKeyedPicture(std::shared_ptr<const render::VideoTexture> texture,
-                                     LitPlate plate,
+                                     std::shared_ptr<const LitPlate> plate,
                                      const KeyDials& dials)
     : texture_(std::move(texture)), plate_(std::move(plate)), dials_(dials) {
   check_frame(texture_);
-  if (texture_->levels.front().channels != 3 || texture_->width() != plate_.width ||
-      texture_->height() != plate_.height) {
+  if (!plate_ || texture_->levels.front().channels != 3 || texture_->width() != plate_->width ||
+      texture_->height() != plate_->height) {
     throw std::invalid_argument("a frame that is keyed by its texels must be of its plate's size");
   }
+  aspect_ = aspect_of(*texture_);
 }
 
 std::array<float, 4> TexelKeyedPicture::look_up(float u, float v, float footprint_uv) const {
-  const float inside = share_inside(u, v, footprint_uv, aspect_of(*texture_));
+  const float inside = inside_of(u, v, footprint_uv, aspect_);
   if (!(inside > 0)) return {};
   const std::array<float, 4> light = filtered(*texture_, u, v, footprint_uv);
   const auto texel = [](float place, int size) {
     return std::clamp(static_cast<int>(place * static_cast<float>(size)), 0, size - 1);
   };
-  std::array<float, 4> rgba = key_texel(plate_, dials_, texel(v, plate_.height),
-                                        texel(u, plate_.width), {light[0], light[1], light[2]});
+  std::array<float, 4> rgba = key_texel(*plate_, dials_, texel(v, plate_->height),
+                                        texel(u, plate_->width), {light[0], light[1], light[2]});
   for (float& value : rgba) value *= inside;
   return rgba;
 }

@@ -41,19 +41,20 @@ class KeyedPicture final : public render::LivePicture {
 // rays see; their alpha is not smoothed over frames.
 class TexelKeyedPicture final : public render::LivePicture {
  public:
-  // `plate` and `dials` as the keyer has them for this frame (Keyer::lit, Keyer::dials); what the
-  // dials point to must outlive the picture. Throws std::invalid_argument if there is no texture,
-  // it has no 3 channels, or its size is not the plate's.
+  // `plate` and `dials` as the keyer has them for this frame (Keyer::shared_lit, Keyer::dials);
+  // what the dials point to must outlive the picture. Throws std::invalid_argument if there is no
+  // texture or plate, the texture has no 3 channels, or its size is not the plate's.
   TexelKeyedPicture(std::shared_ptr<const render::VideoTexture> texture,
-                    LitPlate plate,
+                    std::shared_ptr<const LitPlate> plate,
                     const KeyDials& dials);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
 
  private:
   std::shared_ptr<const render::VideoTexture> texture_;
-  LitPlate plate_;
+  std::shared_ptr<const LitPlate> plate_;
   KeyDials dials_;
+  float aspect_ = 0;  // height over width
 };
 
 // Share that lies in the picture, of the square of look_up(). `aspect` is its height over width.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "compositing/background_subtraction.h"
+#include "compositing/key_glance.h"
 #include "compositing/key_pass.h"
 
 namespace compositing {
@@ -42,60 +43,6 @@ struct DifferenceFormula {
     return foreground_of<true>(c, p, matte, 0.0F);  // no colour to take out
   }
 };
-
-// The least code that is at least as bright, of light 0..1.
-const std::array<std::uint8_t, 4096>& codes_of(capture::Transfer transfer) {
-  static const auto all = [] {
-    std::array<std::array<std::uint8_t, 4096>, 4> tables{};
-    for (std::size_t t = 0; t < tables.size(); ++t) {
-      for (std::size_t i = 0; i < tables[t].size(); ++i) {
-        const double light = static_cast<double>(i) / static_cast<double>(tables[t].size() - 1);
-        const double code = 255 * capture::encode(static_cast<capture::Transfer>(t), light);
-        tables[t][i] = static_cast<std::uint8_t>(std::clamp(std::ceil(code), 0.0, 255.0));
-      }
-    }
-    return tables;
-  }();
-  return all[static_cast<std::size_t>(transfer)];
-}
-
-// Light within which eight pixels of a row are screen at a glance, for each 8x8 pixels: the primary
-// within a tenth of the plate, the others no brighter than it by more than noise. A thing that
-// covers less than a twentieth of each of eight pixels is given up.
-template <class Add>
-void bound_screen(const LitPlate& lit, const Add& add) {
-  constexpr float darkest = 0.955F, brightest = 1.15F, more = 0.03F;
-  const int blocks = (lit.width + 7) / 8;
-  for (int row = 0; row < lit.rows; row += 2) {
-    for (int block = 0; block < blocks; ++block) {
-      F4 low = load_four(lit.cell(row, std::min(2 * block, lit.columns - 1))), high = low;
-      for (int part = 1; part < 4; ++part) {
-        const F4 cell = load_four(lit.cell(std::min(row + part / 2, lit.rows - 1),
-                                           std::min(2 * block + part % 2, lit.columns - 1)));
-        low = cell < low ? cell : low;
-        high = cell > high ? cell : high;
-      }
-      LightBounds bounds;
-      if (low[3] > 0) {
-        const float slack = more / high[3];
-        bounds = {{low[0] * brightest, low[1] + slack, low[2] + slack}, high[0] * darkest};
-      }
-      add(bounds);
-    }
-  }
-}
-
-CodeBounds codes_of(const LightBounds& bounds,
-                    const std::array<std::uint8_t, 4096>& codes,
-                    const std::array<int, 3>& order) {
-  const auto code = [&](float light) {
-    return static_cast<std::uint32_t>(
-        codes[static_cast<std::size_t>(std::clamp(light, 0.0F, 1.0F) * 4095)]);
-  };
-  CodeBounds coded{0xFF000000U, code(bounds.least) << (8 * order[0])};
-  for (std::size_t c = 0; c < 3; ++c) coded.most |= code(bounds.most[c]) << (8 * order[c]);
-  return coded;
-}
 
 const KeyTable& shipped_table() {
   static const KeyTable table(shipped_key_table());
@@ -138,6 +85,17 @@ std::string_view name_of(KeyStatus status) {
   return names[static_cast<std::size_t>(status)];
 }
 
+void KeyedFrame::resize(int height, int width) {
+  const auto rows = static_cast<std::size_t>(height), across = static_cast<std::size_t>(width);
+  const std::size_t halves = 4 * rows * across, eights = (rows + 7) / 8 * 8 * ((across + 7) / 8);
+  const bool fits = image_.height == height && image_.width == width &&
+                    image_.pixels.size() == halves && written_.size() == eights;
+  if (fits) return;  // one that was moved from does not
+  image_ = {height, width, {}, 4};
+  image_.pixels.assign(halves, 0);
+  written_.assign(eights, 0);
+}
+
 Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
     : light_(std::move(plate), use_of(settings.method)),
       watch_(light_.plate()),
@@ -158,31 +116,54 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
             1 / (settings.core - settings.screen), settings.edge, settings.despill};
 }
 
+Keyer::Target Keyer::target(KeyedFrame& keyed) const {
+  keyed.resize(light_.lit().height, light_.lit().width);
+  return {keyed.image_.pixels.data(), keyed.written_.data()};
+}
+
+Keyer::Target Keyer::target(HalfImage& keyed) {
+  const auto height = static_cast<std::size_t>(light_.lit().height);
+  const auto width = static_cast<std::size_t>(light_.lit().width);
+  keyed.height = light_.lit().height, keyed.width = light_.lit().width, keyed.channels = 4;
+  keyed.pixels.assign(4 * height * width, 0);
+  scratch_.written.assign(((height + 7) / 8) * 8 * ((width + 7) / 8), 0);
+  return {keyed.pixels.data(), scratch_.written.data()};
+}
+
+KeyReport Keyer::key(const capture::Image& frame, KeyedFrame& keyed) {
+  light_.check_size(frame.height, frame.width);
+  return key_light(frame, target(keyed));
+}
+KeyReport Keyer::key(const CodedFrame& frame, KeyedFrame& keyed) {
+  light_.check_size(frame.height, frame.width);
+  return key_codes(frame, target(keyed));
+}
 KeyReport Keyer::key(const capture::Image& frame, HalfImage& keyed) {
+  light_.check_size(frame.height, frame.width);
+  return key_light(frame, target(keyed));
+}
+KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
+  light_.check_size(frame.height, frame.width);
+  return key_codes(frame, target(keyed));
+}
+
+KeyReport Keyer::key_light(const capture::Image& frame, const Target& target) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   const LightRows rows(frame, channels_of(light_.plate().colour));
   watch(rows);
   scratch_.bare_light.clear();
-  if (glances()) {
-    bound_screen(light_.lit(),
-                 [&](const LightBounds& bounds) { scratch_.bare_light.push_back(bounds); });
-  }
-  return report(sight, key_rows(rows, scratch_.bare_light, keyed));
+  if (glances()) bound_screen(light_.lit(), scratch_.bare_light);
+  return report(sight, key_rows(rows, scratch_.bare_light, target));
 }
 
-KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
+KeyReport Keyer::key_codes(const CodedFrame& frame, const Target& target) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   const auto order = channels_of(light_.plate().colour);
   const CodeRows rows(frame.rgba.data(), frame.width, order, light_polynomial(frame.transfer));
   watch(rows);
   scratch_.bare_codes.clear();
-  if (glances()) {
-    const auto& codes = codes_of(frame.transfer);
-    bound_screen(light_.lit(), [&](const LightBounds& bounds) {
-      scratch_.bare_codes.push_back(codes_of(bounds, codes, order));
-    });
-  }
-  return report(sight, key_rows(rows, scratch_.bare_codes, keyed));
+  if (glances()) bound_screen(light_.lit(), frame.transfer, order, scratch_.bare_codes);
+  return report(sight, key_rows(rows, scratch_.bare_codes, target));
 }
 
 // One frame may be shaken; a camera that was pushed stays where it is, also while nothing tells.
@@ -213,16 +194,15 @@ KeyReport Keyer::follow(const capture::Image& frame) {
 template <class Source>
 float Keyer::key_rows(const Source& source,
                       std::span<const typename Source::Bounds> bare,
-                      HalfImage& keyed) {
+                      const Target& target) {
   const LitPlate& lit = light_.lit();
   const std::size_t pixels =
       static_cast<std::size_t>(lit.height) * static_cast<std::size_t>(lit.width);
-  keyed.height = lit.height, keyed.width = lit.width, keyed.channels = 4;
-  keyed.pixels.resize(4 * pixels);
   const auto run = [&](const auto& formula) {
     using Pass = KeyPass<Source, std::decay_t<decltype(formula)>>;
     const float noise = settings_.smoothing * lit.sigma;
-    Pass pass(source, formula, {lit, masks_.garbage, masks_.core, noise, bare}, scratch_, keyed);
+    Pass pass(source, formula, {lit, masks_.garbage, masks_.core, noise, bare}, scratch_,
+              {target.pixels, target.written});
     return static_cast<float>(pass.run()) / static_cast<float>(pixels);
   };
   if (settings_.method == KeyMethod::difference) return run(DifferenceFormula{dials_});

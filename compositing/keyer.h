@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "compositing/clean_plate.h"
 #include "compositing/key_scratch.h"
 #include "compositing/key_texel.h"
+#include "compositing/keyed_frame.h"
 #include "compositing/plate_watch.h"
 
 namespace compositing {
@@ -68,13 +70,17 @@ class Keyer {
   Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks = {});
 
   // (height, width, 4): premultiplied, scene-linear; alpha 0..1, foreground at least 0, all finite.
-  // `keyed` keeps its memory. Throws std::invalid_argument naming both sizes if the frame's is not
-  // the plate's.
+  // `keyed` keeps its memory; of a KeyedFrame, only what was or is not 0 is written. Throws
+  // std::invalid_argument naming both sizes if the frame's is not the plate's.
+  KeyReport key(const capture::Image& frame, KeyedFrame& keyed);
+  KeyReport key(const CodedFrame& frame, KeyedFrame& keyed);
   KeyReport key(const capture::Image& frame, capture::HalfImage& keyed);
   KeyReport key(const CodedFrame& frame, capture::HalfImage& keyed);
 
-  // For keying texels by themselves (key_texel.h): the plate as lit in the newest frame.
+  // For keying texels by themselves (key_texel.h): the plate as lit in the newest frame; one that
+  // is held stays as it is.
   const LitPlate& lit() const { return light_.lit(); }
+  std::shared_ptr<const LitPlate> shared_lit() const { return light_.shared_lit(); }
   const KeyDials& dials() const { return dials_; }
 
   // Follows the light without keying, for those who key texel by texel.
@@ -84,10 +90,19 @@ class Keyer {
   void restart() { scratch_.has_previous = false; }
 
  private:
+  // Pixels of (height, width, 4), and which of them may not be 0, as a KeyedFrame has it.
+  struct Target {
+    capture::Half* pixels;
+    std::uint8_t* written;
+  };
+  Target target(KeyedFrame& keyed) const;
+  Target target(capture::HalfImage& keyed);
+  KeyReport key_light(const capture::Image& frame, const Target& target);
+  KeyReport key_codes(const CodedFrame& frame, const Target& target);
   template <class Source>
   float key_rows(const Source& source,
                  std::span<const typename Source::Bounds> bare,
-                 capture::HalfImage& keyed);
+                 const Target& target);
   bool glances() const;
   template <class Rows>
   void watch(const Rows& rows);

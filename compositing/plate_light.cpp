@@ -69,7 +69,8 @@ F8 sums_of(const std::array<F8, key_lanes>& v) {
          __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
 }
 
-F8 chosen(I8 which, F8 value) { return which ? value : F8{}; }
+F8 chosen(I8 which, F8 value) { return std::bit_cast<F8>(which & std::bit_cast<I8>(value)); }
+F8 size_of(F8 v) { return std::bit_cast<F8>(std::bit_cast<I8>(v) & 0x7FFFFFFF); }
 
 }  // namespace
 
@@ -133,7 +134,8 @@ PlateLight::PlateLight(CleanPlate plate, PlateUse use)
   const float share = static_cast<float>(deviation * std::max(count, 1.0) / std::max(light, 1e-3));
   tolerance_ = 0.035F + 3 * share;
   spread_ = 0.025F + 1.3F * share;
-  lit_ = bare_;
+  lit_ = plates_.lend();
+  *lit_ = bare_;
   gains_.assign(
       static_cast<std::size_t>(filler_.rows()) * static_cast<std::size_t>(filler_.columns()), 1.0F);
   blurred_ = gains_;
@@ -178,23 +180,30 @@ void PlateLight::prepare() {
         {before, std::min(before + 1, filler_.columns() - 1), place - static_cast<float>(before)});
   }
   gain_row_.resize(static_cast<std::size_t>(filler_.columns()));
+  cell_gains_.resize(across_.size());
+  over_gains_.assign(across_.size(), 1);
 }
 
 // The ratios at eight pixels from (y, x) on, to the nearest cell: 1 / first, and the others over
 // it.
-std::array<F8, 3> PlateLight::ratios_at(int y, int x) const {
-  const int last = bare_.columns - 1;
+inline std::array<F8, 3> PlateLight::ratios_at(int y, int x) const {
+  const float* row = &ratios_[4 * static_cast<std::size_t>(y / bare_.step) *
+                              static_cast<std::size_t>(bare_.columns)];
   const auto cell_at = [&](int column) {
-    return load_four(&ratios_[4 * (static_cast<std::size_t>(y / bare_.step) *
-                                       static_cast<std::size_t>(bare_.columns) +
-                                   static_cast<std::size_t>(std::min(column, last)))]);
+    return load_four(row + 4 * std::min(column, bare_.columns - 1));
   };
   std::array<F8, 3> ratios;
   if (bare_.step == 4) {
-    const F4 a = cell_at(x / 4), b = cell_at(x / 4 + 1);
-    ratios = {__builtin_shufflevector(a, b, 0, 0, 0, 0, 4, 4, 4, 4),
-              __builtin_shufflevector(a, b, 1, 1, 1, 1, 5, 5, 5, 5),
-              __builtin_shufflevector(a, b, 2, 2, 2, 2, 6, 6, 6, 6)};
+    F8 two;
+    if (x / 4 + 1 < bare_.columns) {
+      two = load_lanes(row + x);
+    } else {
+      const F4 last = cell_at(x / 4);
+      two = __builtin_shufflevector(last, last, 0, 1, 2, 3, 4, 5, 6, 7);
+    }
+    ratios = {__builtin_shufflevector(two, two, 0, 0, 0, 0, 4, 4, 4, 4),
+              __builtin_shufflevector(two, two, 1, 1, 1, 1, 5, 5, 5, 5),
+              __builtin_shufflevector(two, two, 2, 2, 2, 2, 6, 6, 6, 6)};
     return ratios;
   }
   const auto low = transposed(cell_at(x), cell_at(x + 1), cell_at(x + 2), cell_at(x + 3));
@@ -207,16 +216,18 @@ std::array<F8, 3> PlateLight::ratios_at(int y, int x) const {
 // What is seen of one cell, in lanes to be summed.
 struct PlateLight::CellSums {
   F8 alike{};  // pixels of the plate's colour that are lit by far not more nor less than it
-  F8 gain{}, gain_squared{}, off{}, bright{};  // of those
+  F8 gain{}, gain_squared{}, off{}, bright{};  // of those; how far off in units of the plate
   F8 dark{};                                   // pixels in deep shadow
 };
 
 template <class Rows>
-PlateLight::CellSums PlateLight::look_at(const Rows& source, int row, int column) const {
+[[gnu::always_inline]] inline PlateLight::CellSums PlateLight::look_at(const Rows& source,
+                                                                       int row,
+                                                                       int column) const {
   static_assert(cell == key_lanes);
   const int bottom = std::min(bare_.height, (row + 1) * cell);
   const int count = std::min(cell, bare_.width - column * cell);
-  const I8 inside = lanes_below(count) > 0.0F;
+  const I8 inside = count == cell ? ~I8{} : lanes_below(count) > 0.0F;
   const F8 one = all_of(1);
   CellSums sums;
   for (int y = row * cell + 1; y < bottom; y += rows_apart_) {
@@ -224,15 +235,16 @@ PlateLight::CellSums PlateLight::look_at(const Rows& source, int row, int column
     std::array<F8, 3> c;
     source.load(y, column * cell, count, c);
     const F8 q = c[0] * ratios[0];
-    const F8 d1 = c[1] - c[0] * ratios[1], d2 = c[2] - c[0] * ratios[2];
-    const F8 away = (d1 < 0.0F ? -d1 : d1) + (d2 < 0.0F ? -d2 : d2);
+    const F8 d1 = less_times(c[1], c[0], ratios[1]), d2 = less_times(c[2], c[0], ratios[2]);
+    const F8 away = size_of(d1) + size_of(d2);
     const I8 coloured = (away < tolerance_ * c[0]) & inside;
     const I8 alike = coloured & (q > least_gain) & (q < most_gain);
+    const F8 gain = chosen(alike, q);
     sums.dark += chosen(coloured & (q > black) & (q < deep), one);
     sums.alike += chosen(alike, one);
-    sums.gain += chosen(alike, q);
-    sums.gain_squared += chosen(alike, q * q);
-    sums.off += chosen(alike, away / c[0]);
+    sums.gain += gain;
+    sums.gain_squared = times_plus(gain, gain, sums.gain_squared);
+    sums.off += chosen(alike, away * ratios[0]);
     sums.bright += chosen(alike & (c[0] >= clipped_from), one);
   }
   return sums;
@@ -251,18 +263,18 @@ PlateSight PlateLight::measure(const Rows& source) {
       const auto bytes = static_cast<std::size_t>(cells) * sizeof(float);
       F8 pixels{};
       std::memcpy(&pixels, &pixels_[at], bytes);
-      std::array<F8, key_lanes> alike{}, gain{}, squared{}, away{}, bright{};
-      for (int i = 0; i < cells; ++i) {
-        if (!(pixels[i] > 0)) continue;
+      std::array<F8, key_lanes> alike, gain, squared, away, bright;
+      for (int i = 0; i < key_lanes; ++i) {
+        CellSums sums;
+        if (i < cells && pixels[i] > 0) sums = look_at(source, row, first + i);
         const auto k = static_cast<std::size_t>(i);
-        const CellSums sums = look_at(source, row, first + i);
         alike[k] = sums.alike, gain[k] = sums.gain, squared[k] = sums.gain_squared;
         away[k] = sums.off, bright[k] = sums.bright;
         dark += sums.dark;
       }
       const F8 n = sums_of(alike), zero{}, one = all_of(1);
       const F8 over = one / (n > 0.0F ? n : one);
-      const F8 mean = sums_of(gain) * over;
+      const F8 gains = sums_of(gain), mean = gains * over;
       const F8 variance = sums_of(squared) * over - mean * mean;
       const F8 most_deviation = 0.02F * mean + spread_;
       const I8 known = pixels > 0.0F;
@@ -272,7 +284,7 @@ PlateSight PlateLight::measure(const Rows& source) {
       std::memcpy(&filler_.weight(row, first), &weight, bytes);
       screen += chosen(known, one), all_known += most(pixels, zero), seen += weight;
       clipped += chosen(good, sums_of(bright) * over);
-      off += chosen(good, sums_of(away) * over);
+      off += chosen(good, sums_of(away) / most(gains, all_of(least_gain)));
     }
   }
   const auto share = [](F8 part, F8 of) {
@@ -325,12 +337,25 @@ PlateSight PlateLight::update_from(const Rows& rows, bool follow) {
     sight.gain = sum / static_cast<float>(gains_.size());
     if (follow) light_up();
   }
-  if (!follow) std::copy(bare_.cells.begin(), bare_.cells.end(), lit_.cells.begin());
+  if (!follow && gained_) {
+    renew();
+    std::copy(bare_.cells.begin(), bare_.cells.end(), lit_->cells.begin());
+    gained_ = false;
+  }
   return sight;
+}
+
+// A plate that may be written, for the one at hand is somebody's.
+void PlateLight::renew() {
+  if (lit_.use_count() == 1) return;
+  lit_ = plates_.lend();
+  if (lit_->cells.size() != bare_.cells.size()) *lit_ = bare_;
 }
 
 // Smooths the gain and puts it on the plate.
 void PlateLight::light_up() {
+  renew();
+  gained_ = true;
   const int rows = filler_.rows(), columns = filler_.columns();
   const auto width = static_cast<std::size_t>(columns);
   for (int row = 0; row < rows; ++row) {
@@ -353,9 +378,9 @@ void PlateLight::light_up() {
     float* to = &gains_[static_cast<std::size_t>(row) * width];
     for (int i = 0; i < columns; ++i) to[i] = 0.25F * (above[i] + below[i]) + 0.5F * here[i];
   }
-  const float reach = static_cast<float>(cell / lit_.step);  // of a gain's cell, in plate cells
-  const bool by_excess = lit_.use == PlateUse::screen;
-  for (int row = 0; row < lit_.rows; ++row) {
+  const float reach = static_cast<float>(cell / bare_.step);  // of a gain's cell, in plate cells
+  const bool by_excess = bare_.use == PlateUse::screen;
+  for (int row = 0; row < bare_.rows; ++row) {
     const float place = std::clamp((static_cast<float>(row) + 0.5F) / reach - 0.5F, 0.0F,
                                    static_cast<float>(rows - 1));
     const auto before = static_cast<int>(place);
@@ -363,15 +388,36 @@ void PlateLight::light_up() {
     const float* top = &gains_[static_cast<std::size_t>(before) * width];
     const float* low = &gains_[static_cast<std::size_t>(std::min(before + 1, rows - 1)) * width];
     for (std::size_t i = 0; i < width; ++i) gain_row_[i] = top[i] + down * (low[i] - top[i]);
+    const std::size_t cells = across_.size();
+    if (reach == 2) {
+      // Each cell of the gain lies over two of the plate, a quarter off its centre.
+      for (std::size_t i = 0; i + 1 < width; ++i) {
+        const float left = gain_row_[i], right = gain_row_[i + 1], quarter = 0.25F * (right - left);
+        cell_gains_[2 * i + 1] = left + quarter, cell_gains_[2 * i + 2] = right - quarter;
+      }
+      cell_gains_[0] = gain_row_[0];
+      if (cells == 2 * width) cell_gains_[cells - 1] = gain_row_[width - 1];
+    } else {
+      for (std::size_t i = 0; i < cells; ++i) {
+        const float left = gain_row_[static_cast<std::size_t>(across_[i].left)];
+        const float right = gain_row_[static_cast<std::size_t>(across_[i].right)];
+        cell_gains_[i] = left + across_[i].share * (right - left);
+      }
+    }
+    if (by_excess) {
+      for (std::size_t i = 0; i < cells; ++i) over_gains_[i] = 1 / cell_gains_[i];
+    }
     const float* from = bare_.cell(row, 0);
-    float* to = &lit_.cells[static_cast<std::size_t>(from - bare_.cells.data())];
-    for (const Between& between : across_) {
-      const float left = gain_row_[static_cast<std::size_t>(between.left)];
-      const float right = gain_row_[static_cast<std::size_t>(between.right)];
-      const float gain = left + between.share * (right - left);
-      const F4 lit = load_four(from) * F4{gain, gain, gain, by_excess ? 1 / gain : 1};
+    float* to = &lit_->cells[static_cast<std::size_t>(from - bare_.cells.data())];
+    std::size_t i = 0;
+    for (; i + 2 <= cells; i += 2, from += 8, to += 8) {
+      const float a = cell_gains_[i], b = cell_gains_[i + 1];
+      store_lanes(to, load_lanes(from) * F8{a, a, a, over_gains_[i], b, b, b, over_gains_[i + 1]});
+    }
+    if (i < cells) {
+      const float a = cell_gains_[i];
+      const F4 lit = load_four(from) * F4{a, a, a, over_gains_[i]};
       std::memcpy(to, &lit, sizeof lit);
-      from += 4, to += 4;
     }
   }
 }

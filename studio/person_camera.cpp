@@ -152,10 +152,10 @@ void PersonCameraFeed::key_frame(capture::Pool<render::VideoTexture>& textures) 
   key_ = compositing::name_of(report.status);
   moved_px_.reset();
   if (report.moved) moved_px_ = {report.shift.right_px, report.shift.down_px};
-  if (!by_texel_) return show(capture::to_float(keyed_));
+  if (!by_texel_) return show(capture::to_float(keyed_.image()));
   render::make_video_texture(image, *texture);
-  picture_ = std::make_shared<compositing::TexelKeyedPicture>(std::move(texture), keyer_->lit(),
-                                                              keyer_->dials());
+  picture_ = std::make_shared<compositing::TexelKeyedPicture>(
+      std::move(texture), keyer_->shared_lit(), keyer_->dials());
 }
 
 void PersonCameraFeed::look_for_person(const capture::Image& rgba) {

@@ -77,7 +77,7 @@ class PersonCameraFeed {
   capture::Time period_{}, time_{};
   std::shared_ptr<const capture::Image> image_, shown_;  // newest; that the picture was made from
   bool skipped_ = false;                                 // frames between these two
-  capture::HalfImage keyed_;
+  compositing::KeyedFrame keyed_;
   std::shared_ptr<const render::LivePicture> picture_;
   float confidence_ = 1;
   std::string_view key_ = "none";

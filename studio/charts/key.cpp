@@ -136,7 +136,7 @@ class KeyChart {
                         setting.name + ", " + setting.label);
       trials = judge(scenes_, setting.settings, i + 1 == all.size());
       compositing::Keyer keyer(compositing::average_plate(shots), setting.settings);
-      capture::HalfImage keyed;
+      compositing::KeyedFrame keyed;
       ChartPoint point;
       point.method = setting.name;
       point.label = setting.label;
