@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "capture/half.h"
+
 namespace compositing {
 namespace {
 
@@ -27,7 +29,7 @@ float share_inside(float u, float v, float footprint_uv, float aspect) {
 
 namespace {
 
-float aspect_of(const render::VideoTexture& texture) {
+float aspect_of(const KeyedTexture& texture) {
   return static_cast<float>(texture.height()) / static_cast<float>(texture.width());
 }
 
@@ -40,57 +42,27 @@ float inside_of(float u, float v, float footprint_uv, float aspect) {
   return whole ? 1.0F : share_inside(u, v, footprint_uv, aspect);
 }
 
-void check_frame(const std::shared_ptr<const render::VideoTexture>& texture) {
-  if (!texture || texture->levels.empty() || texture->levels.front().empty()) {
+void check_frame(const std::shared_ptr<const KeyedTexture>& texture) {
+  if (!texture || texture->empty()) {
     throw std::invalid_argument("a keyed picture needs a frame");
   }
 }
 
-// Of 3 channels, the fourth is the share of the picture.
-std::array<float, 4> filtered(const render::VideoTexture& texture,
-                              float u,
-                              float v,
-                              float footprint_uv) {
-  std::array<float, 4> sum{};
-  std::array<render::VideoSample, render::most_video_samples> places;
-  const std::size_t count =
-      render::find_video_samples(texture.width(), texture.height(), u, v, footprint_uv, 0, places);
-  for (const render::VideoSample& place : std::span(places).first(count)) {
-    const capture::Image& level = texture.levels[place.level];
-    const auto channels = static_cast<std::size_t>(level.channels);
-    const float x = std::clamp(place.x, 0.0F, static_cast<float>(level.width - 1));
-    const float y = std::clamp(place.y, 0.0F, static_cast<float>(level.height - 1));
-    const auto x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-    const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
-    const int x1 = std::min(x0 + 1, level.width - 1), y1 = std::min(y0 + 1, level.height - 1);
-    const auto add = [&](int column, int row, float weight) {
-      const float* texel = &level.pixels[level.index(row, column)];
-      for (std::size_t c = 0; c < channels; ++c) sum[c] += weight * texel[c];
-      if (channels == 3) sum[3] += weight;
-    };
-    add(x0, y0, place.share * (1 - fx) * (1 - fy));
-    add(x1, y0, place.share * fx * (1 - fy));
-    add(x0, y1, place.share * (1 - fx) * fy);
-    add(x1, y1, place.share * fx * fy);
-  }
-  return sum;
-}
-
 }  // namespace
 
-KeyedPicture::KeyedPicture(std::shared_ptr<const render::VideoTexture> texture, bool bounded)
+KeyedPicture::KeyedPicture(std::shared_ptr<const KeyedTexture> texture, bool bounded)
     : texture_(std::move(texture)) {
   check_frame(texture_);
   side_texels_ =
       std::sqrt(static_cast<float>(texture_->width()) * static_cast<float>(texture_->height()));
   aspect_ = aspect_of(*texture_);
   if (!bounded) return;
-  const capture::Image& image = texture_->levels.front();
+  const capture::HalfImage& image = texture_->level(0);
   Bounds level{image.width, image.height, {}};
   level.most.assign(static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height),
                     255);
-  for (std::size_t i = 0; image.channels == 4 && i < level.most.size(); ++i) {
-    const float alpha = std::clamp(image.pixels[4 * i + 3], 0.0F, 1.0F);
+  for (std::size_t i = 0; i < level.most.size(); ++i) {
+    const float alpha = std::clamp(capture::float_from_half(image.pixels[4 * i + 3]), 0.0F, 1.0F);
     level.most[i] = static_cast<std::uint8_t>(std::ceil(alpha * 255));
   }
   bounds_.push_back(std::move(level));
@@ -140,8 +112,7 @@ float KeyedPicture::quick_alpha(float u, float v, float footprint_uv) const {
   const float texels = std::min(footprint_uv * side_texels_, 1e6F);
   std::size_t k = 0;
   if (texels >= 2) k = static_cast<std::size_t>(std::bit_width(static_cast<unsigned>(texels))) - 1;
-  const capture::Image& level = texture_->levels[std::min(k, texture_->levels.size() - 1)];
-  if (level.channels != 4) return inside;
+  const capture::HalfImage& level = texture_->level(std::min(k, texture_->levels() - 1));
   const auto last_x = static_cast<float>(level.width - 1);
   const auto last_y = static_cast<float>(level.height - 1);
   const float x = std::clamp(u * static_cast<float>(level.width) - 0.5F, 0.0F, last_x);
@@ -149,29 +120,30 @@ float KeyedPicture::quick_alpha(float u, float v, float footprint_uv) const {
   const auto x0 = static_cast<int>(x), y0 = static_cast<int>(y);
   const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
   const std::size_t right = x0 + 1 < level.width ? 4 : 0;
-  const float* upper = &level.pixels[level.index(y0, x0)] + 3;
-  const float* lower = &level.pixels[level.index(std::min(y0 + 1, level.height - 1), x0)] + 3;
-  const float above = upper[0] + fx * (upper[right] - upper[0]);
-  const float below = lower[0] + fx * (lower[right] - lower[0]);
+  const auto alpha = [](const capture::Half* at) { return capture::float_from_half(*at); };
+  const capture::Half* upper = &level.pixels[level.index(y0, x0)] + 3;
+  const capture::Half* lower =
+      &level.pixels[level.index(std::min(y0 + 1, level.height - 1), x0)] + 3;
+  const float above = alpha(upper) + fx * (alpha(upper + right) - alpha(upper));
+  const float below = alpha(lower) + fx * (alpha(lower + right) - alpha(lower));
   return std::clamp((above + fy * (below - above)) * inside, 0.0F, 1.0F);
 }
 
 std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv) const {
   const float inside = share_inside(u, v, footprint_uv, aspect_);
   if (!(inside > 0)) return {};
-  std::array<float, 4> rgba = filtered(*texture_, u, v, footprint_uv);
+  std::array<float, 4> rgba = texture_->filtered(u, v, footprint_uv);
   for (float& value : rgba) value = std::max(value * inside, 0.0F);
   rgba[3] = std::min(rgba[3], 1.0F);
   return rgba;
 }
 
-TexelKeyedPicture::TexelKeyedPicture(std::shared_ptr<const render::VideoTexture> texture,
+TexelKeyedPicture::TexelKeyedPicture(std::shared_ptr<const KeyedTexture> texture,
                                      std::shared_ptr<const LitPlate> plate,
                                      const KeyDials& dials)
     : texture_(std::move(texture)), plate_(std::move(plate)), dials_(dials) {
   check_frame(texture_);
-  if (!plate_ || texture_->levels.front().channels != 3 || texture_->width() != plate_->width ||
-      texture_->height() != plate_->height) {
+  if (!plate_ || texture_->width() != plate_->width || texture_->height() != plate_->height) {
     throw std::invalid_argument("a frame that is keyed by its texels must be of its plate's size");
   }
   aspect_ = aspect_of(*texture_);
@@ -180,7 +152,7 @@ TexelKeyedPicture::TexelKeyedPicture(std::shared_ptr<const render::VideoTexture>
 std::array<float, 4> TexelKeyedPicture::look_up(float u, float v, float footprint_uv) const {
   const float inside = inside_of(u, v, footprint_uv, aspect_);
   if (!(inside > 0)) return {};
-  const std::array<float, 4> light = filtered(*texture_, u, v, footprint_uv);
+  const std::array<float, 4> light = texture_->filtered(u, v, footprint_uv);
   const auto texel = [](float place, int size) {
     return std::clamp(static_cast<int>(place * static_cast<float>(size)), 0, size - 1);
   };

@@ -5,19 +5,18 @@
 #include <memory>
 #include <vector>
 
+#include "compositing/keyed_texture.h"
 #include "compositing/keyer.h"
 #include "render/live_picture.h"
-#include "render/video_texture.h"
 
 namespace compositing {
 
-// Of a texture of premultiplied foreground and alpha: keyed first, then filtered. A texture of 3
-// channels is opaque.
+// Of premultiplied foreground and alpha: keyed first, then filtered.
 class KeyedPicture final : public render::LivePicture {
  public:
   // `bounded`: most_alpha() says more than 1, which hulls (visual_hull.h) are quick by; takes about
   // a byte a texel. Throws std::invalid_argument if there is no texture or it is empty.
-  explicit KeyedPicture(std::shared_ptr<const render::VideoTexture> texture, bool bounded = false);
+  explicit KeyedPicture(std::shared_ptr<const KeyedTexture> texture, bool bounded = false);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
   // Bilinear in one level.
@@ -31,7 +30,7 @@ class KeyedPicture final : public render::LivePicture {
     std::vector<std::uint8_t> most;
   };
 
-  std::shared_ptr<const render::VideoTexture> texture_;
+  std::shared_ptr<const KeyedTexture> texture_;
   std::vector<Bounds> bounds_;  // by k
   float side_texels_ = 0;       // of a square of as many texels
   float aspect_ = 0;            // height over width
@@ -43,15 +42,15 @@ class TexelKeyedPicture final : public render::LivePicture {
  public:
   // `plate` and `dials` as the keyer has them for this frame (Keyer::shared_lit, Keyer::dials);
   // what the dials point to must outlive the picture. Throws std::invalid_argument if there is no
-  // texture or plate, the texture has no 3 channels, or its size is not the plate's.
-  TexelKeyedPicture(std::shared_ptr<const render::VideoTexture> texture,
+  // texture or plate, or its size is not the plate's.
+  TexelKeyedPicture(std::shared_ptr<const KeyedTexture> texture,
                     std::shared_ptr<const LitPlate> plate,
                     const KeyDials& dials);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
 
  private:
-  std::shared_ptr<const render::VideoTexture> texture_;
+  std::shared_ptr<const KeyedTexture> texture_;
   std::shared_ptr<const LitPlate> plate_;
   KeyDials dials_;
   float aspect_ = 0;  // height over width

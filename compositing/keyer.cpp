@@ -85,17 +85,6 @@ std::string_view name_of(KeyStatus status) {
   return names[static_cast<std::size_t>(status)];
 }
 
-void KeyedFrame::resize(int height, int width) {
-  const auto rows = static_cast<std::size_t>(height), across = static_cast<std::size_t>(width);
-  const std::size_t halves = 4 * rows * across, eights = (rows + 7) / 8 * 8 * ((across + 7) / 8);
-  const bool fits = image_.height == height && image_.width == width &&
-                    image_.pixels.size() == halves && written_.size() == eights;
-  if (fits) return;  // one that was moved from does not
-  image_ = {height, width, {}, 4};
-  image_.pixels.assign(halves, 0);
-  written_.assign(eights, 0);
-}
-
 Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
     : light_(std::move(plate), use_of(settings.method)),
       watch_(light_.plate()),

@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
 #include "capture/half.h"
 #include "capture/rgbe.h"
+#include "render/area_cover.h"
 #include "render/cell_transport.h"
 #include "render/environment.h"
 #include "render/texture.h"
@@ -98,35 +101,34 @@ void size_image(capture::Image& image, int height, int width, int channels) {
                       static_cast<std::size_t>(channels));
 }
 
-// Target texel i of max(1, n / 2) covers two source texels or, of odd sizes, three.
-struct Cover {
-  int first = 0, count = 1;
-  std::array<float, 3> weights{1, 0, 0};
-
-  Cover(int i, int n_source, int n_target) {
-    if (n_source == n_target) {
-      first = i;
-      return;
-    }
-    const double scale = static_cast<double>(n_source) / n_target;
-    const double from = i * scale, to = (i + 1) * scale;
-    first = static_cast<int>(from);
-    count = 0;
-    for (int k = first; k < n_source && k < to && count < 3; ++k) {
-      const double share = (std::min(to, k + 1.0) - std::max(from, static_cast<double>(k))) / scale;
-      weights[static_cast<std::size_t>(count++)] = static_cast<float>(share);
+// Of even sides: means of four, in the order of halve().
+template <std::size_t channels>
+void halve_even(const capture::Image& from, capture::Image& to) {
+  for (int y = 0; y < to.height; ++y) {
+    const float* upper = &from.pixels[from.index(2 * y, 0)];
+    const float* lower = &from.pixels[from.index(2 * y + 1, 0)];
+    float* target = &to.pixels[to.index(y, 0)];
+    for (int x = 0; x < to.width; ++x, upper += 2 * channels, lower += 2 * channels) {
+      for (std::size_t c = 0; c < channels; ++c) {
+        const float left = upper[c] + lower[c];
+        const float right = upper[c + channels] + lower[c + channels];
+        *target++ = 0.25F * (left + right);
+      }
     }
   }
-};
+}
 
 void halve(const capture::Image& from, capture::Image& to) {
   size_image(to, std::max(1, from.height / 2), std::max(1, from.width / 2), from.channels);
-  std::vector<Cover> columns;
+  if (from.width % 2 == 0 && from.height % 2 == 0) {
+    return from.channels == 3 ? halve_even<3>(from, to) : halve_even<4>(from, to);
+  }
+  std::vector<AreaCover> columns;
   for (int x = 0; x < to.width; ++x) columns.emplace_back(x, from.width, to.width);
   const auto channels = static_cast<std::size_t>(from.channels);
   std::vector<float> row(static_cast<std::size_t>(from.width) * channels);
   for (int y = 0; y < to.height; ++y) {
-    const Cover rows(y, from.height, to.height);
+    const AreaCover rows(y, from.height, to.height);
     std::ranges::fill(row, 0.0F);
     for (int j = 0; j < rows.count; ++j) {
       const float weight = rows.weights[static_cast<std::size_t>(j)];
@@ -134,7 +136,7 @@ void halve(const capture::Image& from, capture::Image& to) {
       for (std::size_t i = 0; i < row.size(); ++i) row[i] += weight * texels[i];
     }
     float* target = &to.pixels[to.index(y, 0)];
-    for (const Cover& column : columns) {
+    for (const AreaCover& column : columns) {
       const float* texel = &row[static_cast<std::size_t>(column.first) * channels];
       for (std::size_t c = 0; c < channels; ++c) {
         float sum = 0;
@@ -149,15 +151,13 @@ void halve(const capture::Image& from, capture::Image& to) {
 
 // What no light can be is 0; then the other levels.
 void finish(VideoTexture& texture) {
-  texture.not_numbers = 0;
+  std::int64_t numbers = 0;
   for (float& value : texture.levels.front().pixels) {
-    if (std::isfinite(value)) {
-      value = std::clamp(value, -brightest_radiance, brightest_radiance);
-    } else {
-      value = 0;
-      ++texture.not_numbers;
-    }
+    const bool is_number = std::abs(value) <= std::numeric_limits<float>::max();
+    value = is_number ? std::clamp(value, -brightest_radiance, brightest_radiance) : 0;
+    numbers += is_number;
   }
+  texture.not_numbers = std::ssize(texture.levels.front().pixels) - numbers;
   std::size_t count = 1;
   while (texture.levels[count - 1].width > 1 || texture.levels[count - 1].height > 1) {
     if (texture.levels.size() == count) texture.levels.emplace_back();

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "capture/half.h"
 #include "compositing/keyed_picture.h"
 #include "compositing/person_box.h"
 #include "studio/clean_plates.h"
@@ -47,15 +48,21 @@ compositing::KeyMasks masks_of(const KeyChoice& key, int width, int height) {
   return masks;
 }
 
-// Alpha of a keyed picture of (height, width, 4), area-averaged `shrink` times smaller.
-capture::Image matte_of(const capture::Image& rgba, int shrink) {
+// Alpha of a keyed picture, area-averaged `shrink` times smaller.
+capture::Image matte_of(const compositing::KeyedFrame& keyed, int shrink) {
+  constexpr int run = compositing::KeyedFrame::run;
+  const capture::HalfImage& rgba = keyed.image();
   capture::Image matte =
       capture::make_image(std::max(1, rgba.height / shrink), std::max(1, rgba.width / shrink), 1);
   const float part = 1 / static_cast<float>(shrink * shrink);
-  for (int y = 0; y < matte.height * shrink; ++y) {
-    for (int x = 0; x < matte.width * shrink; ++x) {
-      if (y < rgba.height && x < rgba.width) {
-        matte.at(y / shrink, x / shrink) += part * rgba.at(y, x, 3);
+  const int height = std::min(matte.height * shrink, rgba.height);
+  const int width = std::min(matte.width * shrink, rgba.width);
+  for (int y = 0; y < height; ++y) {
+    for (int first = 0; first < width; first += run) {
+      if (!keyed.has_any(y, first)) continue;
+      for (int x = first; x < std::min(first + run, width); ++x) {
+        matte.at(y / shrink, x / shrink) +=
+            part * capture::float_from_half(rgba.pixels[rgba.index(y, x, 3)]);
       }
     }
   }
@@ -79,8 +86,7 @@ Feet enlarged(Feet feet, int shrink) {
 
 std::shared_ptr<const render::LivePicture> clear_picture() {
   capture::Image clear = capture::make_image(1, 1, 4);
-  return std::make_shared<compositing::KeyedPicture>(
-      std::make_shared<render::VideoTexture>(render::make_video_texture(clear)));
+  return std::make_shared<compositing::KeyedPicture>(compositing::make_keyed_texture(clear));
 }
 
 PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
@@ -129,40 +135,45 @@ void PersonCameraFeed::advance(capture::Time time) {
   time_ = newest.time;
 }
 
-bool PersonCameraFeed::show(capture::Pool<render::VideoTexture>& textures) {
+bool PersonCameraFeed::show(capture::Pool<compositing::KeyedTexture>& textures) {
   if (image_ == shown_) return false;
   key_frame(textures);
   shown_ = image_;
   return true;
 }
 
-void PersonCameraFeed::key_frame(capture::Pool<render::VideoTexture>& textures) {
+void PersonCameraFeed::key_frame(capture::Pool<compositing::KeyedTexture>& textures) {
   const capture::Image& image = *image_;
-  auto texture = textures.lend();
-  const auto show = [&](const capture::Image& rgba) {
-    render::make_video_texture(rgba, *texture);
-    picture_ = std::make_shared<compositing::KeyedPicture>(std::move(texture), bounded_);
-    if (rgba.channels == 4) look_for_person(rgba);
-  };
-  if (!keyer_) return show(image);
+  const auto texture = textures.lend();
+  if (!keyer_) {
+    texture->take(image);
+    if (image.channels == 4) look_for_person(texture->frame());
+    picture_ = std::make_shared<compositing::KeyedPicture>(texture, bounded_);
+    return;
+  }
   if (std::exchange(skipped_, false)) keyer_->restart();
   const compositing::KeyReport report =
-      by_texel_ ? keyer_->follow(image) : keyer_->key(image, keyed_);
+      by_texel_ ? keyer_->follow(image) : keyer_->key(image, texture->frame());
   confidence_ = report.confidence;
   key_ = compositing::name_of(report.status);
   moved_px_.reset();
   if (report.moved) moved_px_ = {report.shift.right_px, report.shift.down_px};
-  if (!by_texel_) return show(capture::to_float(keyed_.image()));
-  render::make_video_texture(image, *texture);
-  picture_ = std::make_shared<compositing::TexelKeyedPicture>(
-      std::move(texture), keyer_->shared_lit(), keyer_->dials());
+  if (by_texel_) {
+    texture->take(image);
+    picture_ = std::make_shared<compositing::TexelKeyedPicture>(texture, keyer_->shared_lit(),
+                                                                keyer_->dials());
+    return;
+  }
+  texture->finish();
+  look_for_person(texture->frame());
+  picture_ = std::make_shared<compositing::KeyedPicture>(texture, bounded_);
 }
 
-void PersonCameraFeed::look_for_person(const capture::Image& rgba) {
+void PersonCameraFeed::look_for_person(const compositing::KeyedFrame& keyed) {
   if (!settings_.lens) return;
-  const int longer = std::max(rgba.width, rgba.height);
+  const int longer = std::max(keyed.image().height, keyed.image().width);
   const int shrink = std::max(1, (longer + matte_side - 1) / matte_side);
-  const capture::Image matte = matte_of(rgba, shrink);
+  const capture::Image matte = matte_of(keyed, shrink);
   has_matte_ = true;
   feet_ = enlarged(compositing::find_feet(matte), shrink);
   if (!bounded_) return;

@@ -10,9 +10,9 @@
 #include "capture/half.h"
 #include "capture/pool.h"
 #include "compositing/feet.h"
+#include "compositing/keyed_texture.h"
 #include "compositing/keyer.h"
 #include "render/live_picture.h"
-#include "render/video_texture.h"
 #include "studio/set.h"
 #include "studio/timed_source.h"
 
@@ -49,7 +49,7 @@ class PersonCameraFeed {
   std::optional<std::string> take_note() { return source_->take_note(); }
 
   // Keys the newest frame, unless it is already. True if it did.
-  bool show(capture::Pool<render::VideoTexture>& textures);
+  bool show(capture::Pool<compositing::KeyedTexture>& textures);
 
   // What follows is of the frame that was shown last.
   const std::shared_ptr<const render::LivePicture>& picture() const { return picture_; }
@@ -65,8 +65,8 @@ class PersonCameraFeed {
   std::array<float, 4> outline() const;
 
  private:
-  void key_frame(capture::Pool<render::VideoTexture>& textures);
-  void look_for_person(const capture::Image& rgba);
+  void key_frame(capture::Pool<compositing::KeyedTexture>& textures);
+  void look_for_person(const compositing::KeyedFrame& keyed);
   std::array<float, 4> whole() const;
 
   PersonCamera settings_;
@@ -77,7 +77,6 @@ class PersonCameraFeed {
   capture::Time period_{}, time_{};
   std::shared_ptr<const capture::Image> image_, shown_;  // newest; that the picture was made from
   bool skipped_ = false;                                 // frames between these two
-  compositing::KeyedFrame keyed_;
   std::shared_ptr<const render::LivePicture> picture_;
   float confidence_ = 1;
   std::string_view key_ = "none";

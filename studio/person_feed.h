@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "capture/pool.h"
+#include "compositing/keyed_texture.h"
 #include "render/live_picture.h"
-#include "render/video_texture.h"
 #include "studio/set.h"
 
 namespace studio {
@@ -74,7 +74,7 @@ class PersonFeed {
   void place_billboard(Person& person, calibrate::Vec3 viewer);
 
   std::vector<std::shared_ptr<Person>> persons_;
-  capture::Pool<render::VideoTexture> textures_;
+  capture::Pool<compositing::KeyedTexture> textures_;
   std::vector<std::string> notes_;
 };
 

@@ -136,8 +136,8 @@ class HullChart {
                     std::max(film.box[2], fx + 1), std::max(film.box[3], fy + 1)};
       }
     }
-    film.picture = std::make_shared<compositing::KeyedPicture>(
-        std::make_shared<render::VideoTexture>(render::make_video_texture(rgba)), true);
+    film.picture =
+        std::make_shared<compositing::KeyedPicture>(compositing::make_keyed_texture(rgba), true);
     return films_.emplace_back(std::pair(degrees, time_s), std::move(film)).second;
   }
 

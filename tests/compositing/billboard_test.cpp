@@ -31,8 +31,7 @@ std::shared_ptr<const KeyedPicture> picture_from(int w, int h, F&& rgba_at) {
       for (int c = 0; c < 4; ++c) image.at(y, x, c) = rgba[static_cast<std::size_t>(c)];
     }
   }
-  return std::make_shared<KeyedPicture>(
-      std::make_shared<render::VideoTexture>(render::make_video_texture(image)));
+  return std::make_shared<KeyedPicture>(make_keyed_texture(image));
 }
 
 // A soft-edged figure: a head and a body, of two colours.
@@ -306,8 +305,7 @@ TEST(KeyedPicture, HasNoAlphaBeyondItsBound) {
     const auto y = static_cast<int>(52 * one(random)), x = static_cast<int>(90 * one(random));
     for (int c = 0; c < 4; ++c) image.at(y, x, c) = one(random);
   }
-  const KeyedPicture picture(
-      std::make_shared<render::VideoTexture>(render::make_video_texture(image)), true);
+  const KeyedPicture picture(make_keyed_texture(image), true);
   int useful = 0;
   for (int i = 0; i < 20000; ++i) {
     const float u = 1.2F * one(random) - 0.1F, v = 1.2F * one(random) - 0.1F;

@@ -178,8 +178,7 @@ TEST(BounceLampsInAPicture, PassLivePictures) {
   const auto whole = [](float alpha) {
     capture::Image image = capture::make_image(8, 4, 4);
     std::ranges::fill(image.pixels, alpha);
-    return std::make_shared<KeyedPicture>(
-        std::make_shared<render::VideoTexture>(render::make_video_texture(image)));
+    return std::make_shared<KeyedPicture>(make_keyed_texture(image));
   };
   MadeShot shot = shot_of(shelter(false), 32);
   const render::Scene solid(scene, {whole(1)});

@@ -38,8 +38,7 @@ BillboardCamera camera_at(double degrees, double distance_m = 3.6, double up_m =
 }
 
 std::shared_ptr<const KeyedPicture> picture_of(const capture::Image& rgba) {
-  return std::make_shared<KeyedPicture>(
-      std::make_shared<render::VideoTexture>(render::make_video_texture(rgba)), true);
+  return std::make_shared<KeyedPicture>(make_keyed_texture(rgba), true);
 }
 std::shared_ptr<const KeyedPicture> even_picture(std::array<float, 4> rgba) {
   capture::Image image = capture::make_image(height, width, 4);

@@ -1,0 +1,141 @@
+// Levels of keyed frames, and look-ups between them.
+#include "compositing/keyed_texture.h"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <span>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "capture/half.h"
+#include "compositing/keyer.h"
+#include "compositing/made_clip.h"
+#include "render/video_texture.h"
+
+namespace compositing {
+namespace {
+
+capture::Image random_picture(int height, int width, int channels, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> one(0, 1);
+  capture::Image image = capture::make_image(height, width, channels);
+  for (float& value : image.pixels) value = one(random);
+  return image;
+}
+
+float value_at(const capture::HalfImage& level, int y, int x, int c) {
+  return capture::float_from_half(level.pixels[level.index(y, x, c)]);
+}
+
+// The same light, as render's textures have it.
+std::array<float, 4> reference(const render::VideoTexture& texture, float u, float v, float wide) {
+  std::array<render::VideoSample, render::most_video_samples> places;
+  const std::size_t count =
+      render::find_video_samples(texture.width(), texture.height(), u, v, wide, 0, places);
+  std::array<float, 4> sum{};
+  for (const render::VideoSample& place : std::span(places).first(count)) {
+    const capture::Image& level = texture.levels[place.level];
+    const float x = std::clamp(place.x, 0.0F, static_cast<float>(level.width - 1));
+    const float y = std::clamp(place.y, 0.0F, static_cast<float>(level.height - 1));
+    for (int j = 0; j < level.height; ++j) {
+      for (int i = 0; i < level.width; ++i) {
+        const float near_x = std::max(0.0F, 1 - std::abs(x - static_cast<float>(i)));
+        const float near_y = std::max(0.0F, 1 - std::abs(y - static_cast<float>(j)));
+        for (int c = 0; c < 4; ++c) {
+          sum[static_cast<std::size_t>(c)] += place.share * near_x * near_y * level.at(j, i, c);
+        }
+      }
+    }
+  }
+  return sum;
+}
+
+TEST(KeyedTexture, HasTheMeansOfItsFrameAtEveryLevel) {
+  for (const auto& [height, width] : {std::pair(48, 64), {53, 91}, {1, 7}, {30, 1}, {1, 1}}) {
+    const capture::Image image = random_picture(height, width, 4, 3);
+    const auto texture = make_keyed_texture(image);
+    const render::VideoTexture wanted = render::make_video_texture(image);
+    ASSERT_EQ(texture->levels(), wanted.levels.size());
+    for (std::size_t k = 0; k < wanted.levels.size(); ++k) {
+      const capture::Image& level = wanted.levels[k];
+      ASSERT_EQ(texture->level(k).width, level.width);
+      ASSERT_EQ(texture->level(k).height, level.height);
+      for (int y = 0; y < level.height; ++y) {
+        for (int x = 0; x < level.width; ++x) {
+          for (int c = 0; c < 4; ++c) {
+            ASSERT_NEAR(value_at(texture->level(k), y, x, c), level.at(y, x, c), 1e-3)
+                << width << "x" << height << " level " << k << ": " << x << " " << y;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(KeyedTexture, FiltersAsTheRendersTexturesDo) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> one(0, 1);
+  for (const auto& [height, width] : {std::pair(96, 64), {53, 91}, {3, 200}, {5, 4}}) {
+    const capture::Image image = random_picture(height, width, 4, 7);
+    const auto texture = make_keyed_texture(image);
+    const render::VideoTexture wanted = render::make_video_texture(image);
+    for (int i = 0; i < 3000; ++i) {
+      const float u = 1.2F * one(random) - 0.1F, v = 1.2F * one(random) - 0.1F;
+      const float wide = std::exp2(-9 * one(random));
+      const auto seen = texture->filtered(u, v, wide);
+      const auto truth = reference(wanted, u, v, wide);
+      for (std::size_t c = 0; c < 4; ++c) {
+        ASSERT_NEAR(seen[c], truth[c], 1e-3)
+            << width << "x" << height << ": " << u << " " << v << " wide " << wide;
+      }
+    }
+  }
+}
+
+// Memory of frames before leaves no trace.
+TEST(KeyedTexture, ShowsNothingOfTheFramesThatItHeldBefore) {
+  const MadeClip clip(made_scene("plain"), 2, 96, 160);
+  std::vector<capture::Image> shots{light_of(clip.plate_shot(0)), light_of(clip.plate_shot(1))};
+  Keyer keyer(average_plate(shots), {}), same(average_plate(shots), {});
+  KeyedTexture again;
+  again.take(random_picture(96, 160, 3, 1));
+  for (int i = 0; i < 12; i += 3) {
+    const capture::Image frame = light_of(clip.frame(i).seen);
+    KeyedTexture fresh;
+    keyer.key(frame, again.frame());
+    same.key(frame, fresh.frame());
+    again.finish();
+    fresh.finish();
+    ASSERT_EQ(again.levels(), fresh.levels());
+    for (std::size_t k = 0; k < fresh.levels(); ++k) {
+      ASSERT_EQ(again.level(k).pixels, fresh.level(k).pixels) << "frame " << i << " level " << k;
+    }
+  }
+  again.take(random_picture(31, 17, 4, 1));
+  EXPECT_EQ(again.level(1).width, 8);
+}
+
+TEST(KeyedTexture, TakesPicturesThatAreNotKeyed) {
+  capture::Image opaque = random_picture(4, 6, 3, 9);
+  opaque.at(0, 0, 0) = std::numeric_limits<float>::quiet_NaN();
+  opaque.at(0, 0, 1) = -std::numeric_limits<float>::infinity();
+  opaque.at(0, 0, 2) = 1e9F;
+  const auto texture = make_keyed_texture(opaque);
+  EXPECT_EQ(value_at(texture->level(0), 0, 0, 0), 0);
+  EXPECT_EQ(value_at(texture->level(0), 0, 0, 1), 0);
+  EXPECT_EQ(value_at(texture->level(0), 0, 0, 2), capture::half_max);
+  for (std::size_t k = 0; k < texture->levels(); ++k) {
+    const capture::HalfImage& level = texture->level(k);
+    for (int y = 0; y < level.height; ++y) {
+      for (int x = 0; x < level.width; ++x) EXPECT_EQ(value_at(level, y, x, 3), 1);
+    }
+  }
+  EXPECT_THROW(make_keyed_texture(capture::make_image(4, 4, 1)), std::invalid_argument);
+  EXPECT_THROW(make_keyed_texture({}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace compositing
