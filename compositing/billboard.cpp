@@ -120,16 +120,21 @@ class BillboardShader final : public render::Shader {
     return block.lit != 0 ? Layer{{}, passed, shown} : Layer{shown, passed};
   }
 
-  // A hole is where the camera does not see; how clear a place is within its picture depends on how
-  // wide the ray is, and is left to shade().
+  // A hole is where the camera does not see, and where its picture is clear as far as the ray is
+  // wide: most of it, around a person. The rest is left to shade().
   Vec3f transmittance(const ShadeContext& context,
                       const Material& material,
                       const HitPoint& hit,
                       Vec3f,
-                      RayKind kind) const override {
+                      RayKind kind,
+                      float footprint_m) const override {
     const Block block = block_of(material);
-    if (kind == RayKind::shadow) return grey(1 - seen(context, material, block, hit, 0)[3]);
-    return find(material, block, hit) ? Vec3f{} : grey(1);
+    const auto at = find(material, block, hit);
+    if (!at) return grey(1);
+    const render::LivePicture& picture = *context.pictures[block.picture];
+    const auto [u, v] = at->place;
+    if (picture.is_clear(u, v, footprint_m * at->uv_per_metre)) return grey(1);
+    return kind == RayKind::shadow ? grey(1 - picture.look_up(u, v, 0)[3]) : Vec3f{};
   }
 };
 

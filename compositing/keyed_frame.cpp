@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <span>
 
@@ -21,6 +22,13 @@ void KeyedFrame::resize(int height, int width) {
   image_ = {height, width, {}, 4};
   image_.pixels.assign(halves, 0);
   written_.assign(bytes, 0);
+}
+
+bool KeyedFrame::has_any_in_block(int row, int column) const {
+  std::uint64_t rows;
+  static_assert(sizeof rows == run);
+  std::memcpy(&rows, &written_[byte_at(row * run, column * run)], sizeof rows);
+  return rows != 0;
 }
 
 void KeyedFrame::set(const capture::Image& picture) {
@@ -48,7 +56,13 @@ void KeyedFrame::set(const capture::Image& picture) {
     capture::halves_from_floats(std::span(rgba).first(4 * n), &image_.pixels[4 * first]);
   }
   for (int y = 0; y < picture.height; ++y) {
-    for (int x = 0; x < picture.width; x += run) written_[byte_at(y, x)] = 1;
+    for (int x = 0; x < picture.width; x += run) {
+      const auto halves =
+          std::span(image_.pixels)
+              .subspan(image_.index(y, x),
+                       4 * static_cast<std::size_t>(std::min(run, picture.width - x)));
+      written_[byte_at(y, x)] = std::ranges::any_of(halves, [](auto half) { return half != 0; });
+    }
   }
 }
 

@@ -23,6 +23,9 @@ class KeyedFrame {
   // Whether any of the pixels x to x + run - 1 of a row may not be 0; x is a multiple of `run`.
   bool has_any(int y, int x) const { return written_[byte_at(y, x)] != 0; }
 
+  // The same of a block of run x run pixels, by its column and row.
+  bool has_any_in_block(int row, int column) const;
+
   // A picture that is not keyed: of 3 channels, opaque, or 4. Values that are not finite become 0,
   // those beyond half's range its largest.
   void set(const capture::Image& picture);

@@ -19,6 +19,9 @@ class KeyedPicture final : public render::LivePicture {
   explicit KeyedPicture(std::shared_ptr<const KeyedTexture> texture, bool bounded = false);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
+  bool is_clear(float u, float v, float footprint_uv) const override {
+    return texture_->is_clear(u, v, footprint_uv);
+  }
   // Bilinear in one level.
   float quick_alpha(float u, float v, float footprint_uv) const override;
   float most_alpha(float u0, float v0, float u1, float v1) const override;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
 
@@ -169,7 +170,58 @@ Four filtered_in(const HalfImage& level, float left, float right, float top, flo
 
 }  // namespace
 
+// Distances on a grid where steps go to all eight neighbours: exact in two passes (Rosenfeld and
+// Pfaltz, Journal of the ACM 13, 1966).
+void KeyedTexture::find_bare() {
+  constexpr int run = KeyedFrame::run;
+  const int rows = (height() + run - 1) / run, columns = (width() + run - 1) / run;
+  const auto at = [&](int row, int column) -> std::uint8_t& {
+    return bare_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                 static_cast<std::size_t>(column)];
+  };
+  bare_.resize(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns));
+  const auto nearer = [&](int row, int column, std::initializer_list<std::array<int, 2>> steps) {
+    int least = at(row, column);
+    for (const auto& [down, right] : steps) {
+      const int y = row + down, x = column + right;
+      if (y < 0 || y >= rows || x < 0 || x >= columns) continue;
+      least = std::min(least, at(y, x) + 1);
+    }
+    at(row, column) = static_cast<std::uint8_t>(least);
+  };
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      at(row, column) = frame_.has_any_in_block(row, column) ? 0 : 255;
+      nearer(row, column, {{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}});
+    }
+  }
+  for (int row = rows - 1; row >= 0; --row) {
+    for (int column = columns - 1; column >= 0; --column) {
+      nearer(row, column, {{1, 1}, {1, 0}, {1, -1}, {0, 1}});
+    }
+  }
+}
+
+bool KeyedTexture::is_clear(float u, float v, float footprint_uv) const {
+  constexpr int run = KeyedFrame::run;
+  const int columns = (width() + run - 1) / run;
+  const auto block = [](float place, int size) {
+    const float at = std::clamp(place, 0.0F, 1.0F) * static_cast<float>(size);
+    return std::min(static_cast<int>(at), size - 1) / run;
+  };
+  if (!(std::abs(u) < 1e6F && std::abs(v) < 1e6F)) return false;
+  const std::size_t here =
+      static_cast<std::size_t>(block(v, height())) * static_cast<std::size_t>(columns) +
+      static_cast<std::size_t>(block(u, width()));
+  const float side = std::sqrt(static_cast<float>(width()) * static_cast<float>(height()));
+  // Look-ups reach no further from their middle: a quarter of the footprint to their places, and
+  // from there one and a half texels of a level, less than .7 of it, or of odd sizes 1.4.
+  const float reach = 1.5F + 2.5F * footprint_uv * side;
+  return static_cast<float>((bare_[here] - 1) * run) >= reach;
+}
+
 void KeyedTexture::finish() {
+  find_bare();
   std::size_t k = 0;
   for (; level(k).width > 1 || level(k).height > 1; ++k) {
     if (coarser_.size() == k) coarser_.emplace_back();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -34,13 +35,19 @@ class KeyedTexture {
     return k == 0 ? frame_.image() : coarser_[k - 1];
   }
 
+  // Whether filtered() is all 0 here: not where the person is near.
+  bool is_clear(float u, float v, float footprint_uv) const;
   // Red, green, blue and alpha at (u, v), filtered over a square of `footprint_uv`, of the places
   // that render::find_video_samples() has.
   std::array<float, 4> filtered(float u, float v, float footprint_uv) const;
 
  private:
+  void find_bare();
+
   KeyedFrame frame_;
   std::vector<capture::HalfImage> coarser_;
+  // Of each 8x8 pixels: how many such blocks away the nearest is that is not bare, 0 to 255.
+  std::vector<std::uint8_t> bare_;
 };
 
 // One that took a picture.

@@ -246,7 +246,8 @@ class HullShader final : public render::Shader {
                       const Material&,
                       const HitPoint& hit,
                       Vec3f incoming,
-                      RayKind kind) const override {
+                      RayKind kind,
+                      float) const override {
     if (hit.back) return grey(1);
     if (kind != RayKind::shadow) return {};
     const auto& set_from_object = context.scene->instances[hit.instance].set_from_object;

@@ -85,7 +85,7 @@ void CellBaker::bake(const FrameContext& frame,
       statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays - rays_before;
 }
 
-void CellBaker::trace(int count, bool coherent, RayKind kind) {
+void CellBaker::trace(int count, bool coherent, RayKind kind, float cone_rad) {
   RayStream& s = stream_;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     s.far_m[i] = s.mask[i] ? ray_far : -1.0F;
@@ -101,6 +101,7 @@ void CellBaker::trace(int count, bool coherent, RayKind kind) {
                      s.mask.data(), static_cast<std::size_t>(count));
   }
   TraceContext context(*frame_->inputs.scene, kind, coherent);
+  context.cone_rad = cone_rad;
   RTCRayHitNp rays;
   rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
               s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
@@ -149,7 +150,7 @@ void CellBaker::trace_centres() {
       ++counting_[static_cast<std::size_t>(y * cell_size + x)].rays;
     }
   }
-  trace(cell_pixels, true, RayKind::camera);
+  trace(cell_pixels, true, RayKind::camera, frame_->pixel_angle * static_cast<float>(block_));
 }
 
 void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::uint32_t slot) {

@@ -119,7 +119,7 @@ class CellBaker final : public RaySink {
   bool is_inside(std::size_t k) const { return (inside_[k / 64] >> (k % 64) & 1) != 0; }
 
   // cell_baker.cpp
-  void trace(int count, bool coherent, RayKind kind);
+  void trace(int count, bool coherent, RayKind kind, float cone_rad);
   void set_camera_ray(int i, Vec3f v_cam);
   void set_point(ShadePoint& p, int i, std::uint32_t pixel, std::uint32_t slot);
   void set_camera_cone(ShadePoint& p, int i, float width_rad) const;

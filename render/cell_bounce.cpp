@@ -1,5 +1,6 @@
 // Rays that surfaces send on.
 #include <algorithm>
+#include <limits>
 
 #include "render/cell_baker.h"
 #include "render/embree_context.h"
@@ -43,7 +44,7 @@ void CellBaker::bounce() {
       stream_.near_m[i] = 0;
       stream_.mask[i] = sees_stand_ins(q.kind) ? mask_virtual | mask_stand_in : mask_virtual;
     }
-    trace(static_cast<int>(n), false, RayKind::reflection);
+    trace(static_cast<int>(n), false, RayKind::reflection, std::numeric_limits<float>::infinity());
     if (grid_) mark_passed(n);
     statistics_->secondary_rays += n;
     int count = 0;

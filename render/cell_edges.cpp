@@ -62,7 +62,7 @@ void CellBaker::trace_ring() {
   for (int x = -1; x <= cell_size; ++x) add(x, cell_size);
   for (int y = 0; y < cell_size; ++y) add(-1, y);
   for (int y = 0; y < cell_size; ++y) add(cell_size, y);
-  trace(count, true, RayKind::camera);
+  trace(count, true, RayKind::camera, frame_->pixel_angle);
   for (int i = 0; i < count; ++i) met_[place[static_cast<std::size_t>(i)]] = met_at(i);
 }
 
@@ -177,13 +177,13 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
 }
 
 void CellBaker::finish_further(int count) {
-  trace(count, true, RayKind::camera);
+  const float finer = 1 / std::sqrt(static_cast<float>(samples_each_));
+  trace(count, true, RayKind::camera, frame_->pixel_angle * finer);
   statistics_->primary_rays += static_cast<std::uint64_t>(count);
   int shaded = 0;
   std::size_t leaving = 0;
   std::array<std::uint16_t, stream_rays> pixel_of;
   std::size_t used = 0;
-  const float finer = 1 / std::sqrt(static_cast<float>(samples_each_));
   for (int i = 0; i < count; ++i) {
     const Further& f = further_[static_cast<std::size_t>(i)];
     if (counting_ && stream_.mask[static_cast<std::size_t>(i)]) ++counting_[f.pixel].rays;

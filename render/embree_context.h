@@ -1,6 +1,8 @@
 // Embree's ray context with ours behind it. Private to render: includes Embree.
 #pragma once
 
+#include <limits>
+
 #include <embree3/rtcore.h>
 
 #include "render/shader.h"
@@ -12,6 +14,7 @@ struct TraceContext {
   RTCIntersectContext context;
   const Scene* scene;
   RayKind kind = RayKind::camera;
+  float cone_rad = std::numeric_limits<float>::infinity();  // full angle of rays, if it is known
   bool past_pictures = false;  // surfaces that show live pictures are not there
   // Shadow rays: per ray id, share of light so far. Null: any surface that is not a hole blocks.
   float* transmittance_r = nullptr;

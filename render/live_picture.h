@@ -17,6 +17,11 @@ class LivePicture {
   virtual float quick_alpha(float u, float v, float footprint_uv) const {
     return look_up(u, v, footprint_uv)[3];
   }
+  // Whether look_up() has nothing at all here: said only where that is quick to tell.
+  virtual bool is_clear(float u, float v, float footprint_uv) const {
+    static_cast<void>(u), static_cast<void>(v), static_cast<void>(footprint_uv);
+    return false;
+  }
   // What no alpha in the rectangle from (u0, v0) to (u1, v1) exceeds, whatever the footprint of a
   // look-up whose square, widened three times, lies in it. 1 where it would take long to say.
   virtual float most_alpha(float u0, float v0, float u1, float v1) const {

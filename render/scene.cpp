@@ -170,7 +170,8 @@ Scene::Impl::FilteredRay Scene::Impl::ray_of(const RTCFilterFunctionNArguments* 
 
 Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
                           unsigned lane,
-                          RayKind kind) const {
+                          RayKind kind,
+                          float cone_rad) const {
   const unsigned n = args->N;
   const Vec3f incoming = ray_of(args, lane).direction;
   const HitPoint hit =
@@ -178,8 +179,10 @@ Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
                 RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
                 RTCHitN_v(args->hit, n, lane), incoming);
   const ShadeContext context{&description, nullptr, pictures, prepared};
+  const float slant = std::max(std::abs(dot(incoming, hit.geometric_normal)), 1e-6F);
+  const float footprint_m = cone_rad * RTCRayN_tfar(args->ray, n, lane) / slant;
   return compiled->shaders[hit.material]->transmittance(
-      context, description.materials[hit.material], hit, incoming, kind);
+      context, description.materials[hit.material], hit, incoming, kind, footprint_m);
 }
 
 // Whether a camera ray passes a real surface that hides nothing: it does where it meets something
@@ -227,7 +230,7 @@ void Scene::Impl::filter_closest(const RTCFilterFunctionNArguments* args) {
   const bool past_picture = impl.is_past_picture(args);
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
-    if (past_picture || impl.passes(args, i, context.kind) == Vec3f{1, 1, 1} ||
+    if (past_picture || impl.passes(args, i, context.kind, context.cone_rad) == Vec3f{1, 1, 1} ||
         impl.stands_back(args, i)) {
       args->valid[i] = 0;
     }
@@ -249,7 +252,7 @@ void Scene::Impl::filter_any(const RTCFilterFunctionNArguments* args) {
     const std::uint32_t prim = RTCHitN_primID(args->hit, args->N, i);
     const std::uint32_t t = part.triangle_of_prim.empty() ? prim : part.triangle_of_prim[prim];
     const auto& anywhere = impl.compiled->shadow[material_of(mesh, t)];
-    const Vec3f share = anywhere ? *anywhere : impl.passes(args, i, RayKind::shadow);
+    const Vec3f share = anywhere ? *anywhere : impl.passes(args, i, RayKind::shadow, 0);
     if (share == Vec3f{}) continue;
     if (context.transmittance_r) {
       const unsigned id = RTCRayN_id(args->ray, args->N, i);

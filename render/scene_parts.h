@@ -223,7 +223,10 @@ struct Scene::Impl {
     Vec3f origin, direction;
   };
   FilteredRay ray_of(const RTCFilterFunctionNArguments* args, unsigned lane) const;
-  Vec3f passes(const RTCFilterFunctionNArguments* args, unsigned lane, RayKind kind) const;
+  Vec3f passes(const RTCFilterFunctionNArguments* args,
+               unsigned lane,
+               RayKind kind,
+               float cone_rad) const;
   bool is_past_picture(const RTCFilterFunctionNArguments* args) const;
   bool stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const;
 };

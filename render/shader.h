@@ -181,14 +181,16 @@ class Shader {
     return std::nullopt;
   }
   // RGB share of light that passes straight through here. For `camera`, `reflection`, `difference`
-  // rays a hole is where it is (1, 1, 1); anything less is left to shade().
+  // rays a hole is where it is (1, 1, 1); anything less is left to shade(). `footprint_m`: no less
+  // than the width of surface that the ray stands for; 0 of shadow rays, infinite if not known.
   virtual Vec3f transmittance(const ShadeContext& context,
                               const Material& material,
                               const HitPoint& hit,
                               Vec3f incoming,
-                              RayKind kind) const {
+                              RayKind kind,
+                              float footprint_m) const {
     static_cast<void>(context), static_cast<void>(material), static_cast<void>(hit);
-    static_cast<void>(incoming), static_cast<void>(kind);
+    static_cast<void>(incoming), static_cast<void>(kind), static_cast<void>(footprint_m);
     return {0, 0, 0};
   }
 };

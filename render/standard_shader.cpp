@@ -69,7 +69,8 @@ class StandardShader final : public Shader {
                       const Material& material,
                       const HitPoint& hit,
                       Vec3f incoming,
-                      RayKind kind) const override {
+                      RayKind kind,
+                      float) const override {
     const StandardParameters parameters = block_of(material);
     if (parameters.alpha_cutoff > 0 &&
         standard_alpha(parameters, *context.scene, hit, 0) < parameters.alpha_cutoff) {

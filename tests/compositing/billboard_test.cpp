@@ -138,6 +138,53 @@ TEST(Billboard, LeavesThePlateItsBitsWhereItIsClear) {
   }
 }
 
+// Says of nothing that it is clear.
+class Unsure final : public render::LivePicture {
+ public:
+  explicit Unsure(std::shared_ptr<const LivePicture> picture) : picture_(std::move(picture)) {}
+  std::array<float, 4> look_up(float u, float v, float footprint_uv) const override {
+    return picture_->look_up(u, v, footprint_uv);
+  }
+
+ private:
+  std::shared_ptr<const LivePicture> picture_;
+};
+
+// A small figure in a wide picture, of which the most is clear.
+std::shared_ptr<const KeyedPicture> small_figure() {
+  return picture_from(320, 320, [](int x, int y) {
+    const float within = 40 - std::hypot(static_cast<float>(x) - 150, static_cast<float>(y) - 220);
+    const float alpha = std::clamp(0.5F + within / 4, 0.0F, 1.0F);
+    return std::array{0.6F * alpha, 0.3F * alpha, 0.1F * alpha, alpha};
+  });
+}
+
+// Rays that pass at once see what those see that are sent on, at any distance.
+TEST(Billboard, ShowsTheSameWhereItIsPassedAtOnce) {
+  const auto see = [&](std::shared_ptr<const render::LivePicture> picture, float away,
+                       bool furnished) {
+    render::SceneDescription scene = scene_with(make_billboard_material("person", {}));
+    if (furnished) furnish(scene, {0.9F, 1.4F}, {0.55F, -0.6F, 0.6F});
+    scene.instances[0].set_from_object = standing({0, away, 0}, 3, 3);
+    const MadeShot shot = shot_of(std::move(scene), {std::move(picture)});
+    render::FrameResult result;
+    render::render_frame(shot.inputs(), shot.job, shot.plate, result);
+    return result;
+  };
+  const capture::Image plate = capture::to_float(made_plate(height, width));
+  for (const float away : {0.0F, 40.0F}) {
+    const capture::Image seen = capture::to_float(see(small_figure(), away, true).rgba);
+    const capture::Image truth =
+        capture::to_float(see(std::make_shared<Unsure>(small_figure()), away, true).rgba);
+    const capture::Image mask = render::affected_mask(truth, plate);
+    EXPECT_LT(render::picture_error(seen, truth, mask).relative_rms, 0.01) << away;
+  }
+  const auto rays = [&](std::shared_ptr<const render::LivePicture> picture) {
+    return see(std::move(picture), 0, false).statistics.secondary_rays;
+  };
+  EXPECT_LT(rays(small_figure()), rays(std::make_shared<Unsure>(small_figure())) / 2);
+}
+
 // A person on a floor that catches the shadow, with a mirror behind and a glass ball in front.
 render::SceneDescription furnished(bool lit = false) {
   render::SceneDescription scene = scene_with(make_billboard_material("person", {.lit = lit}));

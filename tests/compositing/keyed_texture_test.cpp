@@ -118,6 +118,35 @@ TEST(KeyedTexture, ShowsNothingOfTheFramesThatItHeldBefore) {
   EXPECT_EQ(again.level(1).width, 8);
 }
 
+TEST(KeyedTexture, IsClearOnlyWhereALookUpFindsNothing) {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> one(0, 1);
+  for (const auto& [height, width] : {std::pair(270, 480), {307, 505}}) {
+    const MadeClip clip(made_scene("plain"), 2, height, width);
+    std::vector<capture::Image> shots{light_of(clip.plate_shot(0)), light_of(clip.plate_shot(1))};
+    Keyer keyer(average_plate(shots), {});
+    KeyedTexture texture;
+    keyer.key(light_of(clip.frame(4).seen), texture.frame());
+    texture.finish();
+    int clear = 0, bare = 0;
+    for (int i = 0; i < 40000; ++i) {
+      const float u = 1.4F * one(random) - 0.2F, v = 1.4F * one(random) - 0.2F;
+      const float wide = i % 4 == 0 ? 0 : std::exp2(-10 * one(random));
+      const auto rgba = texture.filtered(u, v, wide);
+      const bool nothing = rgba == std::array<float, 4>{};
+      bare += nothing && wide == 0;
+      if (!texture.is_clear(u, v, wide)) continue;
+      clear += wide == 0;
+      ASSERT_TRUE(nothing) << u << " " << v << " wide " << wide;
+    }
+    EXPECT_GT(clear, bare / 3);
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    for (const float wide : {nan, infinity}) EXPECT_FALSE(texture.is_clear(0.01F, 0.01F, wide));
+    for (const float at : {nan, infinity}) EXPECT_FALSE(texture.is_clear(at, 0.01F, 0));
+  }
+}
+
 TEST(KeyedTexture, TakesPicturesThatAreNotKeyed) {
   capture::Image opaque = random_picture(4, 6, 3, 9);
   opaque.at(0, 0, 0) = std::numeric_limits<float>::quiet_NaN();
