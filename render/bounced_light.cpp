@@ -492,6 +492,17 @@ Vec3f under(std::span<const Vec3f> light, std::span<const Vec3f> per_light) {
   return std::inner_product(per_light.begin(), per_light.end(), light.begin(), Vec3f{});
 }
 
+// Whether an instance is a live picture and nothing else: what frames one sends light, and blocks
+// it.
+bool is_picture(const Scene& scene, std::uint32_t instance) {
+  if (!scene.shows_pictures(instance)) return false;
+  const SceneDescription& description = scene.description();
+  const Mesh& mesh = *description.meshes[description.instances[instance].mesh];
+  return std::ranges::none_of(mesh.materials, [&](std::uint32_t material) {
+    return scene.shader_of(material).pictures_of(description.materials[material]).empty();
+  });
+}
+
 }  // namespace
 
 BouncedLight::BouncedLight(const Scene& scene,
@@ -551,7 +562,7 @@ BounceFollower::Plan BounceFollower::plan_of(const Scene& scene,
   Plan plan{scene.places().parts, {}, scene.places().shapes, table.lights, table.lamps, settings};
   const auto& instances = scene.description().instances;
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
-    if (instances[i].moves && !scene.shows_pictures(i)) {
+    if (instances[i].moves && !is_picture(scene, i)) {
       plan.places.push_back(instances[i].set_from_object);
     }
   }

@@ -192,5 +192,40 @@ TEST(BounceLampsInAPicture, PassLivePictures) {
   EXPECT_EQ(render::BouncedLight(moved, shot.job.lights, settings).lamps(shot.job.lights), lamps);
 }
 
+// What frames a live picture is a surface like any other, and sends light from where it stands.
+TEST(BounceLampsInAPicture, FollowTheFrameOfALivePicture) {
+  render::SceneDescription scene = shelter(false);
+  scene.materials.push_back(make_billboard_material("person", {}));
+  render::Mesh board = make_billboard_mesh(3);
+  const auto first = static_cast<std::uint32_t>(board.positions.size());
+  const render::Mesh frame = *wall({-1, -0.1F, 0}, {2, 0, 0}, {0, 0, 2}, 1);
+  board.materials.assign(board.triangles.size(), 3);
+  board.positions.insert(board.positions.end(), frame.positions.begin(), frame.positions.end());
+  if (!board.normals.empty()) board.normals.resize(board.positions.size(), {0, -1, 0});
+  if (!board.uvs.empty()) board.uvs.resize(board.positions.size());
+  if (!board.tangents.empty()) board.tangents.resize(board.positions.size());
+  for (const auto& [a, b, c] : frame.triangles) {
+    board.triangles.push_back({a + first, b + first, c + first});
+    board.materials.push_back(1);
+  }
+  scene.meshes.push_back(std::make_shared<render::Mesh>(board));
+  render::Instance& framed = scene.instances.emplace_back();
+  framed.mesh = 4;
+  framed.moves = true;
+  capture::Image image = capture::make_image(8, 4, 4);
+  std::ranges::fill(image.pixels, 1.0F);
+  const render::Scene::Pictures pictures{std::make_shared<KeyedPicture>(make_keyed_texture(image))};
+  const MadeShot shot = shot_of(shelter(false), 32);
+  const render::Scene before(scene, pictures);
+  scene.instances[4].set_from_object[7] -= 1;
+  const render::Scene moved(scene, before, pictures);
+  const render::BounceSettings settings{.lamps = 24};
+  render::BounceFollower follower;
+  const auto lamps = follower.follow(before, shot.job.lights, settings);
+  const auto now = render::BouncedLight(moved, shot.job.lights, settings).lamps(shot.job.lights);
+  EXPECT_NE(now, lamps);
+  EXPECT_EQ(follower.follow(moved, shot.job.lights, settings), now);
+}
+
 }  // namespace
 }  // namespace compositing
