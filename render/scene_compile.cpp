@@ -84,9 +84,10 @@ void Scene::Compiled::build(const SceneDescription& description) {
       }
     }
     real_blockers |= instance.kind == ObjectKind::stand_in && instance.blocks_light;
-    if (mesh.triangles.empty()) continue;
-    if (mesh.rest) {
+    if (mesh.rest) {  // also of one without triangles: its next shape may have some
       filters |= std::ranges::any_of(mesh.materials, [&](auto m) { return filtered[m] != 0; });
+    } else if (mesh.triangles.empty()) {
+      continue;
     } else if (instanced[instance.mesh] == 0) {
       const auto left_out = untraceable_triangles(mesh.positions, mesh.triangles);
       skipped += left_out.size();

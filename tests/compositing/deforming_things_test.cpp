@@ -2,6 +2,7 @@
 // bit shows it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -255,6 +256,33 @@ TEST(DeformingMesh, CastsItsShadowAndIsMirroredInTheSameFrame) {
   }
   EXPECT_GT(changed, 1000U);
   EXPECT_GT(outside, 300U);
+}
+
+// Shadow rays ask no filter in a scene that says it has none.
+TEST(DeformingMesh, LetsLightThroughAlsoIfItBeganWithoutTriangles) {
+  MadeRoom room(16, 16);
+  SceneDescription scene = MadeRoom::describe();
+  const auto glass = static_cast<std::uint32_t>(
+      std::ranges::find(scene.materials, "glass", &render::Material::shader) -
+      scene.materials.begin());
+  ASSERT_LT(glass, scene.materials.size());
+  std::erase_if(scene.instances, [&](const render::Instance& i) {
+    return std::ranges::find(scene.meshes[i.mesh]->materials, glass) !=
+           scene.meshes[i.mesh]->materials.end();
+  });
+  ASSERT_FALSE(Scene(scene).has_filters());
+  const Mesh cloth = made_cloth(4, 0, 0.1F, glass);
+  Mesh none = cloth;
+  none.triangles.clear();
+  const auto rest = rest_of(cloth);
+  render::Instance& instance = scene.instances.emplace_back();
+  instance.mesh = static_cast<std::uint32_t>(scene.meshes.size());
+  instance.moves = true;
+  scene.meshes.push_back(shape(none, rest));
+  const Scene before(scene);
+  scene.meshes.back() = shape(cloth, rest);
+  EXPECT_TRUE(Scene(scene).has_filters());
+  EXPECT_TRUE(Scene(scene, before).has_filters());
 }
 
 TEST(DeformingMesh, TravelsAsBytes) {
