@@ -26,6 +26,7 @@ struct Block {
   std::uint32_t picture;
   std::uint32_t lit;
   std::array<float, 3> gain;
+  float translucency;
   CameraGrid camera;
 };
 
@@ -56,6 +57,15 @@ Vec3f foreground(const Block& block, const std::array<float, 4>& rgba) {
   return {rgba[0] * block.gain[0], rgba[1] * block.gain[1], rgba[2] * block.gain[2]};
 }
 
+// What shadow rays keep. The picture's light is taken for the colour of cloth.
+Vec3f passed(const Block& block, const std::array<float, 4>& rgba) {
+  const float open = 1 - rgba[3];
+  const auto of = [&](float caught) {
+    return open * (1 + block.translucency * std::min(caught, rgba[3]));
+  };
+  return {of(rgba[0]), of(rgba[1]), of(rgba[2])};
+}
+
 Vec3f grey(float value) { return {value, value, value}; }
 
 class BillboardShader final : public render::Shader {
@@ -73,6 +83,7 @@ class BillboardShader final : public render::Shader {
     for (const float gain : b.gain) {
       if (!(gain >= 0 && std::isfinite(gain))) refuse("gain must be finite, and 0 or more");
     }
+    if (!(b.translucency >= 0 && b.translucency <= 1)) refuse("translucency must be 0 to 1");
   }
 
   void shade(const ShadeContext& context,
@@ -134,7 +145,7 @@ class BillboardShader final : public render::Shader {
     const render::LivePicture& picture = *context.pictures[block.picture];
     const auto [u, v] = at->place;
     if (picture.is_clear(u, v, footprint_m * at->uv_per_metre)) return grey(1);
-    return kind == RayKind::shadow ? grey(1 - picture.look_up(u, v, 0)[3]) : Vec3f{};
+    return kind == RayKind::shadow ? passed(block, picture.look_up(u, v, 0)) : Vec3f{};
   }
 };
 
@@ -155,7 +166,11 @@ Block block_from(const BillboardSettings& settings) {
       throw std::invalid_argument("a billboard's gain must be finite, and 0 or more");
     }
   }
+  if (!(settings.translucency >= 0 && settings.translucency <= 1)) {
+    throw std::invalid_argument("a billboard's translucency must be 0 to 1");
+  }
   Block block{};
+  block.translucency = settings.translucency;
   block.picture = settings.picture;
   block.lit = settings.lit ? 1 : 0;
   block.gain = settings.gain;

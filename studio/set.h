@@ -204,6 +204,7 @@ struct PersonSettings {
   double turn_rad = 0;       // how far it turns to the show's camera
   std::array<float, 3> gain{1, 1, 1};
   bool lit = false;
+  float translucency = 0;
 
   const PersonCamera& first() const { return cameras.front(); }
   bool may_be_hull() const {

@@ -125,6 +125,9 @@ void read_further_cameras(Section& section, const SetContext& context, PersonSet
   }
   if (person.shape == compositing::PersonShape::billboard) return;
   if (person.lit) section.fault("lit", "is for billboards: a hull is shown as it was filmed");
+  if (person.translucency > 0) {
+    section.fault("translucency", "is for billboards: a hull's shadow has no colour");
+  }
   tables.insert(tables.begin(), section);
   for (std::size_t i = 0; i < person.cameras.size(); ++i) {
     if (!person.cameras[i].key || !person.cameras[i].key->by_texel) continue;
@@ -159,6 +162,7 @@ PersonSettings read_billboard_section(Section section, const SetContext& context
   read_camera(section, context, person.cameras.front());
   section.colour("gain", person.gain, {0, 1e9});
   section.boolean("lit", person.lit);
+  section.number("translucency", person.translucency, share);
   read_standing(section, person);
   read_further_cameras(section, context, person);
   section.finish();
@@ -183,7 +187,8 @@ void add_persons(const Set& set, SetScene& scene, Faults& faults) {
     const std::string name = name_of(person, i);
     const auto cameras = static_cast<std::uint32_t>(person.cameras.size());
     for (const PersonCamera& camera : person.cameras) {
-      const compositing::BillboardSettings shown{picture++, person.gain, person.lit};
+      const compositing::BillboardSettings shown{picture++, person.gain, person.lit,
+                                                 person.translucency};
       try {
         add(name,
             camera.lens ? compositing::make_billboard_material(name, shown,

@@ -13,6 +13,7 @@
 #include "made_shot.h"
 #include "render/kept_transport.h"
 #include "render/reference.h"
+#include "render/trace.h"
 
 namespace compositing {
 namespace {
@@ -186,16 +187,39 @@ TEST(Billboard, ShowsTheSameWhereItIsPassedAtOnce) {
 }
 
 // A person on a floor that catches the shadow, with a mirror behind and a glass ball in front.
-render::SceneDescription furnished(bool lit = false) {
-  render::SceneDescription scene = scene_with(make_billboard_material("person", {.lit = lit}));
+render::SceneDescription furnished(bool lit = false, float translucency = 0) {
+  render::SceneDescription scene =
+      scene_with(make_billboard_material("person", {.lit = lit, .translucency = translucency}));
   furnish(scene, {0.9F, 1.4F}, {0.55F, -0.6F, 0.6F});
   return scene;
 }
 
-// Glowing, and lit.
+TEST(Billboard, LetsLightThroughThinClothInItsColour) {
+  const auto passes = [](float translucency, float alpha) {
+    constexpr std::array colour{0.9F, 0.2F, 0.0F};
+    const auto cloth = picture_from(16, 32, [&](int, int) {
+      return std::array{alpha * colour[0], alpha * colour[1], alpha * colour[2], alpha};
+    });
+    const render::Scene scene(
+        scene_with(make_billboard_material("person", {.translucency = translucency})), {cloth});
+    return render::transmittance(scene, {0.1F, -2, 1.1F}, {0, 1, 0}, 0, render::ray_far,
+                                 render::mask_virtual);
+  };
+  const Vec3f grey = passes(0, 0.5F), thin = passes(1, 0.5F), half = passes(0.5F, 0.5F);
+  for (const float value : {grey.x, grey.y, grey.z}) EXPECT_NEAR(value, 0.5F, 1e-3F);
+  EXPECT_NEAR(thin.x, 0.5F * 1.45F, 1e-3F);
+  EXPECT_NEAR(thin.y, 0.5F * 1.1F, 1e-3F);
+  EXPECT_NEAR(thin.z, 0.5F, 1e-3F);
+  EXPECT_NEAR(half.x, 0.5F * 1.225F, 1e-3F);
+  EXPECT_EQ(passes(1, 1), Vec3f{});
+  EXPECT_EQ(passes(1, 0), (Vec3f{1, 1, 1}));
+  EXPECT_THROW(make_billboard_material("p", {.translucency = 1.5F}), std::invalid_argument);
+}
+
+// Glowing, and lit; and with cloth that colours its shadow.
 TEST(Billboard, CastsShadowsAndIsMirroredAndRefractedAsTheReferenceHasIt) {
-  for (const bool lit : {false, true}) {
-    MadeShot shot = shot_of(furnished(lit), {figure()});
+  for (const auto& [lit, translucency] : {std::pair(false, 0.0F), {true, 0.0F}, {false, 0.8F}}) {
+    MadeShot shot = shot_of(furnished(lit, translucency), {figure()});
     shot.job.effort.light_samples = 256;
     shot.job.lights = even_lights(256);
     shot.job.effort.accuracy = 0.99F;
@@ -209,7 +233,8 @@ TEST(Billboard, CastsShadowsAndIsMirroredAndRefractedAsTheReferenceHasIt) {
     settings.seed = 2;
     const capture::Image again = render_reference(shot.inputs(), shot.job, plate, settings);
     const capture::Image mask = render::affected_mask(truth, plate);
-    EXPECT_LT(render::picture_error(seen, {truth, again}, mask).relative_rms, 0.01) << lit;
+    EXPECT_LT(render::picture_error(seen, {truth, again}, mask).relative_rms, 0.01)
+        << lit << " " << translucency;
   }
 }
 
