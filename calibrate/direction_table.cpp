@@ -4,12 +4,10 @@
 #include <cmath>
 #include <span>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include "calibrate/axial_lens.h"
 #include "calibrate/lens.h"
 #include "calibrate/mrcal_lens.h"
+#include "capture/parallel_loop.h"
 
 namespace calibrate {
 namespace {
@@ -106,7 +104,7 @@ void fill_axial(const Lens& lens, DirectionTable& table) {
   const double far_y = std::max(std::abs(-1 - c.y), std::abs(lens.height - c.y)) / f.y;
   const RayTable tabulated(axial, std::min(std::hypot(far_x, far_y), axial.max_radius()));
   const auto fill_rows = [&](auto ray) {
-    tbb::parallel_for(tbb::blocked_range<int>(-1, lens.height + 1), [&](const auto& rows) {
+    capture::parallel_for(tbb::blocked_range<int>(-1, lens.height + 1), [&](const auto& rows) {
       for (int y = rows.begin(); y != rows.end(); ++y) {
         const std::size_t begin = table.index(y, -1);
         fill(Row{columns, (y - c.y) / f.y, &table.x[begin], &table.y[begin], &table.z[begin]},
@@ -133,7 +131,7 @@ void fill_axial(const Lens& lens, DirectionTable& table) {
 
 // Asks the lens for every pixel.
 void fill_by_pixel(const Lens& lens, DirectionTable& table) {
-  tbb::parallel_for(tbb::blocked_range<int>(-1, lens.height + 1), [&](const auto& rows) {
+  capture::parallel_for(tbb::blocked_range<int>(-1, lens.height + 1), [&](const auto& rows) {
     std::vector<Vec2> pixels(static_cast<std::size_t>(lens.width) + 2);
     for (int y = rows.begin(); y != rows.end(); ++y) {
       for (std::size_t i = 0; i < pixels.size(); ++i) {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <tbb/parallel_for.h>
+#include "capture/parallel_loop.h"
 
 namespace calibrate {
 namespace {
@@ -188,7 +188,7 @@ LensSelection select_lens(const LensProblem& problem,
   const Folds folds = deal(problem, start);
   selection.folds = folds.count;
   selection.candidates.resize(forms.size());
-  tbb::parallel_for(std::size_t{0}, forms.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, forms.size(), [&](std::size_t i) {
     selection.candidates[i] = judge(problem, start, forms[i], warp, folds);
   });
   choose(selection);

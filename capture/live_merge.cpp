@@ -12,11 +12,10 @@
 #include <type_traits>
 #include <utility>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 
 #include "capture/live_merge_plan.h"
+#include "capture/parallel_loop.h"
 
 namespace capture {
 namespace {
@@ -109,7 +108,7 @@ void merge_all(
     }
   };
   const std::size_t stretches = samples / lanes;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, stretches, stretches_per_task), merge);
+  capture::parallel_for(tbb::blocked_range<std::size_t>(0, stretches, stretches_per_task), merge);
   if (samples % lanes != 0) merge_rest(kernel, plan, stretches * lanes, samples % lanes, frame);
 }
 

@@ -1,9 +1,6 @@
 // From the kernel's scene-linear halves to the codes of a display, by tables made once.
 #include "compositing/display.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +8,8 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
+
+#include "capture/parallel_loop.h"
 
 namespace compositing {
 namespace {
@@ -347,7 +346,7 @@ std::int64_t Display::convert_image(const capture::HalfImage& rgba,
   require_size(rgba.pixels.size() / 4, values.size(), values_per_pixel);
   const auto width = static_cast<std::size_t>(rgba.width);
   const std::span<const capture::Half> pixels(rgba.pixels);
-  return tbb::parallel_reduce(
+  return capture::parallel_reduce(
       tbb::blocked_range<int>(0, rgba.height, rows_per_task), std::int64_t{0},
       [&](const tbb::blocked_range<int>& rows, std::int64_t count) {
         const std::size_t first = static_cast<std::size_t>(rows.begin()) * width;

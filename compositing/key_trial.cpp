@@ -1,10 +1,9 @@
 // Trials of keyers on made clips.
 #include "compositing/key_trial.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
+#include "capture/parallel_loop.h"
 #include "compositing/clean_plate.h"
 
 namespace compositing {
@@ -83,7 +82,7 @@ std::vector<SceneTrial> judge_scenes(std::span<const MadeScene> scenes,
                                      const KeySettings& settings,
                                      const TrialSize& size) {
   std::vector<SceneTrial> trials(scenes.size());
-  tbb::parallel_for(std::size_t{0}, scenes.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, scenes.size(), [&](std::size_t i) {
     trials[i] = judge_scene(scenes[i], seeds, settings, size);
   });
   return trials;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include <tbb/parallel_for.h>
+#include "capture/parallel_loop.h"
 
 namespace compositing {
 
@@ -236,7 +236,7 @@ capture::Image photograph_of(const calibrate::Lens& lens,
   };
   capture::Image image = capture::make_image(lens.height, lens.width, 4);
   const double share = 1.0 / (detail * detail);
-  tbb::parallel_for(y0, std::max(y1, y0), [&](int y) {
+  capture::parallel_for(y0, std::max(y1, y0), [&](int y) {
     for (int x = x0; x < x1; ++x) {
       std::array<double, 4> sum{};
       for (int i = 0; i < detail * detail; ++i) {

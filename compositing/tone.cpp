@@ -1,12 +1,11 @@
 // Schlick's curve, and what it is chosen by.
 #include "compositing/tone.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+
+#include "capture/parallel_loop.h"
 
 namespace compositing {
 namespace {
@@ -111,7 +110,7 @@ void apply_tone(const ToneCurve& curve,
 }
 
 std::optional<PictureLevels> measure_levels(const capture::HalfImage& rgba) {
-  const Histogram histogram = tbb::parallel_reduce(
+  const Histogram histogram = capture::parallel_reduce(
       tbb::blocked_range<std::size_t>(0, rgba.pixels.size() / 4, 16384), Histogram{},
       [&](const tbb::blocked_range<std::size_t>& pixels, Histogram sum) {
         for (std::size_t i = pixels.begin(); i != pixels.end(); ++i) {

@@ -1,8 +1,6 @@
 // Points, what reaches them, and lamps of them.
 #include "render/bounced_light.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "capture/parallel_loop.h"
 #include "render/sample_sequence.h"
 #include "render/scene_parts.h"
 #include "render/standard.h"
@@ -345,7 +344,7 @@ void check(const BounceSettings& settings) {
 template <class F>
 std::uint64_t for_each_point(const Scene& scene, std::size_t count, F&& call) {
   std::vector<std::uint64_t> rays(count);
-  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
     prepare_thread();
     PointFinder finder(scene);
     call(finder, i);

@@ -1,14 +1,13 @@
 // Counts as colours.
 #include "render/false_colour.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+
+#include "capture/parallel_loop.h"
 
 namespace render {
 namespace {
@@ -150,13 +149,14 @@ void draw_false_colour(const RayCounts& counts, RayView view, std::span<std::uin
   if (counts.pixels.size() * 3 != rgb8.size()) {
     throw std::invalid_argument("the counts are not those of the picture's pixels");
   }
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, counts.pixels.size(), 8192),
-                    [&](const tbb::blocked_range<std::size_t>& pixels) {
-                      for (std::size_t i = pixels.begin(); i != pixels.end(); ++i) {
-                        const ColourClass& c = class_of(value_of(counts.pixels[i], view), view);
-                        rgb8[i * 3] = c.red, rgb8[i * 3 + 1] = c.green, rgb8[i * 3 + 2] = c.blue;
-                      }
-                    });
+  capture::parallel_for(tbb::blocked_range<std::size_t>(0, counts.pixels.size(), 8192),
+                        [&](const tbb::blocked_range<std::size_t>& pixels) {
+                          for (std::size_t i = pixels.begin(); i != pixels.end(); ++i) {
+                            const ColourClass& c = class_of(value_of(counts.pixels[i], view), view);
+                            rgb8[i * 3] = c.red, rgb8[i * 3 + 1] = c.green,
+                                     rgb8[i * 3 + 2] = c.blue;
+                          }
+                        });
 }
 
 void draw_legend(RayView view, int width, int height, std::span<std::uint8_t> rgb8) {

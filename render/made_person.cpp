@@ -12,6 +12,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "capture/colour.h"
+#include "capture/parallel_loop.h"
 #include "render/made_noise.h"
 #include "render/texture.h"
 
@@ -167,7 +168,7 @@ Texture make_person_texture(const MadePerson& person, int height) {
   const float texel_m = made_person_height_m / static_cast<float>(height);
   const auto row = static_cast<std::size_t>(width) * 4;
   std::vector<std::uint8_t> texels(row * static_cast<std::size_t>(height));
-  tbb::parallel_for(0, height, [&](int y) {
+  capture::parallel_for(0, height, [&](int y) {
     std::uint8_t* texel = &texels[row * static_cast<std::size_t>(y)];
     for (int x = 0; x < width; ++x) {
       const Point p{((static_cast<float>(x) + 0.5F) * texel_m - made_person_width_m / 2) /

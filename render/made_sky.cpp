@@ -9,6 +9,7 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include "capture/parallel_loop.h"
 #include "render/environment.h"
 #include "render/made_noise.h"
 
@@ -118,7 +119,7 @@ using Samples = std::function<int(Vec3f)>;
 // A map of `radiance`.
 capture::Image make_map(int height, const Samples& samples_at, const Radiance& radiance) {
   capture::Image map = capture::make_image(height, 2 * height);
-  tbb::parallel_for(0, height, [&](int y) {
+  capture::parallel_for(0, height, [&](int y) {
     for (int x = 0; x < map.width; ++x) {
       const auto fx = static_cast<float>(x);
       const auto fy = static_cast<float>(y);

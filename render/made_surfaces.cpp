@@ -11,6 +11,7 @@
 
 #include "capture/colour.h"
 #include "capture/counter_random.h"
+#include "capture/parallel_loop.h"
 #include "render/made_noise.h"
 #include "render/texture.h"
 
@@ -37,7 +38,7 @@ using Paint = std::function<Vec3f(int x, int y, float u, float v)>;
 Texture paint_texture(int size, const Paint& paint) {
   const auto side = static_cast<std::size_t>(size);
   std::vector<std::uint8_t> texels(side * side * 3);
-  tbb::parallel_for(0, size, [&](int y) {
+  capture::parallel_for(0, size, [&](int y) {
     for (int x = 0; x < size; ++x) {
       const float u = (static_cast<float>(x) + 0.5F) / static_cast<float>(size);
       const float v = (static_cast<float>(y) + 0.5F) / static_cast<float>(size);

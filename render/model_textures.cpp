@@ -1,13 +1,12 @@
 // Textures of a model.
 #include "render/model_textures.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <span>
 #include <stdexcept>
 #include <string>
 
+#include "capture/parallel_loop.h"
 #include "capture/still.h"
 #include "capture/still_size.h"
 #include "render/texture.h"
@@ -134,7 +133,7 @@ std::vector<std::shared_ptr<const Texture>> decode_textures(RawModel& model,
     bytes += claimed_bytes(model.textures[i], sources[i]);
   }
   if (bytes > max_texel_bytes) throw std::runtime_error("its textures take more than 4 GB");
-  tbb::parallel_for(std::size_t{0}, sources.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, sources.size(), [&](std::size_t i) {
     if (sources[i].why.empty()) decode(model.textures[i], sources[i]);
   });
   Substitution substitution(sources);

@@ -7,6 +7,7 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
+#include "capture/parallel_loop.h"
 #include "render/environment_sampler.h"
 #include "render/path_tracer.h"
 #include "render/pixel_rays.h"
@@ -36,7 +37,7 @@ capture::Image photograph(const FrameInputs& inputs,
   const PixelRays rays(*inputs.directions, cam_from_set);
   const int width = inputs.directions->width;
   capture::Image picture = capture::make_image(inputs.directions->height, width, 3);
-  tbb::parallel_for(0, picture.height, [&](int y) {
+  capture::parallel_for(0, picture.height, [&](int y) {
     prepare_thread();
     for (int x = 0; x < width; ++x) {
       std::array<double, 3> sum{};

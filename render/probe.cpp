@@ -9,10 +9,8 @@
 #include <stdexcept>
 #include <string>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include "calibrate/vignetting.h"
+#include "capture/parallel_loop.h"
 
 namespace render {
 namespace {
@@ -78,7 +76,7 @@ void ProbeMapper::correct_vignetting(const Lens& lens) {
   if (settings_.vignetting.empty()) return;
   std::vector<float> correction(static_cast<std::size_t>(gather_.width * gather_.height));
   const double to_middle = 0.5 * (gather_.shrink - 1);
-  tbb::parallel_for(tbb::blocked_range<int>(0, gather_.height), [&](const auto& rows) {
+  capture::parallel_for(tbb::blocked_range<int>(0, gather_.height), [&](const auto& rows) {
     std::vector<calibrate::Vec2> pixels(static_cast<std::size_t>(gather_.width));
     for (int y = rows.begin(); y != rows.end(); ++y) {
       for (int x = 0; x < gather_.width; ++x) {
@@ -147,13 +145,13 @@ void ProbeMapper::map(const capture::Image& probe, const ProbeFrame& frame, Envi
   out.seen = seen_;
   shrink(probe);
   const tbb::blocked_range<int> all(0, rows, rows_per_task);
-  tbb::parallel_for(all, [&](const auto& range) {
+  capture::parallel_for(all, [&](const auto& range) {
     for (int y = range.begin(); y != range.end(); ++y) gather_row(y, frame, out);
   });
   const Vec3f fill = settings_.unseen != Unseen::floor ? mean_without_sources(out)
                      : frame.floor_radiance            ? *frame.floor_radiance
                                                        : floor_of_light_from_above();
-  tbb::parallel_for(all, [&](const auto& range) {
+  capture::parallel_for(all, [&](const auto& range) {
     for (int y = range.begin(); y != range.end(); ++y) fill_row(y, fill, out);
   });
   out.unseen_share = unseen_share();
@@ -177,7 +175,7 @@ void ProbeMapper::shrink(const capture::Image& probe) {
   const float* const last_pixel = &probe.pixels[probe.pixels.size() - 3];
   const std::array<float, 4> last{last_pixel[0], last_pixel[1], last_pixel[2], 0};
   const tbb::blocked_range<int> all(0, shrunk_.height, rows_per_task);
-  tbb::parallel_for(all, [&](const auto& rows) {
+  capture::parallel_for(all, [&](const auto& rows) {
     for (int y = rows.begin(); y != rows.end(); ++y) {
       float* to = &shrunk_.pixels[shrunk_.index(y, 0)];
       for (int x = 0; x < shrunk_.width; ++x, to += 4) {

@@ -9,9 +9,7 @@
 #include <optional>
 #include <span>
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
+#include "capture/parallel_loop.h"
 #include "render/environment.h"
 
 namespace render {
@@ -91,7 +89,7 @@ ShrunkProbe shrink_probe(const DirectionTable& table, double texel_rad) {
   ShrunkProbe probe{shrink, table.width / shrink, table.height / shrink, shrink * angle_rad, {}};
   const auto width = static_cast<std::size_t>(probe.width);
   probe.solid_angle.resize(static_cast<std::size_t>(probe.height) * width);
-  tbb::parallel_for(tbb::blocked_range<int>(0, probe.height), [&](const auto& rows) {
+  capture::parallel_for(tbb::blocked_range<int>(0, probe.height), [&](const auto& rows) {
     for (int y = rows.begin(); y != rows.end(); ++y) {
       for (int x = 0; x < probe.width; ++x) {
         probe.solid_angle[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] =
@@ -253,7 +251,7 @@ ProbeGather make_probe_gather(const Lens& lens,
   std::vector<std::vector<Entry>> texels(static_cast<std::size_t>(environment_height * width));
   if (probe.angle_rad > 0) {
     const TexelSampler sampler(lens, probe_from_set, probe, environment_height);
-    tbb::parallel_for(tbb::blocked_range<int>(0, environment_height), [&](const auto& rows) {
+    capture::parallel_for(tbb::blocked_range<int>(0, environment_height), [&](const auto& rows) {
       for (int y = rows.begin(); y != rows.end(); ++y) {
         sampler.sample_row(y, std::span(texels).subspan(static_cast<std::size_t>(y * width),
                                                         static_cast<std::size_t>(width)));

@@ -1,12 +1,11 @@
 // Rays shot again.
 #include "render/ray_log.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 
+#include "capture/parallel_loop.h"
 #include "render/embree_context.h"
 #include "render/light_gather.h"
 #include "render/trace.h"
@@ -74,16 +73,17 @@ std::uint64_t shoot_logged_rays(const Scene& scene,
   std::atomic<std::uint64_t> hits = 0;
   for (const RayLog& log : logs) {
     constexpr std::size_t batch = 64;
-    tbb::parallel_for(std::size_t{0}, (log.streams.size() + batch - 1) / batch, [&](std::size_t i) {
-      prepare_thread();
-      std::uint64_t sum = 0;
-      const std::size_t end = std::min(log.streams.size(), (i + 1) * batch);
-      for (std::size_t k = i * batch; k < end; ++k) {
-        const LoggedStream& s = log.streams[k];
-        sum += shoot(scene, log, s, s.coherent && coherent_camera);
-      }
-      hits += sum;
-    });
+    capture::parallel_for(std::size_t{0}, (log.streams.size() + batch - 1) / batch,
+                          [&](std::size_t i) {
+                            prepare_thread();
+                            std::uint64_t sum = 0;
+                            const std::size_t end = std::min(log.streams.size(), (i + 1) * batch);
+                            for (std::size_t k = i * batch; k < end; ++k) {
+                              const LoggedStream& s = log.streams[k];
+                              sum += shoot(scene, log, s, s.coherent && coherent_camera);
+                            }
+                            hits += sum;
+                          });
   }
   return hits;
 }

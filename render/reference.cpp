@@ -1,8 +1,6 @@
 // The reference's pictures: samples of every pixel, put together.
 #include "render/reference.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,6 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "capture/parallel_loop.h"
 #include "render/cell_transport.h"
 #include "render/environment_sampler.h"
 #include "render/path_tracer.h"
@@ -266,7 +265,7 @@ void check(const FrameInputs& inputs, const ReferenceSettings& settings) {
 // Calls pixel(x, y, index) for every pixel, rows in parallel.
 template <class F>
 void for_each_pixel(const DirectionTable& directions, F&& pixel) {
-  tbb::parallel_for(0, directions.height, [&](int y) {
+  capture::parallel_for(0, directions.height, [&](int y) {
     prepare_thread();
     for (int x = 0; x < directions.width; ++x) {
       pixel(x, y, static_cast<std::uint32_t>(y * directions.width + x));

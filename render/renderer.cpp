@@ -1,9 +1,7 @@
 // One frame on this machine's threads.
 #include "render/renderer.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
 
@@ -14,6 +12,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "capture/parallel_loop.h"
 #include "render/kept_transport.h"
 #include "render/kernel.h"
 
@@ -124,7 +123,8 @@ void refine_cells(const FrameContext& context,
     const std::lock_guard lock(statistics_mutex);
     statistics += taken;
   };
-  tbb::parallel_for(0, tbb::this_task_arena::max_concurrency(), work, tbb::simple_partitioner());
+  capture::parallel_for(0, tbb::this_task_arena::max_concurrency(), work,
+                        tbb::simple_partitioner());
 }
 
 void render_frame(const FrameInputs& inputs,
@@ -169,7 +169,7 @@ void render_frame(const FrameContext& context,
   // no thread may be left with one of those when the others are done.
   const std::vector<int> order = tiles_by_work(context, size, columns, rows);
   std::atomic<std::size_t> next = 0;
-  tbb::parallel_for(
+  capture::parallel_for(
       tbb::blocked_range<int>(0, columns * rows),
       [&](const tbb::blocked_range<int>& tiles) {
         for (int i = tiles.begin(); i != tiles.end(); ++i) render(order[next++]);

@@ -2,7 +2,6 @@
 #include "render/sampled_light.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "capture/parallel_loop.h"
 #include "render/cell_baker.h"
 #include "render/embree_context.h"
 #include "render/environment_sampler.h"
@@ -32,7 +32,7 @@ struct Drawn {
 std::vector<Drawn> draw(const Environment& environment, std::uint32_t seed) {
   const EnvironmentSampler sampler(environment);
   std::vector<Drawn> result(drawn);
-  tbb::parallel_for(std::uint32_t{0}, drawn, [&](std::uint32_t i) {
+  capture::parallel_for(std::uint32_t{0}, drawn, [&](std::uint32_t i) {
     const auto sample = sampler.sample(SampleSequence(seed, 0, i).next_pair());
     if (sample) result[i] = {sample->direction, sample->radiance * (1 / sample->density)};
   });
@@ -253,7 +253,7 @@ capture::Image render_sampled_light(const FrameInputs& inputs,
   const int columns = (plate.width + cell_size - 1) / cell_size;
   const int rows = (plate.height + cell_size - 1) / cell_size;
   tbb::enumerable_thread_specific<Workspace> workspaces;
-  tbb::parallel_for(0, columns * rows, [&](int i) {
+  capture::parallel_for(0, columns * rows, [&](int i) {
     prepare_thread();
     light.render_cell(i % columns * cell_size, i / columns * cell_size, workspaces.local());
   });

@@ -17,6 +17,7 @@
 
 #include "calibrate/lens.h"
 #include "calibrate/made_board.h"
+#include "capture/parallel_loop.h"
 #include "capture/png.h"
 #include "compositing/video_writer.h"
 #include "studio/demo_files.h"
@@ -132,7 +133,7 @@ void write_boards(const fs::path& dir,
                   const std::vector<Pose>& poses) {
   fs::create_directories(dir);
   const calibrate::DirectionTable directions = make_direction_table(camera.lens);
-  tbb::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, poses.size(), [&](std::size_t i) {
     const capture::Image radiance =
         photograph_board(demo_board(), poses[i], camera.lens, directions, room);
     constexpr std::uint64_t first_shot = 1'000'000;  // noise of its own
@@ -271,7 +272,7 @@ void write_lamp(const fs::path& file,
   sensor.saturation = exposure_s * 4;
   const int frames = static_cast<int>(lamp_length_s * rate.value());
   std::vector<std::vector<std::uint8_t>> pictures(static_cast<std::size_t>(frames));
-  tbb::parallel_for(0, frames, [&](int n) {
+  capture::parallel_for(0, frames, [&](int n) {
     const double on = lamp_in(switched_s, start_s + n / rate.value(), exposure_s);
     capture::Image lit = dark;
     for (int y = 0; y < height; ++y) {

@@ -11,6 +11,7 @@
 
 #include "capture/files.h"
 #include "capture/made_sound.h"
+#include "capture/parallel_loop.h"
 #include "capture/png.h"
 #include "compositing/video_writer.h"
 #include "studio/demo_files.h"
@@ -73,8 +74,8 @@ void write_video(const fs::path& file,
   for (int first = 0; first < frames; first += together) {
     const int count = std::min(together, frames - first);
     std::vector<std::vector<std::uint8_t>> pictures(static_cast<std::size_t>(count));
-    tbb::parallel_for(0, count,
-                      [&](int i) { pictures[static_cast<std::size_t>(i)] = frame(first + i); });
+    capture::parallel_for(0, count,
+                          [&](int i) { pictures[static_cast<std::size_t>(i)] = frame(first + i); });
     for (int i = 0; i < count; ++i) {
       const int n = first + i;
       video.write_picture(n, pictures[static_cast<std::size_t>(i)]);
@@ -122,7 +123,7 @@ int write_demo_probe(const fs::path& dir,
   const int shots = static_cast<int>(
       std::llround(studio.settings.frames * probe.rate.value() / studio.plate.rate.value()));
   fs::create_directories(dir);
-  tbb::parallel_for(0, shots, [&](int n) {
+  capture::parallel_for(0, shots, [&](int n) {
     const float strength = render::sun_strength(studio, render::time_of_picture(probe, n));
     const capture::MadeShot shot =
         capture::expose(probe.sensor, render::add_light(picture, strength),

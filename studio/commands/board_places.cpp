@@ -9,9 +9,8 @@
 #include <optional>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
 #include "calibrate/board_detector.h"
+#include "capture/parallel_loop.h"
 
 namespace studio {
 
@@ -42,7 +41,7 @@ BoardPlaces find_board_places(const std::vector<TimedPicture>& pictures,
   std::vector<std::string> reasons(pictures.size());
   std::atomic<std::size_t> done = 0;
   std::mutex speaking;
-  tbb::parallel_for(std::size_t{0}, pictures.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, pictures.size(), [&](std::size_t i) {
     calibrate::BoardDetection found =
         calibrate::detect_board(pictures[i].grey, board, {.time_limit = limit, .quick = true});
     reasons[i] = std::move(found.reason);

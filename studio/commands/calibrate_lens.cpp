@@ -13,7 +13,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
 #include "calibrate/board_detector.h"
@@ -21,6 +20,7 @@
 #include "calibrate/lens_calibration.h"
 #include "calibrate/text_file.h"
 #include "capture/camera.h"
+#include "capture/parallel_loop.h"
 #include "studio/calibration_report.h"
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
@@ -112,7 +112,7 @@ void find_boards(const std::vector<Picture>& pictures,
   found.detections.resize(pictures.size());
   std::atomic<std::size_t> done = 0;
   std::mutex speaking;
-  tbb::parallel_for(std::size_t{0}, pictures.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, pictures.size(), [&](std::size_t i) {
     if (!found.detections[i].view) {
       found.detections[i] = calibrate::detect_board(pictures[i].grey, board, options);
     }
@@ -152,7 +152,7 @@ Result calibrate_again(const std::vector<Picture>& pictures,
   detection.lens = first.calibration.lens;
   Found again = found;
   find_boards(pictures, board, detection, again, console);
-  tbb::parallel_for(std::size_t{0}, pictures.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, pictures.size(), [&](std::size_t i) {
     auto& view = again.detections[i].view;
     if (!view) return;
     auto refined =

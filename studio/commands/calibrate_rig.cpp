@@ -15,7 +15,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
 #include "calibrate/board_detector.h"
@@ -24,6 +23,7 @@
 #include "calibrate/rig_file.h"
 #include "calibrate/text_file.h"
 #include "capture/camera.h"
+#include "capture/parallel_loop.h"
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
 
@@ -179,7 +179,7 @@ Instants find_boards(const Source& source,
   std::vector<std::optional<calibrate::BoardView>> views(pictures.grey.size());
   std::atomic<std::size_t> done = 0;
   std::mutex speaking;
-  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, views.size(), [&](std::size_t i) {
     const calibrate::GreyPicture& grey = pictures.grey[i];
     if (grey.width != lens.width || grey.height != lens.height) {
       throw std::runtime_error(fmt::format("{}: {} is {}x{}, but its lens is for {}x{}",

@@ -2,12 +2,12 @@
 #include "render/made_car.h"
 
 #include <gtest/gtest.h>
-#include <tbb/parallel_for.h>
 
 #include <cmath>
 #include <numbers>
 #include <set>
 
+#include "capture/parallel_loop.h"
 #include "render/standard.h"
 #include "render/trace.h"
 
@@ -90,7 +90,7 @@ std::vector<Place> hidden_ones(const Scene& scene,
                                const std::vector<Vec3f>& directions) {
   const SceneDescription& description = scene.description();
   std::vector<std::uint8_t> seen(places.size(), 0);
-  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) {
+  capture::parallel_for(std::size_t{0}, places.size(), [&](std::size_t i) {
     prepare_thread();
     const Instance& instance = description.instances[places[i].instance];
     const std::array<Vec3f, 3> c = corners_of(*description.meshes[instance.mesh],

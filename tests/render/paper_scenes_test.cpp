@@ -10,8 +10,8 @@
 #include <string>
 
 #include <gmock/gmock.h>
-#include <tbb/parallel_for.h>
 
+#include "capture/parallel_loop.h"
 #include "render/made_headlight.h"
 #include "render/made_stage.h"
 #include "render/made_tv_room.h"
@@ -187,7 +187,7 @@ TEST_P(OwnPaperScenes, HidesHardlyATriangle) {
   for (std::size_t n = 0; n < description.instances.size(); ++n) {
     const Instance& instance = description.instances[n];
     std::vector<std::uint8_t> seen(description.meshes[instance.mesh]->triangles.size() / step);
-    tbb::parallel_for(std::size_t{0}, seen.size(), [&](std::size_t i) {
+    capture::parallel_for(std::size_t{0}, seen.size(), [&](std::size_t i) {
       prepare_thread();
       const auto corners = corners_of(description, instance, i * step);
       const auto outside = corners_of(drawn_out, drawn_out.instances[n], i * step);

@@ -12,12 +12,12 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <nlohmann/json.hpp>
 
 #include "calibrate/lens.h"
 #include "calibrate/made_board.h"
 #include "capture/exr.h"
+#include "capture/parallel_loop.h"
 #include "capture/png.h"
 #include "tests/calibrate/made_motion.h"
 #include "tests/studio/command_line.h"
@@ -109,7 +109,7 @@ void film_board(const fs::path& folder,
   for (int i = 0; i < frames; ++i) {
     list << fmt::format("{:03}.png,{:.9f},{},good\n", i, i / rate + offset_s, exposure_s);
   }
-  tbb::parallel_for(0, frames, [&](int i) {
+  capture::parallel_for(0, frames, [&](int i) {
     const auto middle_at = [&](double t) {
       const calibrate::Vec3 middle{0.5 * board.square_m * (board.columns - 1),
                                    0.5 * board.square_m * (board.rows - 1), 0};
