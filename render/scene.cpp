@@ -86,6 +86,30 @@ void find_turn(Vec3f e1, Vec3f e2, Vec3f d1, Vec3f d2, HitPoint& hit) {
 
 }  // namespace
 
+Facet facet_of(const Mesh& mesh,
+               const Vec3f* positions,
+               std::uint32_t triangle,
+               const std::array<float, 12>* set_from_mesh) {
+  const auto& [a, b, c] = mesh.triangles[triangle];
+  Facet facet{{positions[a], positions[b], positions[c]}, {}, 0, 0};
+  for (Vec3f& corner : facet.corners) {
+    if (set_from_mesh) corner = transform_point(*set_from_mesh, corner);
+    facet.largest_coordinate = std::max(
+        {facet.largest_coordinate, std::abs(corner.x), std::abs(corner.y), std::abs(corner.z)});
+  }
+  const auto& [p0, p1, p2] = facet.corners;
+  const Vec3f area = cross(p1 - p0, p2 - p0);
+  const float double_area = length(area);
+  if (!(double_area > 0)) return facet;
+  facet.normal = area * (1 / double_area);
+  if (mesh.uvs.empty()) return facet;
+  const auto &t0 = mesh.uvs[a], &t1 = mesh.uvs[b], &t2 = mesh.uvs[c];
+  const float uv_area =
+      std::abs((t1[0] - t0[0]) * (t2[1] - t0[1]) - (t2[0] - t0[0]) * (t1[1] - t0[1]));
+  facet.uv_per_metre = std::sqrt(uv_area / double_area);
+  return facet;
+}
+
 HitPoint Scene::Impl::hit_point(
     unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
   HitPoint hit;
@@ -96,20 +120,13 @@ HitPoint Scene::Impl::hit_point(
   const float w = 1 - u - v;
   const bool placed = p.instance != Part::none;
   const auto& matrix = description.instances[hit.instance].set_from_object;
-  Vec3f p0 = p.positions[a], p1 = p.positions[b], p2 = p.positions[c];
-  if (!placed) {
-    p0 = transform_point(matrix, p0);
-    p1 = transform_point(matrix, p1);
-    p2 = transform_point(matrix, p2);
-  }
+  const std::vector<Facet>& known = facets[hit.instance];
+  const Facet facet =
+      known.empty() ? facet_of(mesh, p.positions, t, placed ? nullptr : &matrix) : known[t];
+  const auto& [p0, p1, p2] = facet.corners;
   hit.position = p0 * w + p1 * u + p2 * v;
-  for (const Vec3f& corner : {p0, p1, p2}) {
-    hit.largest_coordinate = std::max(
-        {hit.largest_coordinate, std::abs(corner.x), std::abs(corner.y), std::abs(corner.z)});
-  }
-  const Vec3f area = cross(p1 - p0, p2 - p0);
-  const float double_area = length(area);
-  hit.geometric_normal = double_area > 0 ? area * (1 / double_area) : -incoming;
+  hit.largest_coordinate = facet.largest_coordinate;
+  hit.geometric_normal = facet.normal != Vec3f{} ? facet.normal : -incoming;
   hit.back = dot(hit.geometric_normal, incoming) > 0;
   if (hit.back) hit.geometric_normal = -hit.geometric_normal;
   if (mirrored[hit.instance] != 0) hit.back = !hit.back;
@@ -136,9 +153,7 @@ HitPoint Scene::Impl::hit_point(
     const auto &t0 = mesh.uvs[a], &t1 = mesh.uvs[b], &t2 = mesh.uvs[c];
     hit.u = t0[0] * w + t1[0] * u + t2[0] * v;
     hit.v = t0[1] * w + t1[1] * u + t2[1] * v;
-    const float uv_area =
-        std::abs((t1[0] - t0[0]) * (t2[1] - t0[1]) - (t2[0] - t0[0]) * (t1[1] - t0[1]));
-    hit.uv_per_metre = double_area > 0 ? std::sqrt(uv_area / double_area) : 0;
+    hit.uv_per_metre = facet.uv_per_metre;
   }
   if (!mesh.tangents.empty()) {
     const auto &t0 = mesh.tangents[a], &t1 = mesh.tangents[b], &t2 = mesh.tangents[c];

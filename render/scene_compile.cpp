@@ -8,6 +8,8 @@
 namespace render {
 namespace {
 
+constexpr std::size_t most_facets = 16;
+
 unsigned mask_of(const Instance& instance) {
   if (instance.kind == ObjectKind::virtual_object) return mask_virtual;
   return mask_stand_in | (instance.blocks_light ? mask_real_blocker : 0U) |
@@ -184,7 +186,14 @@ void Scene::Impl::assemble(const Impl* before) {
     const std::shared_ptr<const Mesh>& mesh = description.meshes[instance.mesh];
     const MeshTree* tree = trees[instance.mesh].get();
     if (tree) add_instance(i, tree->scene);
+    facets.emplace_back();
     if (!instance.moves) continue;
+    if (!mesh->rest && mesh->triangles.size() <= most_facets &&
+        !c.pictures_of_mesh[instance.mesh].empty()) {
+      for (std::uint32_t t = 0; t < mesh->triangles.size(); ++t) {
+        facets[i].push_back(facet_of(*mesh, mesh->positions.data(), t, &instance.set_from_object));
+      }
+    }
     normal_matrices[i] = normal_matrix(instance.set_from_object);
     const Bounds own =
         mesh->rest ? (tree ? tree->bounds : no_bounds) : c.mesh_bounds[instance.mesh];

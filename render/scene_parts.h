@@ -174,6 +174,19 @@ void check_built(RTCDevice device);
 // Of the positions that can be traced.
 Scene::Bounds bounds_of(const Mesh& mesh, const std::array<float, 12>& set_from_mesh);
 
+// A triangle in the set.
+struct Facet {
+  std::array<Vec3f, 3> corners;
+  Vec3f normal;  // unit; 0 where it has no area
+  float largest_coordinate = 0;
+  float uv_per_metre = 0;
+};
+// `set_from_mesh` is where its positions still stand in the mesh's frame.
+Facet facet_of(const Mesh& mesh,
+               const Vec3f* positions,
+               std::uint32_t triangle,
+               const std::array<float, 12>* set_from_mesh);
+
 struct Scene::Impl {
   std::uint64_t id = 0;
   SceneDescription description;
@@ -190,6 +203,8 @@ struct Scene::Impl {
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds, blocker_bounds = no_bounds;
   std::vector<Bounds> blocker_boxes;
   std::size_t skipped = 0;
+  // Per instance: of the few triangles of a billboard, which most of its rays only pass.
+  std::vector<std::vector<Facet>> facets;
 
   ~Impl() {
     if (scene) rtcReleaseScene(scene);
