@@ -73,7 +73,7 @@ Disorder::Disorder(const std::vector<Vec3f>& rest, const std::vector<Triangle>& 
                 [&](std::uint32_t t) { all = joined(all, box_of(rest, triangles[t])); });
   const Vec3f size = all.upper - all.lower;
   const float longest = std::max({size.x, size.y, size.z});
-  const float per_metre = longest > 0 ? static_cast<float>(side) / longest : 0;
+  const float per_metre = longest > 1e-30F ? static_cast<float>(side) / longest : 0;
   const auto step = [&](float v) {
     return std::clamp(static_cast<int>(v * per_metre), 0, side - 1);
   };
