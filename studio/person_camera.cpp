@@ -12,6 +12,7 @@
 #include "compositing/keyed_picture.h"
 #include "compositing/person_box.h"
 #include "studio/clean_plates.h"
+#include "studio/key_masks.h"
 #include "studio/section.h"
 
 namespace studio {
@@ -22,31 +23,6 @@ using compositing::Feet;
 // Feet are looked for in a matte whose longer side is at most so long.
 constexpr int matte_side = 640;
 constexpr capture::Rational rate_of_unknown{25, 1};
-
-// For videos of that size.
-compositing::KeyMasks masks_of(const KeyChoice& key, int width, int height) {
-  compositing::KeyMasks masks;
-  if (key.garbage.empty()) return masks;
-  const capture::Image mask = read_picture(key.garbage, capture::Transfer::linear);
-  if (mask.width != width || mask.height != height) {
-    throw std::invalid_argument(
-        fmt::format("the garbage mask {} is {}x{}, but the video is {}x{}: draw it in that size",
-                    key.garbage, mask.width, mask.height, width, height));
-  }
-  for (int y = 0; y < mask.height; ++y) {
-    for (int x = 0; x < mask.width; ++x) {
-      const float white = mask.at(y, x);
-      if (!std::isfinite(white)) {
-        throw std::invalid_argument(fmt::format(
-            "the garbage mask {} holds no number at column {}, row {}: draw it from 0 to 1",
-            key.garbage, x, y));
-      }
-      masks.garbage.push_back(
-          static_cast<std::uint8_t>(std::clamp(white * 255 + 0.5F, 0.0F, 255.0F)));
-    }
-  }
-  return masks;
-}
 
 // Alpha of a keyed picture, area-averaged `shrink` times smaller.
 capture::Image matte_of(const compositing::KeyedFrame& keyed, int shrink) {
@@ -118,7 +94,8 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
           fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", s.key->plate,
                       plate.light.width, plate.light.height, s.source, info.width, info.height));
     }
-    keyer_.emplace(std::move(plate), s.key->settings, masks_of(*s.key, info.width, info.height));
+    keyer_.emplace(std::move(plate), s.key->settings,
+                   read_key_masks(s.key->masks, info.width, info.height));
     by_texel_ = s.key->by_texel && !options.needs_matte;
   } catch (const std::exception& error) {
     faults.add(s.key->place, error.what());

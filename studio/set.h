@@ -18,6 +18,7 @@
 #include "render/colour_matrix.h"
 #include "render/environment.h"
 #include "render/frame_job.h"
+#include "studio/key_masks.h"
 #include "studio/section.h"
 #include "studio/toml.h"
 
@@ -172,7 +173,7 @@ struct VideoSettings {
 struct KeyChoice {
   std::string plate;                   // file of the empty screen; "" = from the footage alone:
   std::array<int, 2> footage{0, 479};  // these of its frames, first and last
-  std::string garbage;                 // picture: white is never the person; "" = none
+  KeyMaskFiles masks;
   bool by_texel = false;  // filtered, then keyed where rays see it; else whole frames are keyed
   compositing::KeySettings settings;
   Place place;

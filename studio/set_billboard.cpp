@@ -46,7 +46,11 @@ KeyChoice read_key(Section table, const SetContext& context) {
   table.boolean("learned", settings.learned);
   table.boolean("follows_light", settings.follows_light);
   table.number("smoothing", settings.smoothing, {0, 4});
-  table.file("garbage", context.base, key.garbage);
+  table.file("garbage", context.base, key.masks.garbage);
+  table.file("core_mask", context.base, key.masks.core);
+  if (key.by_texel && !key.masks.empty()) {
+    table.fault("by", "\"texel\" knows no masks: key by \"frame\"");
+  }
   table.finish();
   return key;
 }

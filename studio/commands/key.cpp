@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -18,6 +19,7 @@
 #include "compositing/keyer.h"
 #include "studio/clean_plates.h"
 #include "studio/commands/commands.h"
+#include "studio/key_masks.h"
 
 namespace studio {
 namespace {
@@ -32,6 +34,7 @@ struct KeyOptions {
   bool person = false;
   std::optional<std::int64_t> frames, first;
   std::optional<double> screen, core, edge, despill, smoothing;
+  KeyMaskFiles masks;
 };
 
 VideoSource source_of(const KeyOptions& options, const std::string& uri) {
@@ -90,13 +93,17 @@ void key_clip(const KeyOptions& options, Console& console) {
   compositing::CleanPlate plate = read_clean_plate(options.plate, source);
   const double known = plate.known;
   const std::string colour(compositing::name_of(plate.colour));
-  compositing::Keyer keyer(std::move(plate), settings_of(options));
+  const auto [width, height] = std::pair(plate.light.width, plate.light.height);
+  compositing::Keyer keyer(std::move(plate), settings_of(options),
+                           read_key_masks(options.masks, width, height));
   const auto camera = open_video(source);
   compositing::ExrSequenceSettings take;
   take.dir = options.out;
   take.rate = camera->info().rate.num > 0 ? camera->info().rate : capture::Rational{25, 1};
   const compositing::ExrSequence sequence(take);
-  capture::HalfImage keyed, matte;
+  compositing::KeyedFrame frame_keyed;
+  const capture::HalfImage& keyed = frame_keyed.image();
+  capture::HalfImage matte;
   Json rows = Json::array();
   double least = 1, sum = 0, key_ms = 0;
   std::int64_t number = 0;
@@ -105,7 +112,7 @@ void key_clip(const KeyOptions& options, Console& console) {
     if (!frame) break;
     if (!frame->image) continue;
     const auto start = std::chrono::steady_clock::now();
-    const compositing::KeyReport report = keyer.key(*frame->image, keyed);
+    const compositing::KeyReport report = keyer.key(*frame->image, frame_keyed);
     key_ms +=
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     matte = {keyed.height, keyed.width, {}, 1};
@@ -124,6 +131,9 @@ void key_clip(const KeyOptions& options, Console& console) {
                     {"mismatch", report.sight.mismatch},
                     {"clipped", report.sight.clipped},
                     {"soft", report.soft}});
+    if (report.moved) {
+      rows.back()["moved_px"] = {report.shift.right_px, report.shift.down_px};
+    }
   }
   if (number == 0) throw std::runtime_error(source.uri + " gives no picture");
   const auto count = static_cast<double>(number);
@@ -175,6 +185,10 @@ Command key_command() {
                          "at most so many (of a plate: 50)");
         arguments.option("--screen", o->screen, 0, 0.9, "alpha below which the screen is clear");
         arguments.option("--core", o->core, 0.1, 1, "alpha above which the person is whole");
+        arguments.option("--garbage", o->masks.garbage,
+                         "picture of the clip's size: white is never the person");
+        arguments.option("--core-mask", o->masks.core,
+                         "picture of the clip's size: white is always the person");
         arguments.option("--edge", o->edge, -1, 1, "thinner to fuller");
         arguments.option("--despill", o->despill, 0, 2, "none, 1 all of the likely spill, up to 2");
         arguments.option("--smoothing", o->smoothing, 0, 4, "of alpha over frames");

@@ -60,6 +60,42 @@ TEST_F(KeyCommand, TakesAPlateAndKeysAClipWithIt) {
   EXPECT_LT(squares / (3.0 * truth_.height * truth_.width), 1e-3);
 }
 
+TEST_F(KeyCommand, KeepsToMasks) {
+  run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr"));
+  // The left third is the person, the right third is not.
+  capture::Image core = capture::make_image(90, 160), garbage = core;
+  for (int y = 0; y < 90; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        core.at(y, x, c) = x < 53 ? 1.0F : 0.0F;
+        garbage.at(y, x, c) = x >= 106 ? 1.0F : 0.0F;
+      }
+    }
+  }
+  capture::write_exr(in("core.exr"), core);
+  capture::write_exr(in("garbage.exr"), garbage);
+  const Outcome keyed = run("key " + in("take_%04d.png") + " --colour sRGB --frames 2 --plate " +
+                            in("plate.exr") + " --core-mask " + in("core.exr") + " --garbage " +
+                            in("garbage.exr") + " -o " + in("keyed"));
+  ASSERT_EQ(keyed.status, 0) << keyed.err;
+  const capture::Image last = capture::read_exr(in("keyed/frame.000001.exr"));
+  ASSERT_EQ(last.channels, 4);
+  for (int y = 0; y < 90; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      if (x < 53) {
+        ASSERT_EQ(last.at(y, x, 3), 1) << x << " " << y;
+      }
+      if (x >= 106) {
+        ASSERT_EQ(last.at(y, x, 3), 0) << x << " " << y;
+      }
+    }
+  }
+  const Outcome refused = run("key " + in("take_%04d.png") + " --plate " + in("plate.exr") +
+                              " --core-mask " + in("missing.exr") + " -o " + in("keyed"));
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_THAT(refused.err, HasSubstr("missing.exr"));
+}
+
 TEST_F(KeyCommand, RefusesAPlateOfAnotherSizeAndNamesBoth) {
   capture::write_exr(in("small.exr"), capture::make_image(45, 80));
   const Outcome outcome =

@@ -358,6 +358,10 @@ TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
   broken.at(7, 31) = std::numeric_limits<float>::quiet_NaN();
   capture::write_exr((dir_ / "broken.exr").string(), broken);
   expect_refusal("key = {", "key = { garbage = \"broken.exr\", ", "no number at column 31, row 7");
+  expect_refusal("key = {", "key = { core_mask = \"turned.exr\", ", "core mask ");
+  capture::write_exr((dir_ / "drawn.exr").string(), capture::make_image(360, 480));
+  expect_refusal("key = {", "key = { by = \"texel\", core_mask = \"drawn.exr\", ",
+                 "knows no masks");
   write_plate(64, 48);
   expect_refusal("walker\"", "walker\"", "64x48");
   expect_refusal("walker\"", "walker\"", "480x360");

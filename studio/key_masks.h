@@ -1,0 +1,23 @@
+// Where a key holds, from pictures that somebody drew.
+#pragma once
+
+#include <string>
+
+#include "compositing/keyer.h"
+
+namespace studio {
+
+// Paths; "" = none.
+struct KeyMaskFiles {
+  std::string garbage;  // white is never the person
+  std::string core;     // white is always the person
+
+  bool empty() const { return garbage.empty() && core.empty(); }
+};
+
+// For videos of that size. Throws std::runtime_error if a file cannot be read,
+// std::invalid_argument naming file and sizes, or the pixel that is no number, if it is no mask for
+// them.
+compositing::KeyMasks read_key_masks(const KeyMaskFiles& files, int width, int height);
+
+}  // namespace studio
