@@ -216,7 +216,7 @@ bool KeyedTexture::is_clear(float u, float v, float footprint_uv) const {
   const float side = std::sqrt(static_cast<float>(width()) * static_cast<float>(height()));
   // Look-ups reach no further from their middle: a quarter of the footprint to their places, and
   // from there one and a half texels of a level, less than .7 of it, or of odd sizes 1.4.
-  const float reach = 1.5F + 2.5F * footprint_uv * side;
+  const float reach = 1.5F + 2.5F * std::max(footprint_uv, 0.0F) * side;
   return static_cast<float>((bare_[here] - 1) * run) >= reach;
 }
 

@@ -144,6 +144,8 @@ TEST(KeyedTexture, IsClearOnlyWhereALookUpFindsNothing) {
     constexpr float infinity = std::numeric_limits<float>::infinity();
     for (const float wide : {nan, infinity}) EXPECT_FALSE(texture.is_clear(0.01F, 0.01F, wide));
     for (const float at : {nan, infinity}) EXPECT_FALSE(texture.is_clear(at, 0.01F, 0));
+    const auto whole = make_keyed_texture(random_picture(height, width, 3, 2));
+    for (const float wide : {-1.0F, -infinity}) EXPECT_FALSE(whole->is_clear(0.4F, 0.6F, wide));
   }
 }
 
