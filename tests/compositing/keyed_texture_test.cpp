@@ -1,12 +1,14 @@
 // Levels of keyed frames, and look-ups between them.
 #include "compositing/keyed_texture.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <random>
 #include <span>
 #include <stdexcept>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -53,9 +55,20 @@ std::array<float, 4> reference(const render::VideoTexture& texture, float u, flo
   return sum;
 }
 
+// All 0 but for one pixel of `each`.
+capture::Image sparse_picture(int height, int width, int each, unsigned seed) {
+  capture::Image image = random_picture(height, width, 4, seed);
+  std::mt19937 random(seed);
+  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+    if (random() % static_cast<unsigned>(each) != 0) std::fill_n(&image.pixels[i], 4, 0.0F);
+  }
+  return image;
+}
+
 TEST(KeyedTexture, HasTheMeansOfItsFrameAtEveryLevel) {
-  for (const auto& [height, width] : {std::pair(48, 64), {53, 91}, {1, 7}, {30, 1}, {1, 1}}) {
-    const capture::Image image = random_picture(height, width, 4, 3);
+  for (const auto& [height, width, each] :
+       {std::tuple(48, 64, 1), {48, 68, 20}, {53, 91, 1}, {1, 7, 1}, {30, 1, 1}, {1, 1, 1}}) {
+    const capture::Image image = sparse_picture(height, width, each, 3);
     const auto texture = make_keyed_texture(image);
     const render::VideoTexture wanted = render::make_video_texture(image);
     ASSERT_EQ(texture->levels(), wanted.levels.size());
@@ -116,6 +129,27 @@ TEST(KeyedTexture, ShowsNothingOfTheFramesThatItHeldBefore) {
   }
   again.take(random_picture(31, 17, 4, 1));
   EXPECT_EQ(again.level(1).width, 8);
+}
+
+TEST(KeyedTexture, IsClearByItsOwnFrameAlone) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> one(0, 1);
+  KeyedTexture again;
+  int clear = 0, not_clear = 0;
+  for (const auto& [height, width] : {std::pair(80, 120), {80, 120}, {80, 120}, {64, 200}}) {
+    capture::Image image = capture::make_image(height, width, 4);
+    const int pixel = static_cast<int>(one(random) * static_cast<float>(height * width - 1));
+    image.at(pixel / width, pixel % width, 3) = 1;
+    again.take(image);
+    const auto fresh = make_keyed_texture(image);
+    for (int i = 0; i < 500; ++i) {
+      const float u = one(random), v = one(random), wide = 0.1F * one(random);
+      ASSERT_EQ(again.is_clear(u, v, wide), fresh->is_clear(u, v, wide)) << u << " " << v;
+      (fresh->is_clear(u, v, wide) ? clear : not_clear) += 1;
+    }
+  }
+  EXPECT_GT(clear, 200);
+  EXPECT_GT(not_clear, 200);
 }
 
 TEST(KeyedTexture, IsClearOnlyWhereALookUpFindsNothing) {
