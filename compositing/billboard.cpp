@@ -127,8 +127,10 @@ class BillboardShader final : public render::Shader {
                              float footprint_m) const override {
     const Block block = block_of(material);
     const std::array<float, 4> rgba = seen(context, material, block, hit, footprint_m);
-    const Vec3f shown = foreground(block, rgba), passed = grey(1 - rgba[3]);
-    return block.lit != 0 ? Layer{{}, passed, shown} : Layer{shown, passed};
+    const Vec3f shown = foreground(block, rgba), open = grey(1 - rgba[3]);
+    Layer layer = block.lit != 0 ? Layer{{}, open, shown} : Layer{shown, open};
+    if (block.translucency > 0) layer.lit_through = passed(block, rgba);
+    return layer;
   }
 
   // A hole is where the camera does not see, and where its picture is clear as far as the ray is

@@ -153,6 +153,7 @@ struct PathTracer::Walk {
   float density = certain;      // with which the last scattering chose the direction
   Vec3f glow_share{1, 1, 1};    // the same of emission: less where lamps stand for it
   bool left_rough = false;      // was scattered by a diffuse surface
+  bool left_diffuse = false;    // the last scattering was by a diffuse lobe
   bool sky_straight_on = true;  // whether the sky counts before the path was scattered
   int depth = 0;
   bool met_virtual = false;
@@ -280,6 +281,7 @@ bool PathTracer::scatter(Walk& w,
     return true;
   }
   w.kind = RayKind::reflection;
+  w.left_diffuse = by == PathLobe::diffuse;
   w.mask = rules_.scattered_mask;
   w.sky_straight_on = true;
   const auto leave = [&](Vec3f direction) {
@@ -380,9 +382,12 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
 std::optional<Layer> PathTracer::layer_at(const Walk& w, const HitPoint& hit) const {
   if (!materials_[hit.material].picture) return std::nullopt;
   const SceneDescription& description = scene_.description();
-  return scene_.shader_of(hit.material)
-      .layer({&description, &scene_, scene_.pictures(), scene_.prepared()},
-             description.materials[hit.material], hit, w.direction, w.kind, 0);
+  auto layer = scene_.shader_of(hit.material)
+                   .layer({&description, &scene_, scene_.pictures(), scene_.prepared()},
+                          description.materials[hit.material], hit, w.direction, w.kind, 0);
+  // As much as environment_light() finds by shadow rays: they are two estimates of one light.
+  if (layer && layer->lit_through && w.left_diffuse) layer->passed = *layer->lit_through;
+  return layer;
 }
 
 // Goes on behind a picture that is not lit. False if there is nothing more to see.
@@ -504,7 +509,7 @@ Vec3f PathTracer::virtual_irradiance(const HitPoint& hit, SampleSequence& number
   w.direction = direction;
   w.mask = mask_virtual;
   w.kind = RayKind::reflection;
-  w.left_rough = true;
+  w.left_rough = w.left_diffuse = true;
   w.sky_straight_on = false;
   if (!lamps_.empty()) w.glow_share = {};
   walk(w, numbers);

@@ -128,6 +128,7 @@ struct Layer {
   Vec3f radiance;
   Vec3f passed;
   Vec3f albedo = {};  // of a matte one that the set's light falls on, as far as it covers
+  std::optional<Vec3f> lit_through = {};  // of light to matte surfaces, if that is not `passed`
 };
 
 class Shader {

@@ -328,6 +328,40 @@ TEST(Billboard, LetsLightThroughByAlphaWhenLit) {
   EXPECT_GT(in_shadow, 200);
 }
 
+// Light through cloth is found by shadow rays and by paths: the reference has to weigh one light.
+TEST(Billboard, LetsAsMuchLightThroughClothInTheReferenceWithAllBounces) {
+  const auto floor_under = [](float translucency, bool bounces) {
+    render::SceneDescription scene =
+        scene_with(make_billboard_material("person", {.gain = {}, .translucency = translucency}));
+    render::StandardParameters paint;
+    std::ranges::fill(paint.base_color, 0.5F);
+    paint.roughness = 1;
+    paint.specular = 0;
+    scene.materials.push_back(render::make_standard_material("floor", paint));
+    scene.meshes.push_back(made_floor(3, 1));
+    scene.instances.emplace_back().mesh = 1;
+    scene.instances[0].set_from_object = {40, 0, 0, 0, 0, 0, 40, -20, 0, 1, 0, 3};
+    const auto cloth = picture_from(16, 16, [](int, int) {
+      return std::array{0.5F, 0.25F, 0.0F, 0.5F};
+    });
+    const MadeShot shot = shot_of(std::move(scene), {cloth});
+    const render::ReferenceSettings settings{.samples = 64, .bounces = bounces};
+    const capture::Image seen =
+        render_reference(shot.inputs(), shot.job, capture::to_float(shot.plate), settings);
+    Vec3f sum;
+    for (int y = 90; y < 110; ++y) {
+      for (int x = 70; x < 90; ++x) sum += {seen.at(y, x, 0), seen.at(y, x, 1), seen.at(y, x, 2)};
+    }
+    return sum * (1 / 400.0F);
+  };
+  for (const bool bounces : {false, true}) {
+    const Vec3f grey = floor_under(0, bounces), thin = floor_under(1, bounces);
+    EXPECT_NEAR(thin.x / grey.x, 1.5F, 0.02F) << bounces;
+    EXPECT_NEAR(thin.y / grey.y, 1.25F, 0.02F) << bounces;
+    EXPECT_NEAR(thin.z / grey.z, 1, 0.02F) << bounces;
+  }
+}
+
 TEST(Billboard, IsTheSameWithWhatIsKeptFromOtherPictures) {
   render::SceneDescription scene = furnished();
   render::KeptTransport kept;
