@@ -212,6 +212,7 @@ bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned 
   const auto [origin, direction] = ray_of(args, lane);
   const auto& traced = *reinterpret_cast<const TraceContext*>(args->context);
   TraceContext context(*traced.scene, RayKind::camera, false);
+  context.cone_rad = traced.cone_rad;  // what it passed on its way here it passes again
   RTCRayHit ray{};
   ray.ray = {.org_x = origin.x,
              .org_y = origin.y,

@@ -194,6 +194,22 @@ render::SceneDescription furnished(bool lit = false, float translucency = 0) {
   return scene;
 }
 
+// Of a real floor that hides nothing, a picture's clear part before it hides nothing either.
+TEST(Billboard, ShowsTheFloorBehindWhereItIsClearAlsoIfThatHidesNothing) {
+  const auto see = [](std::shared_ptr<const render::LivePicture> picture) {
+    render::SceneDescription scene = scene_with(make_billboard_material("person", {}));
+    furnish(scene, {0.9F, 1.4F}, {0.55F, -0.6F, 0.6F});
+    scene.instances[0].set_from_object = standing({0, 0, 0}, 3, 3);
+    scene.instances[1].occludes = false;
+    return picture_of(shot_of(std::move(scene), {std::move(picture)}));
+  };
+  const capture::Image seen = see(small_figure());
+  const capture::Image truth = see(std::make_shared<Unsure>(small_figure()));
+  const capture::Image mask =
+      render::affected_mask(truth, capture::to_float(made_plate(height, width)));
+  EXPECT_LT(render::picture_error(seen, truth, mask).relative_rms, 0.01);
+}
+
 TEST(Billboard, LetsLightThroughThinClothInItsColour) {
   const auto passes = [](float translucency, float alpha) {
     constexpr std::array colour{0.9F, 0.2F, 0.0F};
