@@ -171,6 +171,9 @@ Block block_from(const BillboardSettings& settings) {
   if (!(settings.translucency >= 0 && settings.translucency <= 1)) {
     throw std::invalid_argument("a billboard's translucency must be 0 to 1");
   }
+  if (settings.lit && settings.translucency > 0) {
+    throw std::invalid_argument("a billboard that is lit has no translucency");
+  }
   Block block{};
   block.translucency = settings.translucency;
   block.picture = settings.picture;

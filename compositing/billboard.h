@@ -19,6 +19,7 @@ struct BillboardSettings {
   bool lit = false;
   // Of the light that thin cloth catches, how much its threads pass on in their colour, 0 to 1: a
   // shadow where alpha is a, of colour c, then has (1 - a) (1 + translucency a c) of the light.
+  // Not for what is lit.
   float translucency = 0;
 };
 

@@ -24,7 +24,7 @@ inline constexpr float calm = 1.0F, moving = 2.0F, least_gain_of_change = 0.2F;
 inline constexpr float haze_of_noise = 0.6F;
 // One pixel alone of eight in a row is a speck of noise up to so many times of that: what is bare
 // then stays bare over wide stretches, which rays pass at once.
-inline constexpr float speck_of_haze = 3;
+inline constexpr float speck_of_haze = 3, most_of_speck = 0.25F;
 
 // One frame through `Formula`, which tells the share of the screen, of that a matte, and of that a
 // foreground.
@@ -334,7 +334,9 @@ class KeyPass {
     if (past == KeyPast::mixed || past == KeyPast::faint)
       store_previous(previous(y) + block.x, alpha);
     alpha = least(alpha, most(2 * (alpha - haze_), F8{}));
-    if (count_of(alpha > 0.0F) == 1 && !any_of(alpha > speck_of_haze * haze_)) alpha = F8{};
+    if (count_of(alpha > 0.0F) == 1 &&
+        !any_of(alpha > std::min(speck_of_haze * haze_, most_of_speck)))
+      alpha = F8{};
   }
 
   static void store_previous(std::uint16_t* to, F8 alpha) {

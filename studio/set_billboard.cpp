@@ -167,6 +167,9 @@ PersonSettings read_billboard_section(Section section, const SetContext& context
   section.colour("gain", person.gain, {0, 1e9});
   section.boolean("lit", person.lit);
   section.number("translucency", person.translucency, share);
+  if (person.lit && person.translucency > 0) {
+    section.fault("translucency", "is not for what is lit: it would give more light than it gets");
+  }
   read_standing(section, person);
   read_further_cameras(section, context, person);
   section.finish();

@@ -230,6 +230,8 @@ TEST(Billboard, LetsLightThroughThinClothInItsColour) {
   EXPECT_EQ(passes(1, 1), Vec3f{});
   EXPECT_EQ(passes(1, 0), (Vec3f{1, 1, 1}));
   EXPECT_THROW(make_billboard_material("p", {.translucency = 1.5F}), std::invalid_argument);
+  EXPECT_THROW(make_billboard_material("p", {.lit = true, .translucency = 0.5F}),
+               std::invalid_argument);
 }
 
 // Glowing, and lit; and with cloth that colours its shadow.

@@ -183,6 +183,34 @@ TEST(KeyedTexture, IsClearOnlyWhereALookUpFindsNothing) {
   }
 }
 
+// One faint pixel alone among bare ones is noise; a person's faint edges lie beside stronger ones.
+TEST(KeyedFrame, HasNoLoneFaintPixels) {
+  const MadeClip clip(made_scene("plain"), 2, 270, 480);
+  std::vector<capture::Image> shots{light_of(clip.plate_shot(0)), light_of(clip.plate_shot(1))};
+  Keyer keyer(average_plate(shots), {});
+  KeyedFrame keyed;
+  int lone = 0, soft = 0;
+  for (int i = 4; i < 8; ++i) {
+    keyer.key(light_of(clip.frame(i).seen), keyed);
+    const capture::HalfImage& image = keyed.image();
+    for (int y = 0; y < image.height; ++y) {
+      for (int first = 0; first < image.width; first += KeyedFrame::run) {
+        int found = 0;
+        float most = 0;
+        for (int x = first; x < first + KeyedFrame::run; ++x) {
+          const float alpha = value_at(image, y, x, 3);
+          found += alpha > 0;
+          most = std::max(most, alpha);
+        }
+        lone += found == 1 && most < 0.02F;
+        soft += most > 0.1F && most < 0.9F;
+      }
+    }
+  }
+  EXPECT_EQ(lone, 0);
+  EXPECT_GT(soft, 400);
+}
+
 TEST(KeyedTexture, TakesPicturesThatAreNotKeyed) {
   capture::Image opaque = random_picture(4, 6, 3, 9);
   opaque.at(0, 0, 0) = std::numeric_limits<float>::quiet_NaN();
