@@ -95,7 +95,7 @@ void CellBaker::trace(int count, bool coherent, RayKind kind, float cone_rad) {
     s.geom[i] = s.inst[i] = RTC_INVALID_GEOMETRY_ID;
   }
   if (gather_.log) {
-    gather_.log->add(false, coherent,
+    gather_.log->add(false, coherent, cone_rad,
                      {s.ox.data(), s.oy.data(), s.oz.data(), s.dx.data(), s.dy.data(), s.dz.data(),
                       s.near_m.data(), s.far_m.data()},
                      s.mask.data(), static_cast<std::size_t>(count));

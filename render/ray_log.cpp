@@ -14,10 +14,11 @@ namespace render {
 
 void RayLog::add(bool any_hit,
                  bool coherent,
+                 float cone_rad,
                  const float* const (&from)[8],
                  const unsigned* masks,
                  std::size_t count) {
-  streams.push_back({any_hit, coherent, static_cast<std::uint32_t>(mask.size()),
+  streams.push_back({any_hit, coherent, cone_rad, static_cast<std::uint32_t>(mask.size()),
                      static_cast<std::uint32_t>(count)});
   std::vector<float>* const to[8] = {&ox, &oy, &oz, &dx, &dy, &dz, &near_m, &far_m};
   for (std::size_t i = 0; i < 8; ++i) to[i]->insert(to[i]->end(), from[i], from[i] + count);
@@ -47,6 +48,7 @@ std::uint64_t shoot(const Scene& scene, const RayLog& log, const LoggedStream& s
                far_m.data(),  const_cast<unsigned*>(log.mask.data() + at),
                id.data(),     flags.data()};
   TraceContext context(scene, s.any_hit ? RayKind::shadow : RayKind::camera, coherent);
+  context.cone_rad = s.cone_rad;
   std::uint64_t hits = 0;
   if (s.any_hit) {
     context.transmittance_r = context.transmittance_g = context.transmittance_b = share.data();

@@ -13,6 +13,7 @@ namespace render {
 struct LoggedStream {
   bool any_hit = false;                // shadow rays
   bool coherent = false;               // camera rays
+  float cone_rad = 0;                  // of rays that are not shadow rays: as TraceContext has it
   std::uint32_t first = 0, count = 0;  // in RayLog's arrays
 };
 
@@ -23,6 +24,7 @@ struct RayLog {
 
   void add(bool any_hit,
            bool coherent,
+           float cone_rad,
            const float* const (&origin_direction_near_far)[8],
            const unsigned* masks,
            std::size_t count);

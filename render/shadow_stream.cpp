@@ -18,7 +18,7 @@ void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics)
     context.transmittance_b = w.tb.data();
   }
   if (w.log) {
-    w.log->add(true, false,
+    w.log->add(true, false, 0,
                {w.ox.data(), w.oy.data(), w.oz.data(), w.dx.data(), w.dy.data(), w.dz.data(),
                 w.near_m.data(), w.far_m.data()},
                w.mask.data(), n);

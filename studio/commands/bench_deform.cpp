@@ -72,7 +72,7 @@ render::RayLog make_rays(bool from_camera) {
       }
       const float* parts[8];
       for (std::size_t k = 0; k < 8; ++k) parts[k] = rays[k].data();
-      log.add(false, from_camera, parts, masks.data(), masks.size());
+      log.add(false, from_camera, 0, parts, masks.data(), masks.size());
     }
   }
   return log;

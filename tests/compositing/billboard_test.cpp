@@ -12,6 +12,7 @@
 #include "furnished_scene.h"
 #include "made_shot.h"
 #include "render/kept_transport.h"
+#include "render/ray_log.h"
 #include "render/reference.h"
 #include "render/trace.h"
 
@@ -184,6 +185,25 @@ TEST(Billboard, ShowsTheSameWhereItIsPassedAtOnce) {
     return see(std::move(picture), 0, false).statistics.secondary_rays;
   };
   EXPECT_LT(rays(small_figure()), rays(std::make_shared<Unsure>(small_figure())) / 2);
+}
+
+// What the kernel is measured against are the rays that it shot, as far as they went.
+TEST(Billboard, IsPassedByLoggedRaysAsByTheirOriginals) {
+  const auto clear = picture_from(64, 64, [](int, int) { return std::array<float, 4>{}; });
+  const MadeShot shot = shot_of(scene_with(make_billboard_material("person", {})), {clear});
+  std::vector<render::RayLog> logs(1);
+  const render::FrameContext context = render::make_frame_context(shot.inputs(), shot.job);
+  render::TileWorkspace workspace;
+  workspace.log_rays(&logs[0]);
+  render::TileJob tile;
+  render::TileResult result;
+  const render::Rect picture{0, 0, width, height};
+  cut_tile(shot.plate, picture, 0, tile);
+  size_result(picture, result);
+  render_tile(context, tile, workspace, result);
+  EXPECT_EQ(result.statistics.secondary_rays, 0U);
+  EXPECT_GE(logs[0].mask.size(), static_cast<std::size_t>(width * height));
+  EXPECT_EQ(shoot_logged_rays(*shot.scene, logs, true), 0U);
 }
 
 // A person on a floor that catches the shadow, with a mirror behind and a glass ball in front.
