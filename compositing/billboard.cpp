@@ -66,6 +66,16 @@ Vec3f passed(const Block& block, const std::array<float, 4>& rgba) {
   return {of(rgba[0]), of(rgba[1]), of(rgba[2])};
 }
 
+// What is wrong with it but for the camera; null = nothing.
+const char* fault_of(const Block& block) {
+  for (const float gain : block.gain) {
+    if (!(gain >= 0 && std::isfinite(gain))) return "gain must be finite, and 0 or more";
+  }
+  if (!(block.translucency >= 0 && block.translucency <= 1)) return "translucency must be 0 to 1";
+  if (block.lit != 0 && block.translucency > 0) return "translucency is not for what is lit";
+  return nullptr;
+}
+
 Vec3f grey(float value) { return {value, value, value}; }
 
 class BillboardShader final : public render::Shader {
@@ -80,10 +90,7 @@ class BillboardShader final : public render::Shader {
     if (material.parameters.size() != sizeof(Block) + bytes_of_places(b.camera)) {
       refuse("wrong parameter block");
     }
-    for (const float gain : b.gain) {
-      if (!(gain >= 0 && std::isfinite(gain))) refuse("gain must be finite, and 0 or more");
-    }
-    if (!(b.translucency >= 0 && b.translucency <= 1)) refuse("translucency must be 0 to 1");
+    if (const char* fault = fault_of(b)) refuse(fault);
   }
 
   void shade(const ShadeContext& context,
@@ -163,22 +170,14 @@ Material material_of(std::string name, const Block& block, const std::vector<Gri
 }
 
 Block block_from(const BillboardSettings& settings) {
-  for (const float gain : settings.gain) {
-    if (!(gain >= 0 && std::isfinite(gain))) {
-      throw std::invalid_argument("a billboard's gain must be finite, and 0 or more");
-    }
-  }
-  if (!(settings.translucency >= 0 && settings.translucency <= 1)) {
-    throw std::invalid_argument("a billboard's translucency must be 0 to 1");
-  }
-  if (settings.lit && settings.translucency > 0) {
-    throw std::invalid_argument("a billboard that is lit has no translucency");
-  }
   Block block{};
   block.translucency = settings.translucency;
   block.picture = settings.picture;
   block.lit = settings.lit ? 1 : 0;
   block.gain = settings.gain;
+  if (const char* fault = fault_of(block)) {
+    throw std::invalid_argument(std::string("a billboard's ") + fault);
+  }
   return block;
 }
 

@@ -244,12 +244,7 @@ void KeyedTexture::finish() {
 }
 
 void KeyedTexture::take(const capture::Image& frame) {
-  const auto good = [](int side) { return side >= 1 && side <= render::largest_video_side; };
-  if (!good(frame.width) || !good(frame.height)) {
-    throw std::invalid_argument("a picture of " + std::to_string(frame.width) + "x" +
-                                std::to_string(frame.height) + "; sides go from 1 to " +
-                                std::to_string(render::largest_video_side));
-  }
+  render::check_video_size(frame.width, frame.height);
   if (frame.channels != 3 && frame.channels != 4) {
     throw std::invalid_argument("a person's picture has 3 or 4 channels, not " +
                                 std::to_string(frame.channels));

@@ -84,15 +84,6 @@ constexpr std::array<FormatEntry, video_formats> formats{{
     {8, 4, decode_half<4>},
 }};
 
-void check_size(int width, int height) {
-  const auto good = [](int side) { return side >= 1 && side <= largest_video_side; };
-  if (!good(width) || !good(height)) {
-    throw std::invalid_argument("a video frame of " + std::to_string(width) + "x" +
-                                std::to_string(height) + "; sides go from 1 to " +
-                                std::to_string(largest_video_side));
-  }
-}
-
 void size_image(capture::Image& image, int height, int width, int channels) {
   image.height = height;
   image.width = width;
@@ -169,8 +160,17 @@ void finish(VideoTexture& texture) {
 
 }  // namespace
 
+void check_video_size(int width, int height) {
+  const auto good = [](int side) { return side >= 1 && side <= largest_video_side; };
+  if (!good(width) || !good(height)) {
+    throw std::invalid_argument("a video frame of " + std::to_string(width) + "x" +
+                                std::to_string(height) + "; sides go from 1 to " +
+                                std::to_string(largest_video_side));
+  }
+}
+
 void make_video_texture(const capture::Image& frame, VideoTexture& texture) {
-  check_size(frame.width, frame.height);
+  check_video_size(frame.width, frame.height);
   if (frame.channels != 3 && frame.channels != 4) {
     throw std::invalid_argument("a video texture has 3 or 4 channels, not " +
                                 std::to_string(frame.channels));
@@ -187,7 +187,7 @@ VideoTexture make_video_texture(const capture::Image& frame) {
 }
 
 VideoTexture make_video_texture(const PackedFrame& frame) {
-  check_size(frame.width, frame.height);
+  check_video_size(frame.width, frame.height);
   const FormatEntry& format = formats.at(static_cast<std::size_t>(frame.format));
   const auto count = static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
   if (frame.texels.size() != count * format.bytes) {

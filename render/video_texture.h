@@ -51,6 +51,8 @@ struct PackedFrame {
 
 // Widest and highest frame that is accepted.
 inline constexpr int largest_video_side = 16384;
+// Throws std::invalid_argument for sides that are not 1 to that.
+void check_video_size(int width, int height);
 
 // The texture of a frame, scene-linear as capture delivers it, (height, width, 3 or 4). A texture
 // that is made again keeps its memory. Values that are not finite become 0 and are counted; those

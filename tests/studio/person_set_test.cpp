@@ -362,6 +362,8 @@ TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
   capture::write_exr((dir_ / "drawn.exr").string(), capture::make_image(360, 480));
   expect_refusal("key = {", "key = { by = \"texel\", core_mask = \"drawn.exr\", ",
                  "knows no masks");
+  expect_refusal("feet = \"auto\"", "feet = \"auto\"\nlit = true\ntranslucency = 0.5",
+                 "not for what is lit");
   write_plate(64, 48);
   expect_refusal("walker\"", "walker\"", "64x48");
   expect_refusal("walker\"", "walker\"", "480x360");
