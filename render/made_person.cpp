@@ -9,8 +9,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include "capture/colour.h"
 #include "capture/parallel_loop.h"
 #include "render/made_noise.h"

@@ -7,8 +7,6 @@
 #include <numbers>
 #include <stdexcept>
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include "capture/parallel_loop.h"
 #include "render/environment.h"
 #include "render/made_noise.h"

@@ -7,8 +7,6 @@
 #include <functional>
 #include <vector>
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include "capture/colour.h"
 #include "capture/counter_random.h"
 #include "capture/parallel_loop.h"

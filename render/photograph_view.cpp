@@ -5,8 +5,6 @@
 #include <cstdint>
 #include <stdexcept>
 
-#include <oneapi/tbb/parallel_for.h>
-
 #include "capture/parallel_loop.h"
 #include "render/environment_sampler.h"
 #include "render/path_tracer.h"

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include "capture/files.h"
 #include "capture/made_sound.h"
