@@ -126,6 +126,30 @@ TEST(Tree, SaysInTheFirstLineOfEveryFileWhatItIs) {
   }
 }
 
+// So that it compiles alone.
+TEST(Tree, IncludesEachHeaderFirstInItsOwnSource) {
+  std::size_t headers = 0;
+  for (const std::string_view folder : folders) {
+    for (const fs::path& header : sources_of(folder)) {
+      if (header.extension() != ".h") continue;
+      ++headers;
+      std::ifstream file(header);
+      std::string line;
+      while (std::getline(file, line) && line.starts_with("//")) {
+      }
+      EXPECT_EQ(line, "#pragma once") << header.string();
+      std::ifstream source(fs::path(header).replace_extension(".cpp"));
+      while (std::getline(source, line) && !line.starts_with("#include")) {
+      }
+      if (!source) continue;  // tests/CMakeLists.txt compiles it
+      EXPECT_EQ(line,
+                "#include \"" + header.lexically_relative(PLATELIGHT_SOURCE_DIR).string() + "\"")
+          << header.string();
+    }
+  }
+  EXPECT_GT(headers, 20U) << "the tree was not found";
+}
+
 // Other versions break lines at other places.
 TEST(Tree, IsFormattedByItsOwnRules) {
   const auto version = lines_of("clang-format --version 2>&1");
