@@ -57,6 +57,7 @@ void CellBaker::bake(const FrameContext& frame,
                       std::min(cell_size, table.height - y0)};
   if (frame.inputs.count_rays) transport.counts.resize(cell_pixels);
   counting_ = frame.inputs.count_rays ? transport.counts.data() : nullptr;
+  cuts_glass_later_ = effort_.aa_samples > 1 && stage == finished_stage;
   compares_centres_ = effort_.aa_samples > 1;
   compares_further_ = effort_.aa_tolerance > 0 || counting_ != nullptr;
   samples_.fill({});

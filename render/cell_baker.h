@@ -251,6 +251,7 @@ class CellBaker final : public RaySink {
   RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for
   // Whether anything is decided by what samples see: centres', further ones'.
   bool compares_centres_ = false, compares_further_ = false;
+  bool cuts_glass_later_ = false;  // rays inside clear bodies are followed further than others
   int x0_ = 0, y0_ = 0;
   int block_ = 1;      // pixels a side that share a camera ray
   CellMask inside_{};  // pixels that have one

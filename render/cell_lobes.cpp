@@ -20,7 +20,7 @@ constexpr std::uint32_t parts_of_source = 4;
 constexpr float far_source = 3;
 // By how much weaker rays inside a clear body may be before they are cut. What lies straight on is
 // not what they see where they come out, and that may be the sun. One ray a pixel shows nothing
-// that small.
+// that small, and pictures that still sharpen have no time for it.
 constexpr float inside_glass = 0.125F;
 
 // Not wider than cones get.
@@ -114,8 +114,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const bool many = sent_[from.pixel] >= effort_.max_rays || queue_.size() == queue_.capacity();
   statistics_->depth_limit_hits += deep;
   statistics_->ray_limit_hits += many;
-  const bool finer = ray.media.count > 0 && effort_.aa_samples > 1;
-  const float least = (1 - effort_.accuracy) * (finer ? inside_glass : 1);
+  const bool later = ray.media.count > 0 && cuts_glass_later_;
+  const float least = (1 - effort_.accuracy) * (later ? inside_glass : 1);
   // What little a ray adds is not worth many steps along its cone.
   const Spread cone = straight || weight >= least ? ray.spread : rounded(ray.spread, ray.direction);
   const auto too_dim = [&] {
