@@ -86,7 +86,7 @@ void VideoFeed::update(Player& player, capture::Time time) {
         fmt::format("video {} {}: its last picture stays", player.settings.source, *note));
   }
   if (player.frame.texture != nullptr && (!frame || frame->image == player.image)) return;
-  auto texture = textures_.lend();
+  auto texture = player.textures.lend();
   const capture::Frame& shown = frame ? *frame : source.first();
   render::make_video_texture(shown.image ? *shown.image : capture::make_image(1, 1), *texture);
   player.image = shown.image;

@@ -55,6 +55,7 @@ class VideoFeed {
     std::shared_ptr<const capture::Image> image;  // that `frame` was made from
     VideoFrame frame;
     bool reported = false;  // numbers that are none
+    capture::Pool<render::VideoTexture> textures;
   };
   struct Channel {
     VideoSettings settings;
@@ -69,7 +70,6 @@ class VideoFeed {
   bool live_ = false;
   std::optional<capture::Time> start_;  // for sources opened now; nothing = the next time asked for
   std::vector<Channel> channels_;
-  capture::Pool<render::VideoTexture> textures_;
   std::vector<std::string> notes_;
 };
 
