@@ -58,6 +58,22 @@ Feet enlarged(Feet feet, int shrink) {
   return feet;
 }
 
+// The part of a picture that an outline is in, and so far around it that what is seen a twentieth
+// as large still ends within. Both are edges in pixels; all of it where the outline is none of it.
+compositing::Window window_about(const std::array<float, 4>& outline,
+                                 const std::array<float, 4>& picture) {
+  const float width = picture[2] - picture[0], height = picture[3] - picture[1];
+  const float around = std::max(width, height) / 32;
+  const auto at = [](float pixel, float first, float size) {
+    return std::clamp((pixel - first) / size, 0.0F, 1.0F);
+  };
+  const compositing::Window window{
+      at(outline[0] - around, picture[0], width), at(outline[1] - around, picture[1], height),
+      at(outline[2] + around, picture[0], width), at(outline[3] + around, picture[1], height)};
+  const bool any = window.left < window.right && window.top < window.bottom;
+  return any ? window : compositing::Window();
+}
+
 }  // namespace
 
 std::shared_ptr<const render::LivePicture> clear_picture() {
@@ -112,19 +128,19 @@ void PersonCameraFeed::advance(capture::Time time) {
   time_ = newest.time;
 }
 
-bool PersonCameraFeed::show(capture::Pool<compositing::KeyedTexture>& textures) {
+bool PersonCameraFeed::show() {
   if (image_ == shown_) return false;
-  key_frame(textures);
+  key_frame();
   shown_ = image_;
   return true;
 }
 
-void PersonCameraFeed::key_frame(capture::Pool<compositing::KeyedTexture>& textures) {
+void PersonCameraFeed::key_frame() {
   const capture::Image& image = *image_;
-  const auto texture = textures.lend();
+  const auto texture = textures_.lend();
   if (!keyer_) {
     texture->take(image);
-    if (image.channels == 4) look_for_person(texture->frame());
+    if (image.channels == 4) return show_keyed(texture);
     picture_ = std::make_shared<compositing::KeyedPicture>(texture, bounded_);
     return;
   }
@@ -142,18 +158,25 @@ void PersonCameraFeed::key_frame(capture::Pool<compositing::KeyedTexture>& textu
     return;
   }
   texture->finish();
+  show_keyed(texture);
+}
+
+void PersonCameraFeed::show_keyed(std::shared_ptr<const compositing::KeyedTexture> texture) {
   look_for_person(texture->frame());
-  picture_ = std::make_shared<compositing::KeyedPicture>(texture, bounded_);
+  window_ = settings_.lens ? compositing::Window() : window_about(outline(), whole());
+  picture_ = see_through(window_,
+                         std::make_shared<compositing::KeyedPicture>(std::move(texture), bounded_));
 }
 
 void PersonCameraFeed::look_for_person(const compositing::KeyedFrame& keyed) {
-  if (!settings_.lens) return;
   const int longer = std::max(keyed.image().height, keyed.image().width);
   const int shrink = std::max(1, (longer + matte_side - 1) / matte_side);
   const capture::Image matte = matte_of(keyed, shrink);
-  has_matte_ = true;
-  feet_ = enlarged(compositing::find_feet(matte), shrink);
-  if (!bounded_) return;
+  if (settings_.lens) {
+    has_matte_ = true;
+    feet_ = enlarged(compositing::find_feet(matte), shrink);
+    if (!bounded_) return;
+  }
   outline_ = compositing::outline_box(matte);
   if (outline_) enlarge(*outline_, shrink);
 }

@@ -12,6 +12,7 @@
 #include "compositing/feet.h"
 #include "compositing/keyed_texture.h"
 #include "compositing/keyer.h"
+#include "compositing/picture_window.h"
 #include "render/live_picture.h"
 #include "studio/set.h"
 #include "studio/timed_source.h"
@@ -49,10 +50,12 @@ class PersonCameraFeed {
   std::optional<std::string> take_note() { return source_->take_note(); }
 
   // Keys the newest frame, unless it is already. True if it did.
-  bool show(capture::Pool<compositing::KeyedTexture>& textures);
+  bool show();
 
-  // What follows is of the frame that was shown last.
+  // What follows is of the frame that was shown last. Of a camera whose pose is not known, the
+  // picture is the part of the video in which anybody is; window() says which.
   const std::shared_ptr<const render::LivePicture>& picture() const { return picture_; }
+  const compositing::Window& window() const { return window_; }
   float confidence() const { return confidence_; }
   std::string_view key() const { return key_; }
   // How far the picture has gone from its plate, if the camera was moved: right and down, pixels.
@@ -65,7 +68,8 @@ class PersonCameraFeed {
   std::array<float, 4> outline() const;
 
  private:
-  void key_frame(capture::Pool<compositing::KeyedTexture>& textures);
+  void key_frame();
+  void show_keyed(std::shared_ptr<const compositing::KeyedTexture> texture);
   void look_for_person(const compositing::KeyedFrame& keyed);
   std::array<float, 4> whole() const;
 
@@ -78,6 +82,8 @@ class PersonCameraFeed {
   std::shared_ptr<const capture::Image> image_, shown_;  // newest; that the picture was made from
   bool skipped_ = false;                                 // frames between these two
   std::shared_ptr<const render::LivePicture> picture_;
+  compositing::Window window_;
+  capture::Pool<compositing::KeyedTexture> textures_;
   float confidence_ = 1;
   std::string_view key_ = "none";
   std::optional<std::array<float, 2>> moved_px_;

@@ -5,12 +5,14 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <numbers>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "capture/parallel_loop.h"
 #include "compositing/billboard_place.h"
 #include "compositing/person_box.h"
 #include "compositing/person_shape.h"
@@ -66,6 +68,7 @@ struct PersonFeed::Person {
   std::shared_ptr<const render::LivePicture> clear = clear_picture();
   std::vector<bool> hidden;  // of its instances
   bool told = false;         // what it is shown as
+  std::vector<std::string> notes;
   PersonFrame frame;
 
   bool has_several() const { return cameras.size() > 1; }
@@ -119,16 +122,16 @@ std::vector<std::shared_ptr<const render::LivePicture>> PersonFeed::nothing_yet(
 // Keys the camera's newest frame, if it has not been.
 void PersonFeed::show(Person& person, std::size_t index) {
   Person::Camera& camera = person.cameras[index];
-  if (!camera.feed.show(textures_)) return;
+  if (!camera.feed.show()) return;
   const bool unsure = camera.feed.confidence() < sure;
   if (unsure && !camera.unsure) {
-    notes_.push_back(
+    person.notes.push_back(
         fmt::format("{}: the key is unsure ({})", person.name_of(index), camera.feed.key()));
   }
   camera.unsure = unsure;
   const auto moved = camera.feed.moved_px();
   if (moved && !camera.moved) {
-    notes_.push_back(fmt::format(
+    person.notes.push_back(fmt::format(
         "{}: its camera was moved: the picture is {:.1f} px further right and {:.1f} px further "
         "down "
         "than its clean plate. Take the plate anew (platelight key plate), and its pose",
@@ -146,8 +149,8 @@ void PersonFeed::stand(Person& person) {
       person.tracker->update(std::chrono::duration<double>(feed.time()).count(), feed.feet());
   const FeetStatus seen = feed.feet().status;
   if (seen != FeetStatus::seen && status.feet == compositing::name_of(FeetStatus::seen)) {
-    notes_.push_back(fmt::format("{}: its feet are {}; it stays where it is", status.name,
-                                 compositing::name_of(seen)));
+    person.notes.push_back(fmt::format("{}: its feet are {}; it stays where it is", status.name,
+                                       compositing::name_of(seen)));
   }
   status.feet = compositing::name_of(seen);
 }
@@ -158,7 +161,8 @@ void PersonFeed::update(Person& person, capture::Time time) {
     PersonCameraFeed& feed = person.cameras[i].feed;
     feed.advance(time);
     if (const auto note = feed.take_note()) {
-      notes_.push_back(fmt::format("{} {}: its last picture stays", person.name_of(i), *note));
+      person.notes.push_back(
+          fmt::format("{} {}: its last picture stays", person.name_of(i), *note));
     }
   }
   if (person.tracker || !person.has_several()) show(person, 0);
@@ -181,7 +185,7 @@ void PersonFeed::judge(Person& person, std::size_t index, capture::Time time) {
                                                   : nullptr;
   if (wrong) {
     if (!camera.is_out()) {
-      notes_.push_back(fmt::format("{}: left out, for {}", person.name_of(index), wrong));
+      person.notes.push_back(fmt::format("{}: left out, for {}", person.name_of(index), wrong));
     }
     camera.out_for = wrong;
     camera.well.reset();
@@ -189,7 +193,7 @@ void PersonFeed::judge(Person& person, std::size_t index, capture::Time time) {
     if (!camera.well) camera.well = time;
     if (time - *camera.well < trial) return;
     camera.out_for = nullptr;
-    notes_.push_back(fmt::format("{}: taken back", person.name_of(index)));
+    person.notes.push_back(fmt::format("{}: taken back", person.name_of(index)));
   }
 }
 
@@ -239,13 +243,13 @@ void PersonFeed::tell(Person& person) {
   const bool first = !std::exchange(person.told, true);
   const bool changed = now.hull != status.hull || static_cast<int>(now.camera) + 1 != status.camera;
   if (!first && (now.hull != status.hull || (changed && !now.hull))) {
-    notes_.push_back(
+    person.notes.push_back(
         fmt::format("{}: shown as {} from here, {:.0f} degrees off, for an error of "
                     "{:.3f} m",
                     status.name, words_for(now), now.view_rad / degree, now.error_m));
   }
   if (!now.holds && status.holds) {
-    notes_.push_back(fmt::format(
+    person.notes.push_back(fmt::format(
         "{}: seen {:.0f} degrees off camera {}, nothing holds the error of {:g} m: {} has {:.3f} "
         "m, the hull would have {:.3f} m",
         status.name, now.view_rad / degree, now.camera + 1, s.error_m, words_for(now), now.error_m,
@@ -285,16 +289,26 @@ void PersonFeed::place_billboard(Person& person, Vec3 viewer) {
     status.view_angle_deg = facing.view_angle_rad / degree;
     status.shallow = facing.shallow;
     const double turned = facing.azimuth_rad;
-    const auto wide = static_cast<float>(s.height_m) * feed.aspect();
+    // No more of the video's picture than the window.
+    const compositing::Window& window = feed.window();
+    const auto high = static_cast<float>(s.height_m), wide = high * feed.aspect();
+    const float width = wide * (window.right - window.left);
+    const float right = wide * (0.5F * (window.left + window.right) - 0.5F);
     const auto c = static_cast<float>(std::cos(turned)),
                sine = static_cast<float>(std::sin(turned));
     const auto at = calibrate::to_float(s.position);
-    place = {wide * c,    -sine, 0,
-             at.x,  //
-             wide * sine, c,     0,
-             at.y,  //
-             0,           0,     static_cast<float>(s.height_m),
-             at.z};
+    place = {width * c,
+             -sine,
+             0,
+             at.x + right * c,  //
+             width * sine,
+             c,
+             0,
+             at.y + right * sine,  //
+             0,
+             0,
+             high * (window.bottom - window.top),
+             at.z + high * (1 - window.bottom)};
   }
   status.error_m = compositing::billboard_error_m(status.view_angle_deg * degree, off_plane);
   status.holds = status.error_m <= s.error_m;
@@ -337,24 +351,31 @@ void PersonFeed::place(Person& person, Vec3 viewer) {
 
 std::vector<PersonFrame> PersonFeed::at(capture::Time time, const calibrate::Pose& cam_from_set) {
   const Vec3 viewer = calibrate::position_of(cam_from_set);
+  capture::parallel_for(std::size_t{0}, persons_.size(),
+                        [&](std::size_t i) { show_at(*persons_[i], time, viewer); });
   std::vector<PersonFrame> frames;
   for (const auto& person : persons_) {
-    update(*person, time);
-    const bool was_shallow = person->frame.status.shallow;
-    if (person->has_several()) {
-      choose(*person, time, viewer);
-      tell(*person);
-    }
-    place(*person, viewer);
-    const PersonStatus& status = person->frame.status;
-    if (status.shallow && !was_shallow) {
-      notes_.push_back(
-          fmt::format("{}: seen {:.0f} degrees from the side, more than it turns ({:.0f})",
-                      status.name, status.view_angle_deg, person->settings.turn_rad / degree));
-    }
+    std::ranges::move(person->notes, std::back_inserter(notes_));
+    person->notes.clear();
     frames.push_back(person->frame);
   }
   return frames;
+}
+
+void PersonFeed::show_at(Person& person, capture::Time time, Vec3 viewer) {
+  update(person, time);
+  const bool was_shallow = person.frame.status.shallow;
+  if (person.has_several()) {
+    choose(person, time, viewer);
+    tell(person);
+  }
+  place(person, viewer);
+  const PersonStatus& status = person.frame.status;
+  if (status.shallow && !was_shallow) {
+    person.notes.push_back(
+        fmt::format("{}: seen {:.0f} degrees from the side, more than it turns ({:.0f})",
+                    status.name, status.view_angle_deg, person.settings.turn_rad / degree));
+  }
 }
 
 std::vector<std::string> PersonFeed::take_notes() { return std::exchange(notes_, {}); }

@@ -9,8 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "capture/pool.h"
-#include "compositing/keyed_texture.h"
+#include "capture/frame.h"
 #include "render/live_picture.h"
 #include "studio/set.h"
 
@@ -64,6 +63,8 @@ class PersonFeed {
  private:
   struct Person;
 
+  // Persons have nothing in common: each of these may run beside those of others.
+  void show_at(Person& person, capture::Time time, calibrate::Vec3 viewer);
   void update(Person& person, capture::Time time);
   void show(Person& person, std::size_t camera);
   void stand(Person& person);
@@ -74,7 +75,6 @@ class PersonFeed {
   void place_billboard(Person& person, calibrate::Vec3 viewer);
 
   std::vector<std::shared_ptr<Person>> persons_;
-  capture::Pool<compositing::KeyedTexture> textures_;
   std::vector<std::string> notes_;
 };
 
