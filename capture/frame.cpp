@@ -19,4 +19,19 @@ Time time_of_frame(std::int64_t n, Rational rate) {
   return Time{static_cast<Time::rep>(time_ns)};
 }
 
+std::int64_t frame_at(Time time, Rational rate) {
+  if (rate.num <= 0 || rate.den <= 0) {
+    throw std::invalid_argument("a time has a frame only at a rate above 0");
+  }
+  // n den 1e9 / num < time + 1 is what rounding down to nanoseconds leaves of n's time <= time.
+  __extension__ using Wide = __int128;
+  const Wide scaled = (Wide{time.count()} + 1) * rate.num - 1;
+  const Wide step = Wide{rate.den} * std::nano::den;
+  Wide n = scaled / step;
+  if (scaled % step < 0) {
+    n -= 1;
+  }
+  return static_cast<std::int64_t>(n);
+}
+
 }  // namespace capture

@@ -27,6 +27,10 @@ struct Rational {
 // Exact for |n| up to 2^40 and any broadcast rate.
 Time time_of_frame(std::int64_t n, Rational rate);
 
+// The last frame whose time is not after `time`, exactly as time_of_frame has it; below 0 before
+// frame 0. Exact for times of centuries at any broadcast rate.
+std::int64_t frame_at(Time time, Rational rate);
+
 enum class FrameStatus {
   good,
   damaged,  // decoded, but the source reported errors inside it

@@ -61,6 +61,11 @@ std::optional<std::int64_t> number_in(const std::string& name, const Pattern& pa
   return number;
 }
 
+Pattern pattern_of(const std::string& path) {
+  if (const std::optional<Pattern> pattern = parse(path)) return *pattern;
+  throw std::invalid_argument("a sequence needs %d or %04d in its file name: " + path);
+}
+
 }  // namespace
 
 bool is_sequence(const std::string& path) {
@@ -68,18 +73,12 @@ bool is_sequence(const std::string& path) {
   return parse(path).has_value() && !std::filesystem::exists(path, error);
 }
 
-std::unique_ptr<Camera> open_sequence(const std::string& path,
-                                      const CameraOptions& options,
-                                      const LightCurves& curves) {
-  const std::optional<Pattern> pattern = parse(path);
-  if (!pattern) {
-    throw std::invalid_argument("a sequence needs %d or %04d in its file name: " + path);
-  }
+std::map<std::int64_t, std::string> numbered_files(const std::string& path) {
+  const Pattern pattern = pattern_of(path);
   std::error_code error;
   std::map<std::int64_t, std::string> files;
-  for (const auto& entry : std::filesystem::directory_iterator(pattern->folder, error)) {
-    const std::optional<std::int64_t> number =
-        number_in(entry.path().filename().string(), *pattern);
+  for (const auto& entry : std::filesystem::directory_iterator(pattern.folder, error)) {
+    const std::optional<std::int64_t> number = number_in(entry.path().filename().string(), pattern);
     if (number) {
       files[*number] = entry.path().string();
     }
@@ -88,9 +87,32 @@ std::unique_ptr<Camera> open_sequence(const std::string& path,
     throw std::runtime_error("cannot open " + path + ": " + error.message());
   }
   if (files.empty()) {
-    throw std::runtime_error("cannot open " + path + ": no file in " + pattern->folder.string() +
+    throw std::runtime_error("cannot open " + path + ": no file in " + pattern.folder.string() +
                              " is named so");
   }
+  std::int64_t expected = files.begin()->first;
+  for (const auto& [number, file] : files) {
+    if (number - expected > max_gap) {
+      throw std::runtime_error("cannot open " + path + ": " + std::to_string(number - expected) +
+                               " files are missing before " + file +
+                               "; keep two sequences in two folders");
+    }
+    expected = number + 1;
+  }
+  return files;
+}
+
+std::string numbered_file(const std::string& path, std::int64_t number) {
+  const Pattern pattern = pattern_of(path);
+  std::string digits = std::to_string(number);
+  if (digits.size() < pattern.width) digits.insert(0, pattern.width - digits.size(), '0');
+  return (pattern.folder / (pattern.before + digits + pattern.after)).string();
+}
+
+std::unique_ptr<Camera> open_sequence(const std::string& path,
+                                      const CameraOptions& options,
+                                      const LightCurves& curves) {
+  const std::map<std::int64_t, std::string> files = numbered_files(path);
   std::vector<PictureEntry> entries;
   std::int64_t expected = files.begin()->first;
   const auto add = [&](const std::string& file, FrameStatus status, const std::string& note) {
@@ -99,11 +121,6 @@ std::unique_ptr<Camera> open_sequence(const std::string& path,
     entries.push_back({file, time, 0, status, note});
   };
   for (const auto& [number, file] : files) {
-    if (number - expected > max_gap) {
-      throw std::runtime_error("cannot open " + path + ": " + std::to_string(number - expected) +
-                               " files are missing before " + file +
-                               "; keep two sequences in two folders");
-    }
     for (; expected < number; ++expected) {
       add("", FrameStatus::lost, "there is no file with the number " + std::to_string(expected));
     }
