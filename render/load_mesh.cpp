@@ -23,12 +23,14 @@ Material material_of(const RawMaterial& raw) {
 LoadedModel load(const ModelFolder& folder, const LoadOptions& options) {
   RawModel raw = read_model_confined(folder, options);
   LoadedModel model;
-  model.scene.textures = decode_textures(raw, folder);
   for (Mesh& mesh : raw.meshes) {
     model.scene.meshes.push_back(std::make_shared<const Mesh>(std::move(mesh)));
   }
-  for (const RawMaterial& material : raw.materials) {
-    model.scene.materials.push_back(material_of(material));
+  if (!options.shape_alone) {
+    model.scene.textures = decode_textures(raw, folder);
+    for (const RawMaterial& material : raw.materials) {
+      model.scene.materials.push_back(material_of(material));
+    }
   }
   model.scene.instances = std::move(raw.instances);
   model.report = std::move(raw.report);

@@ -18,6 +18,8 @@ struct LoadOptions {
   std::vector<std::string> hide;  // nodes left out, with everything under them
   float emission_gain = 1;        // multiplies what the materials emit
   UpAxis up = UpAxis::by_format;
+  bool whole = false;        // refused where triangles would be left out
+  bool shape_alone = false;  // meshes and instances; no materials, no textures
 };
 
 struct LoadReport {

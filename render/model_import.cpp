@@ -116,12 +116,15 @@ class ModelBuilder {
     for (std::size_t i = 0; i < found.size(); ++i)
       if (!found[i]) refuse_hide(options_.hide[i]);
     LoadReport& report = model_.report;
-    if (report.triangles == 0) throw std::runtime_error("it shows no triangles");
-    if (left_out_ > 0)
-      report.notes.push_back(
-          std::to_string(left_out_) +
+    if (left_out_ > 0) {
+      const std::string count = std::to_string(left_out_);
+      const char* what =
           " triangles with positions that are not finite, or farther away than a "
-          "million kilometres, are left out");
+          "million kilometres";
+      if (options_.whole) throw std::runtime_error("it has " + count + what);
+      report.notes.push_back(count + what + ", are left out");
+    }
+    if (report.triangles == 0) throw std::runtime_error("it shows no triangles");
     model_.textures = materials_.take_textures();
     report.materials = model_.materials.size();
     return std::move(model_);

@@ -10,6 +10,7 @@ std::vector<std::byte> write_request(const std::string& file, const LoadOptions&
   out.put(options.scale);
   out.put(options.emission_gain);
   out.put(options.up);
+  out.put(static_cast<std::uint8_t>(options.whole));
   out.put(static_cast<std::uint64_t>(options.hide.size()));
   for (const std::string& node : options.hide) out.put_text(node);
   return out.take();
@@ -22,6 +23,9 @@ LoadOptions parse_request(std::span<const std::byte> bytes, std::string& file) {
   in.get(options.scale);
   in.get(options.emission_gain);
   in.get(options.up);
+  std::uint8_t whole = 0;
+  in.get(whole);
+  options.whole = whole != 0;
   for (std::size_t n = in.get_count(sizeof(std::uint64_t)); n > 0; --n) {
     options.hide.push_back(in.get_text());
   }
