@@ -133,7 +133,8 @@ std::string_view name_of(Stage stage) {
   return "";
 }
 
-FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(std::move(set)) {
+FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live)
+    : set_(std::move(set)), live_(live) {
   // Beside all else: the probe's pictures take the longest.
   std::future<std::unique_ptr<LightFeed>> light =
       std::async(std::launch::async, [this] { return std::make_unique<LightFeed>(set_); });
@@ -148,11 +149,13 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate) : set_(st
   if (plate_->is_live() && plate_rate.num > 0 && rate_.value() > plate_rate.value()) {
     rate_ = plate_rate;
   }
+  live_ = live_ || plate_->is_live();
   videos_ = std::make_unique<VideoFeed>(set_, plate_->first().time, plate_->is_live());
   persons_ = std::make_unique<PersonFeed>(set_, plate_->first().time, plate_->is_live());
   set_scene_ = describe_scene(set_);
   scene_ = compile(set_, *persons_, set_scene_, ++scene_version_);
   videos_->place(set_, set_scene_);
+  shapes_ = std::make_unique<ShapeFeed>(set_, set_scene_, rate_, plate_->first().time, live_);
   lamps_ = describe_lamps(set_);
   light_ = light.get();
 }
@@ -243,6 +246,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     const StageTimer timer(prepared, Stage::job);
     job.frame = number;
     job.time = time;
+    deform_objects(time, prepared);
     stand_persons(time, prepared);
     job.scene_version = scene_version_;
     job.effort = set_.effort;
@@ -268,6 +272,16 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.lens = lens_;
   }
   return prepared;
+}
+
+// Gives the objects that deform the frame's shapes.
+void FrameMaker::deform_objects(capture::Time time, PreparedFrame& frame) {
+  const bool changed = shapes_->at(time, set_scene_);
+  frame.held_shapes = shapes_->held();
+  std::ranges::move(shapes_->take_notes(), std::back_inserter(frame.notes));
+  if (!changed) return;
+  set_scene_.description.version = ++scene_version_;
+  scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_, scene_->pictures());
 }
 
 // Lets the persons of the frame's time stand in its scene.
@@ -354,6 +368,12 @@ void FrameMaker::take_over(Change change) {
   } catch (const std::invalid_argument& error) {
     fail(change.set, {}, error.what());
   }
+  // Begun where the show is: before the first shape is shown.
+  auto shapes = std::make_unique<ShapeFeed>(change.set, change.set_scene, rate_, std::nullopt,
+                                            live_, shapes_.get());
+  // Waits for the file that is being read, which no frame is to wait for.
+  leaving_ = std::async(std::launch::async, [before = std::move(shapes_)] {});
+  shapes_ = std::move(shapes);
   set_ = std::move(change.set);
   videos_ = std::move(videos);
   persons_ = std::move(change.persons);

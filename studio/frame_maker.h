@@ -19,6 +19,7 @@
 #include "studio/person_feed.h"
 #include "studio/set.h"
 #include "studio/set_scene.h"
+#include "studio/shape_feed.h"
 #include "studio/source.h"
 #include "studio/video_feed.h"
 
@@ -41,7 +42,8 @@ struct PreparedFrame {
   std::vector<std::shared_ptr<const render::VideoTexture>> videos;
   std::vector<const render::VideoTexture*> video_frames;  // the same, for inputs()
   std::vector<PersonStatus> persons;                      // of the set, in its order
-  std::vector<std::string> notes;                         // what went wrong while it was made
+  std::int64_t held_shapes = 0;    // objects that deform, whose shape is not the one due
+  std::vector<std::string> notes;  // what went wrong while it was made
   std::vector<capture::Sound> sound;
   std::chrono::steady_clock::time_point arrived;  // of the plate
   render::MatchResult match;
@@ -65,9 +67,12 @@ struct PreparedFrame {
 // frames depend on the set and the commands, and not on timing.
 class FrameMaker {
  public:
-  // Opens the set's sources and builds its scene. `rate` replaces the set's. Throws SetError with
-  // all faults that only opening shows, each at its place.
-  explicit FrameMaker(Set set, std::optional<capture::Rational> rate = std::nullopt);
+  // Opens the set's sources and builds its scene. `rate` replaces the set's. `live`: the show does
+  // not wait for what comes late; so it is with a live plate. Throws SetError with all faults that
+  // only opening shows, each at its place.
+  explicit FrameMaker(Set set,
+                      std::optional<capture::Rational> rate = std::nullopt,
+                      bool live = false);
 
   const Set& set() const { return set_; }
   capture::Rational rate() const { return rate_; }
@@ -123,6 +128,7 @@ class FrameMaker {
     std::shared_ptr<const calibrate::Lens> lens;
   };
   static Change prepare(Set set, std::uint64_t scene_version, bool live);
+  void deform_objects(capture::Time time, PreparedFrame& frame);
   void stand_persons(capture::Time time, PreparedFrame& frame);
   void check_change(const Set& set) const;
   void take_over(Change change);
@@ -131,10 +137,12 @@ class FrameMaker {
 
   Set set_;
   capture::Rational rate_;
+  bool live_;
   std::unique_ptr<Source> plate_;
   std::unique_ptr<LightFeed> light_;
   std::unique_ptr<VideoFeed> videos_;
   std::unique_ptr<PersonFeed> persons_;
+  std::unique_ptr<ShapeFeed> shapes_;
   std::optional<calibrate::Track> track_;
   std::shared_ptr<const render::Scene> scene_;
   SetScene set_scene_;
@@ -144,6 +152,7 @@ class FrameMaker {
   render::BounceFollower bounces_;
   std::uint64_t scene_version_ = 0;
   std::future<Change> change_;               // on its way
+  std::future<void> leaving_;                // shapes of the set before
   std::vector<std::string> notes_;           // for the next frame
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;

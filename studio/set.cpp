@@ -39,23 +39,6 @@ std::optional<capture::Rational> parse_rational(const std::string& text) {
   return capture::Rational{num / divisor, den / divisor};
 }
 
-void read_fps(Section& section, std::optional<capture::Rational>& fps) {
-  const TomlValue* value = section.value("fps");
-  if (value == nullptr) return;
-  if (value->kind == TomlValue::Kind::integer) {
-    std::int64_t rate = 0;
-    if (section.integer("fps", rate, 1, 1000)) fps = capture::Rational{rate, 1};
-    return;
-  }
-  if (value->kind == TomlValue::Kind::text) {
-    fps = parse_rational(value->text);
-    if (fps && fps->value() >= 0.01 && fps->value() <= 1000) return;
-    fps.reset();
-  }
-  section.fault("fps",
-                "must be a whole number from 1 to 1000, or a fraction such as \"30000/1001\"");
-}
-
 ShowSettings read_show_section(Section section) {
   ShowSettings show;
   section.need("width", "the picture's width in pixels");
@@ -118,6 +101,23 @@ RecordSettings read_record_section(Section section, const std::filesystem::path&
 }
 
 }  // namespace
+
+void read_fps(Section& section, std::optional<capture::Rational>& fps) {
+  const TomlValue* value = section.value("fps");
+  if (value == nullptr) return;
+  if (value->kind == TomlValue::Kind::integer) {
+    std::int64_t rate = 0;
+    if (section.integer("fps", rate, 1, 1000)) fps = capture::Rational{rate, 1};
+    return;
+  }
+  if (value->kind == TomlValue::Kind::text) {
+    fps = parse_rational(value->text);
+    if (fps && fps->value() >= 0.01 && fps->value() <= 1000) return;
+    fps.reset();
+  }
+  section.fault("fps",
+                "must be a whole number from 1 to 1000, or a fraction such as \"30000/1001\"");
+}
 
 SetError::SetError(std::vector<Diagnostic> diagnostics)
     : std::runtime_error(lines_of(diagnostics)), diagnostics_(std::move(diagnostics)) {}

@@ -108,9 +108,18 @@ struct PlacementSettings {
   double scale = 1;
 };
 
+// The files of an object's shapes, by which it deforms.
+struct ShapeSettings {
+  std::vector<std::string> files;        // in their order; some may not be there
+  std::optional<capture::Rational> fps;  // nothing = the show's
+  bool loop = false;                     // else the last shape stays
+  friend bool operator==(const ShapeSettings&, const ShapeSettings&) = default;
+};
+
 struct ObjectSettings {
   std::string name;
-  std::string mesh;  // file; "" = made
+  std::string mesh;  // file, the first one of `shapes`; "" = made
+  std::optional<ShapeSettings> shapes;
   std::string made;  // "car", "headlight", "stage", ...: see set_file.md
   Place place;       // of `mesh` or `made`
   PlacementSettings pose;

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "capture/sequence.h"
 #include "studio/set_sections.h"
 
 namespace studio {
@@ -46,6 +47,37 @@ void read_copies(Section& section, ObjectSettings& object) {
   }
 }
 
+// `mesh` as a pattern of numbered files, and how their shapes are shown.
+void read_shapes(Section& section, const std::string& pattern, ObjectSettings& object) {
+  ShapeSettings shapes;
+  read_fps(section, shapes.fps);
+  section.boolean("loop", shapes.loop);
+  std::int64_t first = 0, last = 0;
+  try {
+    const auto files = capture::numbered_files(pattern);
+    first = files.begin()->first;
+    last = files.rbegin()->first;
+    section.integer("first", first, first, last);
+  } catch (const std::runtime_error& error) {
+    section.fault("mesh", error.what());
+    return;
+  }
+  for (std::int64_t number = first; number <= last; ++number) {
+    shapes.files.push_back(capture::numbered_file(pattern, number));
+  }
+  object.mesh = shapes.files.front();
+  object.shapes = std::move(shapes);
+}
+
+void read_mesh(Section& section, const SetContext& context, ObjectSettings& object) {
+  std::string given;
+  if (section.text("mesh", given)) {
+    const std::string path = (context.base / given).lexically_normal().string();
+    if (capture::is_sequence(path)) return read_shapes(section, path, object);
+  }
+  section.file("mesh", context.base, object.mesh);
+}
+
 bool holds(const std::vector<std::string>& words, std::string_view word) {
   return std::ranges::find(words, word) != words.end();
 }
@@ -59,7 +91,7 @@ ObjectSettings read_object_section(Section section, const SetContext& context) {
     section.fault("", "must have either mesh = \"FILE\" or made = \"car\"");
   }
   object.place = section.place_of(section.has("mesh") ? "mesh" : "made");
-  section.file("mesh", context.base, object.mesh);
+  read_mesh(section, context, object);
   section.word("made", object.made,
                {"car", "headlight", "lamp", "stage", "glass_sphere", "tv_room", "tv", "desk"});
   if (auto table = section.table("pose")) object.pose = read_placement(*table);

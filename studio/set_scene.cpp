@@ -4,13 +4,13 @@
 #include <cmath>
 #include <map>
 #include <stdexcept>
-#include <tuple>
 
 #include <fmt/format.h>
 
 #include "compositing/stand_in.h"
 #include "render/join_scenes.h"
 #include "render/load_mesh.h"
+#include "render/load_shape.h"
 #include "render/made_car.h"
 #include "render/made_headlight.h"
 #include "render/made_lamp.h"
@@ -38,19 +38,18 @@ std::vector<Instance> add_model(SceneDescription& scene, const SceneDescription&
   return parts;
 }
 
-render::LoadOptions load_options(const ObjectSettings& object) {
-  render::LoadOptions options;
-  options.hide = object.hide;
-  options.emission_gain = static_cast<float>(object.emission_gain);
-  return options;
-}
-
-SceneDescription load_file(const std::string& file,
-                           const render::LoadOptions& options,
-                           std::vector<std::string>& notes) {
-  render::LoadedModel model = render::load_model(file, options);
+SceneDescription scene_of(render::LoadedModel model,
+                          const std::string& file,
+                          std::vector<std::string>& notes) {
   for (const std::string& note : model.report.notes) notes.push_back(file + ": " + note);
   return std::move(model.scene);
+}
+
+SceneDescription load_file(const ObjectSettings& object, std::vector<std::string>& notes) {
+  const render::LoadOptions options = load_options(object);
+  return scene_of(object.shapes ? render::load_deforming_model(object.mesh, options)
+                                : render::load_model(object.mesh, options),
+                  object.mesh, notes);
 }
 
 // Only the parts whose names `wanted` knows.
@@ -83,7 +82,7 @@ SceneDescription make_thing(const std::string& made) {
 }
 
 SceneDescription load_object(const ObjectSettings& object, std::vector<std::string>& notes) {
-  if (object.made.empty()) return load_file(object.mesh, load_options(object), notes);
+  if (object.made.empty()) return load_file(object, notes);
   if (object.made == "car") {
     render::MadeCarSettings car;
     car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
@@ -103,9 +102,6 @@ SceneDescription load_object(const ObjectSettings& object, std::vector<std::stri
 }
 
 // What people call it, or else its kind and number.
-std::string name_of(const ObjectSettings& object, std::size_t number) {
-  return object.name.empty() ? fmt::format("object {}", number) : object.name;
-}
 std::string name_of(const StandInSettings& stand_in, std::size_t number) {
   return stand_in.name.empty() ? fmt::format("stand-in {}", number) : stand_in.name;
 }
@@ -153,7 +149,7 @@ void add_stand_in(SceneDescription& scene,
   std::vector<Instance> parts;
   if (stand_in.shape == StandInSettings::Shape::mesh) {
     // Its own materials do not matter: the plate shows what it looks like.
-    SceneDescription model = load_file(stand_in.mesh, {}, notes);
+    SceneDescription model = scene_of(render::load_model(stand_in.mesh), stand_in.mesh, notes);
     for (const auto& mesh : model.meshes) {
       Mesh bare = *mesh;
       bare.materials = {material};
@@ -185,6 +181,11 @@ void add_stand_in(SceneDescription& scene,
   }
 }
 
+bool same_model(const ObjectSettings& a, const ObjectSettings& b) {
+  return a.mesh == b.mesh && a.made == b.made && a.shapes == b.shapes && a.hide == b.hide &&
+         a.emission_gain == b.emission_gain;
+}
+
 // Where a part stands in the set.
 Placement set_from_part(const ObjectSettings& object, const ObjectPart& part) {
   // Steps are metres of the set, so the object's scale does not count.
@@ -203,9 +204,10 @@ void place_copies(SetScene& scene,
                   const std::vector<Instance>& model) {
   for (int row = 0; row < object.copies[1]; ++row) {
     for (int column = 0; column < object.copies[0]; ++column) {
-      for (Instance instance : model) {
+      for (std::size_t number = 0; number < model.size(); ++number) {
+        Instance instance = model[number];
         const ObjectPart& part = scene.parts.emplace_back(
-            ObjectPart{index, {column, row}, instance.name, instance.set_from_object});
+            ObjectPart{index, {column, row}, instance.name, number, instance.set_from_object});
         instance.name = fmt::format("{}/{}", name, part.name);
         instance.set_from_object = set_from_part(object, part);
         scene.description.instances.push_back(std::move(instance));
@@ -215,6 +217,13 @@ void place_copies(SetScene& scene,
 }
 
 }  // namespace
+
+render::LoadOptions load_options(const ObjectSettings& object) {
+  render::LoadOptions options;
+  options.hide = object.hide;
+  options.emission_gain = static_cast<float>(object.emission_gain);
+  return options;
+}
 
 std::array<float, 12> matrix_of(const PlacementSettings& placement) {
   const double cy = std::cos(placement.yaw_rad);
@@ -230,23 +239,25 @@ std::array<float, 12> matrix_of(const PlacementSettings& placement) {
   return result;
 }
 
+std::string name_of(const ObjectSettings& object, std::size_t number) {
+  return object.name.empty() ? fmt::format("object {}", number) : object.name;
+}
+
 SetScene describe_scene(const Set& set) {
   SetScene result;
   SceneDescription& scene = result.description;
   scene.background = "plate";
   Faults faults(set.path);
-  // A model that several objects show is held once.
-  std::map<std::tuple<std::string, std::string, std::vector<std::string>, double>,
-           std::vector<Instance>>
-      loaded;
+  // A model that several objects show is held once, by the first of them.
+  std::map<std::size_t, std::vector<Instance>> loaded;
   for (std::size_t i = 0; i < set.objects.size(); ++i) {
     const ObjectSettings& object = set.objects[i];
     const std::string name = name_of(object, i + 1);
     try {
-      const auto key = std::tuple(object.mesh, object.made, object.hide, object.emission_gain);
-      auto found = loaded.find(key);
+      auto found = std::ranges::find_if(
+          loaded, [&](const auto& one) { return same_model(set.objects[one.first], object); });
       if (found == loaded.end()) {
-        found = loaded.emplace(key, add_model(scene, load_object(object, result.notes))).first;
+        found = loaded.emplace(i, add_model(scene, load_object(object, result.notes))).first;
       }
       place_copies(result, object, i, name, found->second);
     } catch (const std::runtime_error& error) {

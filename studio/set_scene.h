@@ -20,6 +20,7 @@ struct ObjectPart {
   std::size_t object = 0;     // of the set
   std::array<int, 2> copy{};  // column and row
   std::string name;           // of its node in the model
+  std::size_t number = 0;     // in the model
   std::array<float, 12> object_from_part{};
   PlacementSettings moved{{}, 0, 0, 1};  // in the object's frame, from where the model has it
 };
@@ -41,6 +42,12 @@ struct SetScene {
   std::vector<PersonHull> hulls;   // of the persons that may be one
   std::vector<std::string> notes;  // what was not understood of its models, with their files
 };
+
+// What people call an object, or else its number, from 1.
+std::string name_of(const ObjectSettings& object, std::size_t number);
+
+// How its model's files are to be read.
+render::LoadOptions load_options(const ObjectSettings& object);
 
 // The scene of a set: first all objects, each part of each copy an instance named "OBJECT/PART",
 // then the stand-ins. Camera rays that meet nothing see the plate. Throws SetError naming every

@@ -39,6 +39,9 @@ struct SetContext {
 // Positions and sizes beyond this many metres are mistakes.
 inline constexpr double farthest_m = 1e6;
 
+// `fps`: a whole number or a fraction.
+void read_fps(Section& section, std::optional<capture::Rational>& fps);
+
 CameraSettings read_camera_section(Section section, const SetContext& context);
 ProbeSettings read_probe_section(Section section, const SetContext& context);
 ObjectSettings read_object_section(Section section, const SetContext& context);

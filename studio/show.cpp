@@ -85,7 +85,7 @@ class Show::Stages {
  public:
   Stages(Set set, const ShowOptions& options)
       : options_(options),
-        maker_(std::move(set), options.rate),
+        maker_(std::move(set), options.rate, options.live),
         display_(make_display(maker_.set())),
         recording_(form_of(maker_, display_)) {
     const Set& s = maker_.set();

@@ -83,6 +83,7 @@ struct ShowStatus {
   std::size_t lights = 0;
   std::int64_t lost_plate_frames = 0;
   std::int64_t damaged_plate_frames = 0;
+  std::int64_t held_shapes = 0;  // of objects that deform: times that one was not there when due
   std::int64_t display_nan = 0;  // pixels that reached the display without a number
   render::Effort effort;
   double sharpness = 1;             // of the last frame: 0 = coarse, 1 = as the effort asks

@@ -31,6 +31,7 @@ void Tally::add(const ShownFrame& shown, Clock::time_point displayed) {
     light_age_ms_.add(std::chrono::duration<double, std::milli>(frame.probe.age).count());
   }
   s.kept_light_frames += frame.probe.kept_because.empty() ? 0 : 1;
+  s.held_shapes += frame.held_shapes;
   s.probe = frame.probe;
   s.persons = frame.persons;
   const double period_ms = period_ms_ > 0 ? period_ms_ : interval_ms_.mean();
