@@ -55,7 +55,8 @@ void check_same(const Mesh& mesh, const MeshShape& shape, const std::string& par
   const auto refuse = [&](const std::string& what) { throw std::runtime_error(part + what); };
   if (shape.positions.size() != mesh.positions.size()) {
     refuse(" has " + std::to_string(shape.positions.size() / 3) + " triangles, but in the first " +
-           "file " + std::to_string(mesh.positions.size() / 3));
+           "file " + std::to_string(mesh.positions.size() / 3) +
+           ": all shapes must have the same triangles, in the same order");
   }
   if (shape.normals.size() != mesh.normals.size()) {
     refuse(mesh.normals.empty() ? " has normals, which the first file has not"

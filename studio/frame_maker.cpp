@@ -372,7 +372,8 @@ void FrameMaker::take_over(Change change) {
   auto shapes = std::make_unique<ShapeFeed>(change.set, change.set_scene, rate_, std::nullopt,
                                             live_, shapes_.get());
   // Waits for the file that is being read, which no frame is to wait for.
-  leaving_ = std::async(std::launch::async, [before = std::move(shapes_)] {});
+  leaving_ =
+      std::async(std::launch::async, [before = std::move(shapes_)]() mutable { before.reset(); });
   shapes_ = std::move(shapes);
   set_ = std::move(change.set);
   videos_ = std::move(videos);

@@ -49,6 +49,7 @@ void read_copies(Section& section, ObjectSettings& object) {
 
 // `mesh` as a pattern of numbered files, and how their shapes are shown.
 void read_shapes(Section& section, const std::string& pattern, ObjectSettings& object) {
+  constexpr std::int64_t most_shapes = 100'000;
   ShapeSettings shapes;
   read_fps(section, shapes.fps);
   section.boolean("loop", shapes.loop);
@@ -59,7 +60,14 @@ void read_shapes(Section& section, const std::string& pattern, ObjectSettings& o
     last = files.rbegin()->first;
     section.integer("first", first, first, last);
   } catch (const std::runtime_error& error) {
+    section.value("first");
     section.fault("mesh", error.what());
+    return;
+  }
+  if (last - first >= most_shapes) {
+    section.fault("mesh", fmt::format("its files' numbers go from {} to {}, but an object has at "
+                                      "most {} shapes: begin later by `first`",
+                                      first, last, most_shapes));
     return;
   }
   for (std::int64_t number = first; number <= last; ++number) {
@@ -74,6 +82,11 @@ void read_mesh(Section& section, const SetContext& context, ObjectSettings& obje
   if (section.text("mesh", given)) {
     const std::string path = (context.base / given).lexically_normal().string();
     if (capture::is_sequence(path)) return read_shapes(section, path, object);
+  }
+  for (const char* key : {"fps", "loop", "first"}) {
+    if (section.value(key) != nullptr) {
+      section.fault(key, "is for a mesh of numbered files, such as mesh = \"flag_%04d.obj\"");
+    }
   }
   section.file("mesh", context.base, object.mesh);
 }

@@ -2,8 +2,11 @@
 #include "studio/set_scene.h"
 
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <ranges>
 #include <stdexcept>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -181,6 +184,45 @@ void add_stand_in(SceneDescription& scene,
   }
 }
 
+// Says which files of its shapes are not there, without reading any.
+void note_missing_shapes(const ObjectSettings& object,
+                         const std::string& name,
+                         std::vector<std::string>& notes) {
+  if (!object.shapes) return;
+  std::string first;
+  std::size_t count = 0;
+  for (const std::string& file : object.shapes->files) {
+    std::error_code error;
+    if (std::filesystem::exists(file, error)) continue;
+    if (count++ == 0) first = file;
+  }
+  if (count == 0) return;
+  notes.push_back(
+      fmt::format("object {}: {} of its {} shapes {} not there, the first of them {}: "
+                  "the shape before stays",
+                  name, count, object.shapes->files.size(), count == 1 ? "is" : "are", first));
+}
+
+// The report on the first file, with notes on each other that gives no shape.
+render::LoadReport check_shapes(const ObjectSettings& object) {
+  const render::LoadOptions options = load_options(object);
+  const render::LoadedModel model = render::load_deforming_model(object.mesh, options);
+  std::vector<render::DeformingPart> parts;
+  for (const Instance& instance : model.scene.instances) {
+    parts.push_back({instance.name, model.scene.meshes[instance.mesh]});
+  }
+  render::LoadReport report = model.report;
+  report.notes.push_back(fmt::format("{} shapes", object.shapes->files.size()));
+  for (const std::string& file : object.shapes->files | std::views::drop(1)) {
+    try {
+      render::load_shape(file, options, parts);
+    } catch (const std::runtime_error& error) {
+      report.notes.push_back(fmt::format("{}: the shape before stays", error.what()));
+    }
+  }
+  return report;
+}
+
 bool same_model(const ObjectSettings& a, const ObjectSettings& b) {
   return a.mesh == b.mesh && a.made == b.made && a.shapes == b.shapes && a.hide == b.hide &&
          a.emission_gain == b.emission_gain;
@@ -258,6 +300,7 @@ SetScene describe_scene(const Set& set) {
           loaded, [&](const auto& one) { return same_model(set.objects[one.first], object); });
       if (found == loaded.end()) {
         found = loaded.emplace(i, add_model(scene, load_object(object, result.notes))).first;
+        note_missing_shapes(object, name, result.notes);
       }
       place_copies(result, object, i, name, found->second);
     } catch (const std::runtime_error& error) {
@@ -289,10 +332,10 @@ std::vector<ModelReport> check_models(const Set& set) {
   std::vector<ModelReport> reports;
   Faults faults(set.path);
   const auto check = [&](const std::string& name, const std::string& file, Place place,
-                         const render::LoadOptions& options) {
+                         const auto& load) {
     if (file.empty()) return;
     try {
-      reports.push_back({name, file, render::load_model(file, options).report});
+      reports.push_back({name, file, load()});
     } catch (const std::runtime_error& error) {
       faults.add(place, error.what());
     } catch (const std::invalid_argument& error) {
@@ -301,11 +344,15 @@ std::vector<ModelReport> check_models(const Set& set) {
   };
   for (std::size_t i = 0; i < set.objects.size(); ++i) {
     const ObjectSettings& object = set.objects[i];
-    check(name_of(object, i + 1), object.mesh, object.place, load_options(object));
+    check(name_of(object, i + 1), object.mesh, object.place, [&] {
+      return object.shapes ? check_shapes(object)
+                           : render::load_model(object.mesh, load_options(object)).report;
+    });
   }
   for (std::size_t i = 0; i < set.stand_ins.size(); ++i) {
     const StandInSettings& stand_in = set.stand_ins[i];
-    check(name_of(stand_in, i + 1), stand_in.mesh, stand_in.place, {});
+    check(name_of(stand_in, i + 1), stand_in.mesh, stand_in.place,
+          [&] { return render::load_model(stand_in.mesh).report; });
   }
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
   return reports;

@@ -61,8 +61,9 @@ struct ModelReport {
   render::LoadReport report;
 };
 
-// Loads every model file of the set, one after the other, and keeps none. Throws SetError naming
-// every one that cannot be loaded, with its place in the set file.
+// Loads every model file of the set, one after the other, and keeps none. Of an object that deforms
+// all shapes are read, and the report of its first one notes what is wrong with others. Throws
+// SetError naming every one that cannot be loaded, with its place in the set file.
 std::vector<ModelReport> check_models(const Set& set);
 
 // Puts an object's parts to where the set says that the object is, and tells that they move. Loads

@@ -55,6 +55,7 @@ ShapeFeed::ShapeFeed(const Set& set,
     channel.start = start;
     open(channel, set, scene);
     if (before != nullptr) go_on(channel, *before, scene);
+    channel.reader->want(files_from(channel, capture::time_of_frame(channel.shown, channel.fps)));
   }
 }
 
@@ -91,9 +92,11 @@ void ShapeFeed::go_on(Channel& channel, const ShapeFeed& before, SetScene& scene
   auto shape = std::make_shared<ReadShape>();
   for (std::size_t i = 0; i < channel.meshes.size(); ++i) {
     const render::Mesh& mesh = *scene.description.meshes[channel.meshes[i]];
-    const auto part = std::ranges::find(same->parts, channel.parts[i]) - same->parts.begin();
-    const render::Mesh& now = *same->shape->meshes[static_cast<std::size_t>(part)];
+    const auto part = std::ranges::find(same->parts, channel.parts[i]);
     // The first file may be another one by now.
+    if (part == same->parts.end()) return;
+    const render::Mesh& now =
+        *same->shape->meshes[static_cast<std::size_t>(part - same->parts.begin())];
     if (now.positions.size() != mesh.positions.size() ||
         now.normals.size() != mesh.normals.size() || now.tangents.size() != mesh.tangents.size()) {
       return;
@@ -103,6 +106,18 @@ void ShapeFeed::go_on(Channel& channel, const ShapeFeed& before, SetScene& scene
   gone_on_ = put(*shape, channel.meshes, scene) || gone_on_;
   channel.shape = std::move(shape);
   channel.shown = same->shown;
+  channel.late = true;  // the new reader has to begin: that needs no words
+}
+
+// What the show's next frames show, as many as are read ahead.
+std::vector<std::size_t> ShapeFeed::files_from(const Channel& channel, capture::Time passed) const {
+  std::vector<std::size_t> files;
+  for (std::size_t i = 0; i < channel.reader->ahead(); ++i, passed += period_) {
+    const std::size_t file =
+        file_of(*channel.settings.shapes, capture::frame_at(passed, channel.fps));
+    if (std::ranges::find(files, file) == files.end()) files.push_back(file);
+  }
+  return files;
 }
 
 bool ShapeFeed::at(capture::Time time, SetScene& scene) {
@@ -116,17 +131,10 @@ bool ShapeFeed::update(Channel& channel, capture::Time time, SetScene& scene) {
   if (!channel.start) channel.start = time;
   const ShapeSettings& shapes = *channel.settings.shapes;
   ShapeReader& reader = *channel.reader;
-  const auto number_at = [&](capture::Time t) {
-    return std::max<std::int64_t>(capture::frame_at(t - *channel.start, channel.fps), 0);
-  };
-  const std::int64_t number = number_at(time);
+  const capture::Time passed = std::max(time - *channel.start, capture::Time::zero());
+  const std::int64_t number = capture::frame_at(passed, channel.fps);
   const std::size_t file = file_of(shapes, number);
-  std::vector<std::size_t> next;
-  for (std::size_t i = 0; next.size() < reader.ahead() && i < reader.ahead(); ++i) {
-    const std::size_t later =
-        file_of(shapes, number_at(time + static_cast<std::int64_t>(i) * period_));
-    if (std::ranges::find(next, later) == next.end()) next.push_back(later);
-  }
+  std::vector<std::size_t> next = files_from(channel, passed);
 
   std::shared_ptr<const ReadShape> due, newest;
   std::int64_t newest_number = number;

@@ -53,6 +53,7 @@ class ShapeFeed {
 
   static void open(Channel& channel, const Set& set, const SetScene& scene);
   void go_on(Channel& channel, const ShapeFeed& before, SetScene& scene);
+  std::vector<std::size_t> files_from(const Channel& channel, capture::Time passed) const;
   bool update(Channel& channel, capture::Time time, SetScene& scene);
   void note_held(Channel& channel, std::size_t file, const ReadShape* due);
 

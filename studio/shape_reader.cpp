@@ -2,8 +2,8 @@
 #include "studio/shape_reader.h"
 
 #include <algorithm>
+#include <exception>
 #include <new>
-#include <stdexcept>
 #include <utility>
 
 namespace studio {
@@ -59,12 +59,10 @@ std::shared_ptr<const ReadShape> ShapeReader::read(std::size_t file) const {
     for (const ShapedMesh& shaped : meshes_) {
       result->meshes.push_back(render::in_shape(*shaped.mesh, shapes[shaped.part]));
     }
-  } catch (const std::runtime_error& error) {
-    result->why_not = error.what();
-  } catch (const std::invalid_argument& error) {
-    result->why_not = error.what();
   } catch (const std::bad_alloc&) {
     result->why_not = files_[file] + ": not enough memory for it";
+  } catch (const std::exception& error) {
+    result->why_not = error.what();
   }
   return result;
 }

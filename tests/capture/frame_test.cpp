@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
 #include <stdexcept>
 
 namespace capture {
@@ -24,6 +25,23 @@ TEST(TimeOfFrame, RoundsDownOnBothSidesOfZero) {
 TEST(TimeOfFrame, RefusesARateOfZero) {
   EXPECT_THROW(time_of_frame(1, {0, 1}), std::invalid_argument);
   EXPECT_THROW(time_of_frame(1, {25, 0}), std::invalid_argument);
+}
+
+TEST(FrameAt, IsTheLastFrameThatIsNotLater) {
+  std::mt19937_64 random(1);
+  for (const Rational rate : {Rational{25, 1}, {30000, 1001}, {3, 1}, {1, 100}, {1000, 7}}) {
+    for (int i = 0; i < 1000; ++i) {
+      const auto n = static_cast<std::int64_t>(random() >> 26U) - (std::int64_t{1} << 37U);
+      const Time time = time_of_frame(n, rate);
+      EXPECT_EQ(frame_at(time, rate), n);
+      EXPECT_EQ(frame_at(time - Time{1}, rate), n - 1);
+      EXPECT_EQ(frame_at(time_of_frame(n + 1, rate) - Time{1}, rate), n);
+    }
+  }
+}
+
+TEST(FrameAt, RefusesARateOfZero) {
+  EXPECT_THROW(frame_at(Time{1}, {0, 1}), std::invalid_argument);
 }
 
 }  // namespace

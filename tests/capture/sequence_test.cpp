@@ -31,6 +31,20 @@ std::vector<Frame> all_frames(Camera& camera) {
   return frames;
 }
 
+TEST(NumberedFiles, AreThoseThatPrintfWouldName) {
+  const std::filesystem::path directory = made::make_temporary_directory();
+  const std::string pattern = (directory / "flag_%03d.obj").string();
+  for (const char* name : {"flag_009.obj", "flag_1000.obj", "flag_0012.obj", "flag_13.obj"}) {
+    std::ofstream(directory / name) << "x";
+  }
+  const auto files = numbered_files(pattern);
+  ASSERT_EQ(files.size(), 2U);
+  EXPECT_EQ(files.begin()->first, 9);
+  for (const auto& [number, file] : files) EXPECT_EQ(numbered_file(pattern, number), file);
+  EXPECT_THROW(numbered_files((directory / "flag.obj").string()), std::invalid_argument);
+  EXPECT_THROW(numbered_files((directory / "none_%03d.obj").string()), std::runtime_error);
+}
+
 TEST(Sequence, IsInTheOrderOfNumbersWithGapsLost) {
   const std::filesystem::path directory = made::make_temporary_directory();
   for (const int number : {9, 10, 12}) {
