@@ -31,7 +31,7 @@ TEST(FrameAt, IsTheLastFrameThatIsNotLater) {
   std::mt19937_64 random(1);
   for (const Rational rate : {Rational{25, 1}, {30000, 1001}, {3, 1}, {1, 100}, {1000, 7}}) {
     for (int i = 0; i < 1000; ++i) {
-      const auto n = static_cast<std::int64_t>(random() >> 26U) - (std::int64_t{1} << 37U);
+      const auto n = static_cast<std::int64_t>(random() >> 37U) - (std::int64_t{1} << 26U);
       const Time time = time_of_frame(n, rate);
       EXPECT_EQ(frame_at(time, rate), n);
       EXPECT_EQ(frame_at(time - Time{1}, rate), n - 1);
