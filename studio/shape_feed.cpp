@@ -106,7 +106,8 @@ void ShapeFeed::go_on(Channel& channel, const ShapeFeed& before, SetScene& scene
   gone_on_ = put(*shape, channel.meshes, scene) || gone_on_;
   channel.shape = std::move(shape);
   channel.shown = same->shown;
-  channel.late = true;  // the new reader has to begin: that needs no words
+  channel.begins = true;
+  channel.told_late = same->told_late;
 }
 
 // What the show's next frames show, as many as are read ahead.
@@ -159,26 +160,26 @@ bool ShapeFeed::update(Channel& channel, capture::Time time, SetScene& scene) {
     channel.shown = newest_number;
   }
   if (file_of(shapes, channel.shown) == file) {
-    channel.late = false;
+    channel.begins = false;
   } else {
     note_held(channel, file, due.get());
   }
   return changed;
 }
 
-// Once for each file that is bad, and once each time that shapes begin to be late.
+// Once for each file that is bad, and once for all that are late.
 void ShapeFeed::note_held(Channel& channel, std::size_t file, const ReadShape* due) {
   ++held_;
   if (due == nullptr) {
-    if (!channel.late) {
+    if (!channel.begins && !channel.told_late) {
       notes_.push_back(
-          fmt::format("object {}: {} is not read in time: the newest shape that is stays",
+          fmt::format("object {}: {} is not read in time: the newest shape that is stays, as "
+                      "wherever one is late",
                       channel.name, channel.reader->files()[file]));
+      channel.told_late = true;
     }
-    channel.late = true;
     return;
   }
-  channel.late = false;
   if (channel.told[file]) return;
   notes_.push_back(
       fmt::format("object {}: {}: its last good shape stays", channel.name, due->why_not));

@@ -48,7 +48,8 @@ class ShapeFeed {
     std::shared_ptr<const ReadShape> shape;  // shown
     std::int64_t shown = 0;                  // its number: from 0 on, without end where they loop
     std::vector<bool> told;                  // of each file, what is wrong with it
-    bool late = false;
+    bool begins = false;                     // anew: it may be late for a moment
+    bool told_late = false;
   };
 
   static void open(Channel& channel, const Set& set, const SetScene& scene);
