@@ -6,6 +6,7 @@
 #include <future>
 #include <iterator>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -246,8 +247,12 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     const StageTimer timer(prepared, Stage::job);
     job.frame = number;
     job.time = time;
-    deform_objects(time, prepared);
-    stand_persons(time, prepared);
+    const bool deformed = deform_objects(time, prepared);
+    if (!persons_->empty()) {
+      renew_scene(stand_persons(time, prepared));
+    } else if (deformed) {
+      renew_scene(scene_->pictures());
+    }
     job.scene_version = scene_version_;
     job.effort = set_.effort;
     job.textures = {{0, frame->time}, {1, light.time}};
@@ -274,25 +279,21 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   return prepared;
 }
 
-// Gives the objects that deform the frame's shapes.
-void FrameMaker::deform_objects(capture::Time time, PreparedFrame& frame) {
+// Gives the objects that deform the frame's shapes; whether any changed.
+bool FrameMaker::deform_objects(capture::Time time, PreparedFrame& frame) {
   const bool changed = shapes_->at(time, set_scene_);
   frame.held_shapes = shapes_->held();
   std::ranges::move(shapes_->take_notes(), std::back_inserter(frame.notes));
-  if (!changed) return;
-  set_scene_.description.version = ++scene_version_;
-  scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_, scene_->pictures());
+  return changed;
 }
 
-// Lets the persons of the frame's time stand in its scene.
-void FrameMaker::stand_persons(capture::Time time, PreparedFrame& frame) {
-  if (persons_->empty()) return;
+// Lets the persons of the frame's time stand in its scene; their pictures.
+render::Scene::Pictures FrameMaker::stand_persons(capture::Time time, PreparedFrame& frame) {
   render::Scene::Pictures pictures;
-  render::SceneDescription& description = set_scene_.description;
   std::size_t instance = set_scene_.first_person, number = 0;
   for (PersonFrame& person : persons_->at(time, frame.job.cam_from_set)) {
     for (const auto& place : person.places) {
-      description.instances[instance++].set_from_object = place;
+      set_scene_.description.instances[instance++].set_from_object = place;
     }
     std::ranges::move(person.pictures, std::back_inserter(pictures));
     frame.persons.push_back(std::move(person.status));
@@ -303,8 +304,13 @@ void FrameMaker::stand_persons(capture::Time time, PreparedFrame& frame) {
     ++number;
   }
   std::ranges::move(persons_->take_notes(), std::back_inserter(frame.notes));
-  description.version = ++scene_version_;
-  scene_ = std::make_shared<render::Scene>(description, *scene_, std::move(pictures));
+  return pictures;
+}
+
+// Compiles the scene as it is described now.
+void FrameMaker::renew_scene(render::Scene::Pictures pictures) {
+  set_scene_.description.version = ++scene_version_;
+  scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_, std::move(pictures));
 }
 
 void FrameMaker::move_object(const std::string& name, const PlacementSettings& pose) {
@@ -323,9 +329,8 @@ void FrameMaker::move_object(const std::string& name, const PlacementSettings& p
   } else {
     throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
   }
-  set_scene_.description.version = ++scene_version_;
   videos_->place(set_, set_scene_);
-  scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_, scene_->pictures());
+  renew_scene(scene_->pictures());
 }
 
 void FrameMaker::change_video(const std::string& name, const std::string& uri) {
@@ -371,10 +376,7 @@ void FrameMaker::take_over(Change change) {
   // Begun where the show is: before the first shape is shown.
   auto shapes = std::make_unique<ShapeFeed>(change.set, change.set_scene, rate_, std::nullopt,
                                             live_, shapes_.get());
-  // Waits for the file that is being read, which no frame is to wait for.
-  leaving_ =
-      std::async(std::launch::async, [before = std::move(shapes_)]() mutable { before.reset(); });
-  shapes_ = std::move(shapes);
+  shapes_.swap(shapes);
   set_ = std::move(change.set);
   videos_ = std::move(videos);
   persons_ = std::move(change.persons);
@@ -385,6 +387,20 @@ void FrameMaker::take_over(Change change) {
   track_ = std::move(change.track);
   directions_ = std::move(change.directions);
   lens_ = std::move(change.lens);
+  let_go(std::move(shapes));
+}
+
+// Beside the frames: it waits for the file that is being read, which no frame is to wait for.
+void FrameMaker::let_go(std::unique_ptr<ShapeFeed> shapes) {
+  std::erase_if(leaving_, [](const std::future<void>& one) {
+    return one.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  });
+  try {
+    leaving_.push_back(
+        std::async(std::launch::async, [before = std::move(shapes)]() mutable { before.reset(); }));
+  } catch (const std::system_error&) {
+    // No thread can be had: then this frame waits.
+  }
 }
 
 void FrameMaker::change_set(Set set) {

@@ -128,11 +128,13 @@ class FrameMaker {
     std::shared_ptr<const calibrate::Lens> lens;
   };
   static Change prepare(Set set, std::uint64_t scene_version, bool live);
-  void deform_objects(capture::Time time, PreparedFrame& frame);
-  void stand_persons(capture::Time time, PreparedFrame& frame);
+  bool deform_objects(capture::Time time, PreparedFrame& frame);
+  render::Scene::Pictures stand_persons(capture::Time time, PreparedFrame& frame);
+  void renew_scene(render::Scene::Pictures pictures);
   void check_change(const Set& set) const;
   void take_over(Change change);
   void finish_change();
+  void let_go(std::unique_ptr<ShapeFeed> shapes);
   std::shared_ptr<const capture::HalfImage> half_plate(const capture::Frame& frame);
 
   Set set_;
@@ -152,7 +154,7 @@ class FrameMaker {
   render::BounceFollower bounces_;
   std::uint64_t scene_version_ = 0;
   std::future<Change> change_;               // on its way
-  std::future<void> leaving_;                // shapes of the set before
+  std::vector<std::future<void>> leaving_;   // shapes of sets before
   std::vector<std::string> notes_;           // for the next frame
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;

@@ -199,7 +199,7 @@ void note_missing_shapes(const ObjectSettings& object,
   if (count == 0) return;
   notes.push_back(
       fmt::format("object {}: {} of its {} shapes {} not there, the first of them {}: "
-                  "the shape before stays",
+                  "the shape that it has by then stays",
                   name, count, object.shapes->files.size(), count == 1 ? "is" : "are", first));
 }
 
@@ -216,8 +216,8 @@ render::LoadReport check_shapes(const ObjectSettings& object) {
   for (const std::string& file : object.shapes->files | std::views::drop(1)) {
     try {
       render::load_shape(file, options, parts);
-    } catch (const std::runtime_error& error) {
-      report.notes.push_back(fmt::format("{}: the shape before stays", error.what()));
+    } catch (const std::exception& error) {
+      report.notes.push_back(fmt::format("{}: the shape that it has by then stays", error.what()));
     }
   }
   return report;

@@ -17,8 +17,14 @@ bool same_shapes(const ObjectSettings& a, const ObjectSettings& b) {
 
 // Which file has shape number n.
 std::size_t file_of(const ShapeSettings& shapes, std::int64_t n) {
+  return static_cast<std::size_t>(n % static_cast<std::int64_t>(shapes.files.size()));
+}
+
+// Which shape is due when so much time has passed: past the last one, that.
+std::int64_t number_at(const ShapeSettings& shapes, capture::Time passed, capture::Rational fps) {
+  const std::int64_t number = capture::frame_at(passed, fps);
   const auto count = static_cast<std::int64_t>(shapes.files.size());
-  return static_cast<std::size_t>(shapes.loop ? n % count : std::min(n, count - 1));
+  return shapes.loop ? number : std::min(number, count - 1);
 }
 
 // Whether that changed anything.
@@ -114,8 +120,8 @@ void ShapeFeed::go_on(Channel& channel, const ShapeFeed& before, SetScene& scene
 std::vector<std::size_t> ShapeFeed::files_from(const Channel& channel, capture::Time passed) const {
   std::vector<std::size_t> files;
   for (std::size_t i = 0; i < channel.reader->ahead(); ++i, passed += period_) {
-    const std::size_t file =
-        file_of(*channel.settings.shapes, capture::frame_at(passed, channel.fps));
+    const ShapeSettings& shapes = *channel.settings.shapes;
+    const std::size_t file = file_of(shapes, number_at(shapes, passed, channel.fps));
     if (std::ranges::find(files, file) == files.end()) files.push_back(file);
   }
   return files;
@@ -133,7 +139,7 @@ bool ShapeFeed::update(Channel& channel, capture::Time time, SetScene& scene) {
   const ShapeSettings& shapes = *channel.settings.shapes;
   ShapeReader& reader = *channel.reader;
   const capture::Time passed = std::max(time - *channel.start, capture::Time::zero());
-  const std::int64_t number = capture::frame_at(passed, channel.fps);
+  const std::int64_t number = number_at(shapes, passed, channel.fps);
   const std::size_t file = file_of(shapes, number);
   std::vector<std::size_t> next = files_from(channel, passed);
 
@@ -182,7 +188,7 @@ void ShapeFeed::note_held(Channel& channel, std::size_t file, const ReadShape* d
   }
   if (channel.told[file]) return;
   notes_.push_back(
-      fmt::format("object {}: {}: its last good shape stays", channel.name, due->why_not));
+      fmt::format("object {}: {}: the shape that it has stays", channel.name, due->why_not));
   channel.told[file] = true;
 }
 

@@ -14,7 +14,7 @@
 namespace studio {
 
 // One thread uses it. Each object gives the shape that is due at the show's time; where that cannot
-// be had, its last good one stays. Objects of the same files and times share them.
+// be had, the one that it has stays. Objects of the same files and times share them.
 class ShapeFeed {
  public:
   // `scene` is the set's, of which it notes what deforms. `rate`: of the show, for objects that

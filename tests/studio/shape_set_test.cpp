@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <string>
 #include <vector>
 
@@ -77,15 +78,23 @@ class ShapeSetTest : public MadeShowTest {
   }
 };
 
-// In the place of the models' reader, one that waits until it may go on.
+// In the place of the models' reader, one that waits until it may go on; the first so many do not.
 class Gate {
  public:
-  explicit Gate(const std::filesystem::path& dir) : open_(dir / "open") {
+  explicit Gate(const std::filesystem::path& dir, int first_passes = 0) : open_(dir / "open") {
     const std::filesystem::path helpers = dir / "helpers";
     std::filesystem::create_directory(helpers);
-    std::ofstream(helpers / "platelight-model")
-        << "#!/bin/sh\nwhile [ ! -e " << open_.string() << " ]; do sleep 0.01; done\nexec "
-        << capture::helper_path("platelight-model") << " \"$@\"\n";
+    std::filesystem::create_symlink(capture::helper_path("platelight-decode"),
+                                    helpers / "platelight-decode");
+    std::ofstream script(helpers / "platelight-model");
+    const std::string reader = "exec " + capture::helper_path("platelight-model") + " \"$@\"\n";
+    script << "#!/bin/sh\n";
+    for (int pass = 0; pass < first_passes; ++pass) {
+      script << "mkdir " << (dir / ("pass_" + std::to_string(pass))).string() << " 2>&- && "
+             << reader;
+    }
+    script << "while [ ! -e " << open_.string() << " ]; do sleep 0.01; done\n" << reader;
+    script.close();
     std::filesystem::permissions(helpers / "platelight-model", std::filesystem::perms::owner_all);
     setenv("PLATELIGHT_HELPERS", helpers.c_str(), 1);
   }
@@ -142,7 +151,7 @@ TEST_F(ShapeSetTest, KeepsTheLastGoodShapeOverBadFilesAndSaysSoOnce) {
                                     HasSubstr(file_of(3).string()))));
   EXPECT_THAT(notes, Contains(AllOf(HasSubstr("object flag"), HasSubstr(file_of(2).string()),
                                     HasSubstr("has 1 triangles, but in the first file 4"),
-                                    HasSubstr("its last good shape stays"))));
+                                    HasSubstr("the shape that it has stays"))));
 }
 
 TEST_F(ShapeSetTest, RefusesAFirstShapeThatIsBadAtItsPlaceAndChecksTheOthers) {
@@ -231,6 +240,41 @@ TEST_F(ShapeSetTest, WaitsForNoShapeLiveAndTellsOnceThatTheyAreLate) {
   ShapeFeed after(set, anew, pal, std::nullopt, true, &feed);
   EXPECT_TRUE(after.at(capture::time_of_frame(4, pal), anew));
   EXPECT_GE(number_in(anew.description), 3);
+}
+
+// However often it changes.
+TEST_F(ShapeSetTest, WaitsForNoFileOfTheSetsBefore) {
+  if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";
+  const Gate gate(dir_, 1);
+  FrameMaker maker(flag_set(""), std::nullopt, true);
+  ASSERT_TRUE(maker.make(0));
+  std::future<void> changes = std::async(std::launch::async, [&] {
+    for (std::int64_t n = 1; n < 4; ++n) {
+      maker.change_set(made_set("grey:1,25,0", ""));
+      EXPECT_TRUE(maker.make(n));
+    }
+  });
+  EXPECT_EQ(changes.wait_for(60s), std::future_status::ready);
+  gate.open();
+  changes.get();
+}
+
+// Of a live show that has long been past a last file that is bad.
+TEST_F(ShapeSetTest, StaysAtItsLastShapeForEver) {
+  std::ofstream(file_of(5)) << "none";
+  const Set set = flag_set("");
+  SetScene scene = describe_scene(set);
+  ShapeFeed feed(set, scene, pal, capture::Time{0}, true);
+  for (int i = 0; i < 1000 && number_in(scene.description) != 4; ++i) {
+    feed.at(capture::time_of_frame(4, pal), scene);
+    std::this_thread::sleep_for(10ms);
+  }
+  ASSERT_EQ(number_in(scene.description), 4);
+  for (const std::int64_t n : {5LL, 6LL, 100LL, 1'000'000'000LL}) {
+    feed.at(capture::time_of_frame(n, pal), scene);
+    EXPECT_EQ(number_in(scene.description), 4) << n;
+    EXPECT_EQ(feed.held(), 1) << n;
+  }
 }
 
 TEST_F(ShapeSetTest, WaitsForTheShapeThatIsDueInAShowThatIsNotLive) {
