@@ -68,6 +68,7 @@ void CellBaker::bake(const FrameContext& frame,
   lender_.fill(-1);
   queue_.clear();
   lamp_terms_.clear();
+  compact_shares_.clear();
   lamps_apart_.fill(0);
   sent_.fill(0);
   trace_centres();

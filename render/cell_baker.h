@@ -171,6 +171,7 @@ class CellBaker final : public RaySink {
   SampleSequence numbers_of(const ShadePoint& p, std::uint32_t number, std::uint32_t sample) const;
   bool turn_within_lobe(const ShadePoint& from, std::uint32_t number, NewRay& ray) const;
   void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
+  void find_compact_tints();
   void add_compact(const Lobe& lobe, std::size_t light, Vec3f passed);
   bool mirrors_lamps(const ShadePoint& from, const NewRay& ray) const;
   bool glows_by_lamps(const ShadePoint& p) const;
@@ -224,6 +225,7 @@ class CellBaker final : public RaySink {
   std::vector<CellTransport::LightTerm> lamp_terms_;  // many times the transport's
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::vector<Lobe> lobes_;
+  std::vector<Vec3f> compact_shares_;  // (compact light, centre): what glass lets by; none = all
   std::vector<QueuedRay> queue_;         // capacity reserved
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
   std::uint32_t pushed_ = 0;

@@ -171,17 +171,21 @@ void CellBaker::add_environment(std::size_t slot,
 // What lobes mirror of compact lights that their points see; of a real surface's, less those that
 // virtual objects hide, for the plate shows them.
 void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid) {
-  if (lobes_.empty()) return;
   const CellVisibility& cell = transport_->visibility;
+  if (grid) find_compact_tints();
+  if (lobes_.empty()) return;
   for (const Lobe& lobe : lobes_) {
     const auto i = static_cast<std::size_t>(lobe.point - points_.data());
     const bool shared = receiver_of_point[i] == nowhere;
     if (!grid && !shared) continue;
     const std::size_t k = shared ? static_cast<std::size_t>(lender_[i]) : receiver_of_point[i];
-    for (const std::uint32_t light : frame_->compact) {
+    for (std::size_t c = 0; c < frame_->compact.size(); ++c) {
+      const std::uint32_t light = frame_->compact[c];
       const auto in = [&](const CellMask& mask) { return (mask[k / 64] >> (k % 64) & 1) != 0; };
       if (!in(cell.lit[light])) continue;
-      add_compact(lobe, light, in(cell.seen[light]) ? Vec3f{1, 1, 1} : Vec3f{});
+      const Vec3f passed =
+          compact_shares_.empty() ? Vec3f{1, 1, 1} : compact_shares_[c * cell_pixels + k];
+      add_compact(lobe, light, in(cell.seen[light]) ? passed : Vec3f{});
     }
     if (lobe.lamps) add_lamps_of_centre(lobe, k);
   }
@@ -208,6 +212,20 @@ void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool
           frame_->job->lights.lamps[l.lamp]);
       if (open && open->per_intensity > 0) add_lamp(lobe, l.lamp, l.factor / open->per_intensity);
     }
+  }
+}
+
+// What glass lets by of each compact light to each centre.
+void CellBaker::find_compact_tints() {
+  compact_shares_.clear();
+  for (const TintedLight& tint : transport_->visibility.tints) {
+    const auto found = std::ranges::lower_bound(frame_->compact, tint.light);
+    if (found == frame_->compact.end() || *found != tint.light) continue;
+    if (compact_shares_.empty()) {
+      compact_shares_.resize(frame_->compact.size() * cell_pixels, Vec3f{1, 1, 1});
+    }
+    const auto c = static_cast<std::size_t>(found - frame_->compact.begin());
+    compact_shares_[c * cell_pixels + tint.centre] -= tint.lost_share;
   }
 }
 

@@ -10,9 +10,11 @@
 #include <random>
 
 #include "render/kept_transport.h"
+#include "render/light_follower.h"
 #include "render/reference.h"
 #include "tests/compositing/made_glass.h"
 #include "tests/render/plain_shapes.h"
+#include "tests/render/sun_and_sky.h"
 
 namespace compositing {
 namespace {
@@ -273,6 +275,46 @@ TEST(Glass, DispersesIntoColours) {
   EXPECT_EQ(colour(shot_of(0).kernel()), 0);
   EXPECT_GT(colour(shot_of(20).kernel()), 0.1);
   EXPECT_GT(colour(shot_of(20).reference(1000)), 0.1);
+}
+
+// What is rough mirrors no more of the sun than glass lets by: seen straight, and through glass.
+TEST(Glass, DimsTheSunThatRoughThingsMirror) {
+  const auto picture = [](float shadow, double from) {
+    render::SceneDescription scene = bodies({render::make_box({-2, -2, -2}, {2, 2, 2})},
+                                            {{.index = 1, .shadow = {shadow, shadow, shadow}}});
+    render::StandardParameters metal;
+    metal.metallic = 1;
+    metal.roughness = 0.4F;
+    auto ball = std::make_shared<render::Mesh>(*render::make_sphere(0.5F, 48));
+    ball->materials = {1};
+    scene.meshes.push_back(ball);
+    scene.materials.push_back(render::make_standard_material("metal", metal));
+    scene.instances.emplace_back().mesh = 1;
+    GlassShot shot =
+        glass_shot(std::move(scene), [](Vec3f) { return 0.0F; }, 48, 50, {0, -from, 0});
+    shot.environment = render::make_sun_and_sky(
+        {.sun_azimuth_rad = -1.4F, .sun_elevation_rad = 0.6F, .clouds = 0}, 128);
+    render::LightFollower follower;
+    shot.job.lights = follower.follow(shot.environment, {});
+    render::smooth_for_reflections(shot.environment, follower.compact_texels());
+    EXPECT_TRUE(shot.environment.compact_apart);
+    return shot.kernel();
+  };
+  for (const double from : {1.5, 3.0}) {  // inside of the glass, outside
+    const capture::Image clear = picture(1, from), half = picture(0.5F, from);
+    const capture::Image dark = picture(0, from);
+    int lit = 0, between = 0;
+    for (int y = 0; y < clear.height; ++y) {
+      for (int x = 0; x < clear.width; ++x) {
+        const float all = clear.at(y, x, 1), none = dark.at(y, x, 1);
+        if (all < 1.2F * none) continue;
+        ++lit;
+        between += std::abs(half.at(y, x, 1) - 0.5F * (all + none)) < 0.1F * (all - none);
+      }
+    }
+    EXPECT_GT(lit, 100) << from;
+    EXPECT_GT(between, 0.8 * lit) << from;
+  }
 }
 
 // A glass ball on a stand-in floor, before a plate.
