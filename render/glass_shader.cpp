@@ -5,6 +5,7 @@
 
 #include "render/builtin_shaders.h"
 #include "render/glass.h"
+#include "render/ray_differential.h"
 #include "render/standard.h"
 #include "render/trace.h"
 
@@ -105,16 +106,8 @@ class GlassShader final : public Shader {
 
   // How the refracted direction turns over the sample's piece of surface, and with its cone.
   static Spread refracted_spread(const ShadePoint& p, Vec3f direction, float ratio) {
-    const Vec3f normal = p.hit.normal;
-    const float from = -dot(normal, p.incoming);
-    const float to = std::max(-dot(normal, direction), 0.05F);
-    const float bend = ratio * from - to;
-    const auto turned = [&](Vec3f step, Vec3f widened) {
-      const Vec3f turn = turn_of_normal(p.hit, step);
-      const float less = -(dot(widened, normal) + dot(p.incoming, turn));  // of the cosine
-      return widened * ratio + turn * bend + normal * (less * ratio * (1 - ratio * from / to));
-    };
-    return {turned(p.steps.a, p.turns.a), turned(p.steps.b, p.turns.b)};
+    return {refracted_turn(p.hit, p.incoming, direction, ratio, {p.steps.a, p.turns.a}),
+            refracted_turn(p.hit, p.incoming, direction, ratio, {p.steps.b, p.turns.b})};
   }
 };
 

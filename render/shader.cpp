@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "render/builtin_shaders.h"
+#include "render/ray_differential.h"
 #include "render/standard.h"
 
 namespace render {
@@ -38,26 +39,21 @@ std::shared_ptr<const T> find(const Table<T>& table, std::string_view name, cons
 }  // namespace
 
 void arrive(ShadePoint& p, const Spread& steps, const Spread& turns, float distance_m) {
-  const auto arrived = [&](Vec3f step, Vec3f turn) {
+  const auto across = [&](Vec3f step, Vec3f turn) {
     const Vec3f moved = step + turn * distance_m;
     return moved - p.incoming * dot(moved, p.incoming);
   };
-  const Vec3f a = arrived(steps.a, turns.a), b = arrived(steps.b, turns.b);
-  p.footprint_m = std::sqrt(length(a) * length(b));
+  p.footprint_m = std::sqrt(length(across(steps.a, turns.a)) * length(across(steps.b, turns.b)));
   // Seen at a slant the cone covers a longer piece of surface that way.
-  const Vec3f normal = p.hit.normal;
-  const Vec3f along = p.incoming * (1 / std::max(-dot(normal, p.incoming), 0.1F));
-  p.steps = {a + along * dot(a, normal), b + along * dot(b, normal)};
+  constexpr float flattest = 0.1F;
+  p.steps = {arrived({steps.a, turns.a}, p.hit, p.incoming, distance_m, flattest).step,
+             arrived({steps.b, turns.b}, p.hit, p.incoming, distance_m, flattest).step};
   p.turns = turns;
 }
 
 Spread mirrored_spread(const ShadePoint& p, Vec3f normal, Vec3f view) {
-  const float cosine = dot(normal, view);
-  const auto mirrored_turn = [&](Vec3f step, Vec3f widened) {
-    const Vec3f turn = turn_of_normal(p.hit, step);
-    return widened + turn * (2 * cosine) + normal * (2 * (dot(turn, view) - dot(widened, normal)));
-  };
-  return {mirrored_turn(p.steps.a, p.turns.a), mirrored_turn(p.steps.b, p.turns.b)};
+  return {mirrored_turn(p.hit, normal, -view, {p.steps.a, p.turns.a}),
+          mirrored_turn(p.hit, normal, -view, {p.steps.b, p.turns.b})};
 }
 
 void register_shader(std::string name, std::shared_ptr<const Shader> shader) {
