@@ -43,7 +43,8 @@ void CellBaker::bake(const FrameContext& frame,
   effort_ = frame.efforts[static_cast<std::size_t>(stage)];
   const bool may_move = frame.inputs.kept && frame.inputs.scene->has_moving();
   grid_ = may_move ? &frame.inputs.kept->grid() : nullptr;
-  shadow_rays_ = {frame.inputs.scene, frame.planned_table.get(), &effort_};
+  shadow_rays_ = {frame.inputs.scene, frame.planned_table.get(), &effort_, frame.caustics.get(),
+                  frame.job->lights.lamps.size()};
   x0_ = x0;
   y0_ = y0;
   block_ = block_of_stage(stage);
@@ -318,7 +319,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
 void CellBaker::receive(int count, bool grid) {
   Receivers& r = receivers_;
   r.active = {};
-  r.by_lamps = {};
+  r.by_lamps = r.by_caustics = {};
   r.count = 0;
   r.real_first.fill(0);
   tested_.clear();
@@ -350,6 +351,8 @@ void CellBaker::receive(int count, bool grid) {
     r.active[k / 64] |= std::uint64_t{1} << (k % 64);
     if (p.diffuse != Vec3f{} || p.catches_lamps || glossy[i] > 1) {
       r.by_lamps[k / 64] |= std::uint64_t{1} << (k % 64);
+    } else if (p.kind == RayKind::bent && p.catches_shadow && frame_->caustics) {
+      r.by_caustics[k / 64] |= std::uint64_t{1} << (k % 64);
     }
   }
   std::array<std::uint32_t, cell_pixels> shadow_rays;
@@ -411,7 +414,7 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
   }
   for (std::size_t k = 0; k < point_at.size(); ++k) {
     const ShadePoint& p = points_[point_at[k]];
-    catcher_of_receiver_[k] = no_catcher;
+    catcher_of_receiver_[k] = bent_of_receiver_[k] = no_catcher;
     if (!p.catches_shadow && !p.catches_lamps) continue;
     const auto first = static_cast<std::uint32_t>(t.shadow_lights.size());
     for (const PointLight& l : tested_) {
@@ -423,11 +426,11 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
                                static_cast<std::uint32_t>(t.shadow_lights.size()) - first,
                                p.catches_shadow && !bent ? p.throughput * p.plate_share : Vec3f{}});
     if (bent) {
-      add_bent(p, p.throughput * p.plate_share,
-               static_cast<std::uint32_t>(t.shadow_points.size()) - 1);
+      bent_of_receiver_[k] = static_cast<std::uint32_t>(t.shadow_points.size()) - 1;
+      add_bent(p, p.throughput * p.plate_share, bent_of_receiver_[k]);
       continue;
     }
-    if (p.catches_lamps && !frame_->job->lights.lamps.empty()) {
+    if (p.catches_lamps && !frame_->planned_table->lamps.empty()) {
       catcher_of_receiver_[k] = static_cast<std::uint32_t>(t.catchers.size());
       t.catchers.push_back({static_cast<std::uint16_t>(target_of(p)),
                             static_cast<std::uint32_t>(cell_pixels + t.shadow_points.size() - 1),

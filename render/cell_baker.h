@@ -224,8 +224,9 @@ class CellBaker final : public RaySink {
   std::vector<PointLamp> reached_;
   std::vector<CellTransport::LightTerm> lamp_terms_;  // many times the transport's
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
+  std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;
-  std::vector<Vec3f> compact_shares_;  // (compact light, centre): what glass lets by; none = all
+  std::vector<Vec3f> compact_shares_;    // (compact light, centre): what glass lets by; none = all
   std::vector<QueuedRay> queue_;         // capacity reserved
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
   std::uint32_t pushed_ = 0;

@@ -7,7 +7,7 @@ namespace render {
 
 // At the centres, after their other light is known.
 void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_point) {
-  if (receivers_.by_lamps == CellMask{} || frame_->job->lights.lamps.empty()) return;
+  if (receivers_.by_lamps == CellMask{} || frame_->planned_table->lamps.empty()) return;
   CellLamps& cell = transport_->lamps;
   gather_cell_lamps(shadow_rays_, receivers_, gather_, cell, *statistics_);
   const auto planned = [&](std::size_t place) {
@@ -33,7 +33,7 @@ void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_poin
 
 // At points that are no centres, whose catchers add_tested has made.
 void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver) {
-  if (frame_->job->lights.lamps.empty()) return;
+  if (frame_->planned_table->lamps.empty()) return;
   reached_.clear();
   gather_point_lamps(shadow_rays_, receivers_, gather_, reached_, *statistics_);
   CellTransport& t = *transport_;
@@ -45,6 +45,9 @@ void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver
     light_of_point_[i].lamps += irradiance;
     if (weight != Vec3f{}) {
       lamp_terms_.push_back({static_cast<std::uint16_t>(target_of(p)), l.lamp, weight});
+    }
+    if (bent_of_receiver_[l.point] != no_catcher && shadow_rays_.is_caustic(l.lamp)) {
+      t.bent_caustics.push_back({bent_of_receiver_[l.point], l.lamp, l.factor});
     }
     const std::uint32_t catcher = catcher_of_receiver_[l.point];
     if (catcher == no_catcher) continue;

@@ -206,7 +206,7 @@ void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool
   for (const PointLamp& l : reached_) {
     const std::size_t k = l.point;
     for (const Lobe& lobe : std::ranges::equal_range(lobes_, l.point, {}, receiver_of)) {
-      if (!lobe.lamps) continue;
+      if (!lobe.lamps || shadow_rays_.is_caustic(l.lamp)) continue;
       const auto open = ray_to_lamp(
           {{r.px[k], r.py[k], r.pz[k]}, {r.nx[k], r.ny[k], r.nz[k]}, {r.gx[k], r.gy[k], r.gz[k]}},
           frame_->job->lights.lamps[l.lamp]);
@@ -268,7 +268,7 @@ bool CellBaker::glows_by_lamps(const ShadePoint& p) const {
 void CellBaker::add_lamps_of_centre(const Lobe& lobe, std::size_t centre) {
   const CellLamps& cell = transport_->lamps;
   for (std::size_t i = 0; i < cell.numbers.size(); ++i) {
-    if (!(cell.factors[i].at[centre] > 0)) continue;
+    if (!(cell.factors[i].at[centre] > 0) || shadow_rays_.is_caustic(cell.numbers[i])) continue;
     Vec3f passed{1, 1, 1};
     for (const TintedLight& tint : cell.tints) {
       if (tint.light == i && tint.centre == centre) passed -= tint.lost_share;

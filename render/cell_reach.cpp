@@ -44,6 +44,11 @@ bool meets(const Scene::Bounds& box, Vec3f from, Vec3f direction, float far) {
   return first <= last;
 }
 
+bool overlap(const Scene::Bounds& a, const Scene::Bounds& b) {
+  return a.lower.x <= b.upper.x && a.upper.x >= b.lower.x && a.lower.y <= b.upper.y &&
+         a.upper.y >= b.lower.y && a.lower.z <= b.upper.z && a.upper.z >= b.lower.z;
+}
+
 bool have_common(const SpaceGrid::Mask& a, const SpaceGrid::Mask& b) {
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (a[i] & b[i]) return true;
@@ -118,11 +123,8 @@ void SpaceGrid::mark_bounds(const Scene::Bounds& bounds, Mask& mask) const {
   for (int i = 0; i < side * side * side; ++i) {
     // A little larger: a line that runs along a wall may be counted to either side.
     const Scene::Bounds b = grown(box(i), size_ * 0.01F);
-    const bool apart = b.lower.x > bounds.upper.x || b.upper.x < bounds.lower.x ||
-                       b.lower.y > bounds.upper.y || b.upper.y < bounds.lower.y ||
-                       b.lower.z > bounds.upper.z || b.upper.z < bounds.lower.z;
     const auto at = static_cast<std::size_t>(i);
-    if (!apart) mask[at / 64] |= std::uint64_t{1} << (at % 64);
+    if (overlap(b, bounds)) mask[at / 64] |= std::uint64_t{1} << (at % 64);
   }
 }
 
@@ -160,14 +162,16 @@ std::vector<CellCone> cell_cones(const calibrate::DirectionTable& table,
 MovedThings::MovedThings(std::vector<Scene::Bounds> where,
                          const SpaceGrid& grid,
                          const LightTable& lights,
-                         const SpaceGrid::Mask& receivers)
-    : where_(std::move(where)), lights_(lights) {
+                         const SpaceGrid::Mask& receivers,
+                         std::vector<Scene::Bounds> relit)
+    : where_(std::move(where)), lights_(lights), relit_(std::move(relit)) {
   for (const Scene::Bounds& bounds : where_) grid.mark_bounds(bounds, filled_);
   for (int i = 0; i < SpaceGrid::side * SpaceGrid::side * SpaceGrid::side; ++i) {
     const auto at = static_cast<std::size_t>(i);
     if (!(receivers[at / 64] >> (at % 64) & 1) || !may_shade(grid.box(i))) continue;
     shaded_[at / 64] |= std::uint64_t{1} << (at % 64);
   }
+  for (const Scene::Bounds& bounds : relit_) grid.mark_bounds(bounds, shaded_);
 }
 
 // Whether anything that moved lies between any of those points and a light: between their middle
@@ -200,7 +204,10 @@ bool MovedThings::may_be_seen(const CellCone& cone, Vec3f camera) const {
 
 bool MovedThings::may_change(const CellReach& reach) const {
   return have_common(reach.passed, filled_) || have_common(reach.lit, shaded_) ||
-         (!is_empty(reach.lit_outside) && may_shade(reach.lit_outside));
+         (!is_empty(reach.lit_outside) &&
+          (may_shade(reach.lit_outside) || std::ranges::any_of(relit_, [&](const auto& bounds) {
+             return overlap(bounds, reach.lit_outside);
+           })));
 }
 
 }  // namespace render

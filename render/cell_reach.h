@@ -66,11 +66,13 @@ std::vector<CellCone> cell_cones(const calibrate::DirectionTable& directions,
 // or after. Never says no where it is yes.
 class MovedThings {
  public:
-  // `receivers` are the boxes that any cell's shadow rays begin in.
+  // `receivers` are the boxes that any cell's shadow rays begin in. `relit`: where light falls
+  // otherwise, whatever is between.
   MovedThings(std::vector<Scene::Bounds> where,
               const SpaceGrid& grid,
               const LightTable& lights,
-              const SpaceGrid::Mask& receivers);
+              const SpaceGrid::Mask& receivers,
+              std::vector<Scene::Bounds> relit = {});
 
   bool may_be_seen(const CellCone& cone, Vec3f camera) const;
   bool may_change(const CellReach& reach) const;
@@ -80,6 +82,7 @@ class MovedThings {
 
   std::vector<Scene::Bounds> where_;
   const LightTable& lights_;
+  std::vector<Scene::Bounds> relit_;
   SpaceGrid::Mask filled_{}, shaded_{};
 };
 

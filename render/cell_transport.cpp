@@ -143,6 +143,13 @@ void light_shadow_points(const CellTransport& cell, const FrameLight& light, Rel
     w.passed[point.slot] += mean(share);
     w.open_at_points.push_back(open);
   }
+  for (const CellTransport::BentCaustic& c : cell.bent_caustics) {
+    const Vec3f open = w.open_at_points[c.point];
+    const Vec3f gathered = c.factor * light.lamps[c.lamp].intensity;
+    if (!(open.x > 0 && open.y > 0 && open.z > 0)) continue;
+    w.passing_at_points[c.point] +=
+        Vec3f{gathered.x / open.x, gathered.y / open.y, gathered.z / open.z};
+  }
 }
 
 // The pixels of a block show what the one does that has a ray.
@@ -189,7 +196,7 @@ void CellTransport::clear() {
   environment.clear(), shadow_points.clear(), shadow_lights.clear();
   lamps.numbers.clear(), lamps.factors.clear(), lamps.tints.clear();
   lamp_terms.clear(), catchers.clear(), caught.clear();
-  bent.clear(), video.clear(), borrowed.clear(), further.clear();
+  bent.clear(), bent_caustics.clear(), video.clear(), borrowed.clear(), further.clear();
   reach = {};
   rays = 0;
   counts.clear();
@@ -200,7 +207,8 @@ std::size_t CellTransport::bytes() const {
   return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
          of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
          of(lamps.numbers) + of(lamps.factors) + of(lamps.tints) + of(lamp_terms) + of(catchers) +
-         of(caught) + of(bent) + of(video) + of(borrowed) + of(further) + of(counts);
+         of(caught) + of(bent) + of(bent_caustics) + of(video) + of(borrowed) + of(further) +
+         of(counts);
 }
 
 void relight(const CellTransport& cell,

@@ -83,6 +83,13 @@ struct CellTransport {
     std::uint16_t slot, level;  // of FrameLight::levels
     std::uint32_t point;        // of shadow_points, or lit
   };
+  // The plate of a shadow point that clear bodies show is brighter by factor * intensity of a lamp,
+  // of the light that is there.
+  struct BentCaustic {
+    std::uint32_t point;
+    std::uint16_t lamp;
+    Vec3f factor;
+  };
   // Slot += weight * a level of a live texture at a place.
   struct VideoTerm {
     Vec3f weight;
@@ -130,6 +137,7 @@ struct CellTransport {
   std::vector<LampCatcher> catchers;
   std::vector<CaughtLamp> caught;
   std::vector<BentPlate> bent;
+  std::vector<BentCaustic> bent_caustics;
   std::vector<VideoTerm> video;
   std::vector<Borrowed> borrowed;
   std::vector<Further> further;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "render/caustics.h"
 #include "render/kept_transport.h"
 #include "render/kernel.h"
 #include "render/standard.h"
@@ -76,6 +77,11 @@ std::uint64_t transport_key(const FrameContext& context) {
   key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
   key.mix(e.max_rays);
   key.mix(std::uint64_t{e.dark_cuts});
+  if (context.caustics) {
+    for (const std::uint32_t light : context.caustics->lights()) {
+      key.mix(std::uint64_t{2} * light + (context.caustics->follows(light) ? 1U : 0U));
+    }
+  }
   return key.value();
 }
 
@@ -155,6 +161,26 @@ void add_videos(FrameContext& context) {
   }
 }
 
+// Light through clear bodies, as lamps that follow the job's.
+void add_caustics(FrameContext& context, LightTable& planned) {
+  const FrameInputs& inputs = context.inputs;
+  const Effort& effort = context.job->effort;
+  const CausticSettings settings{effort.caustic_photons, effort.accuracy, context.camera,
+                                 context.pixel_angle};
+  CausticFollower alone;
+  CausticFollower& follower = inputs.kept ? inputs.kept->caustics() : alone;
+  context.caustics = follower.follow(*inputs.scene, planned, settings);
+  context.lamps = context.job->lights.lamps;
+  if (!context.caustics) return;
+  for (const std::uint32_t light : context.caustics->lights()) {
+    LocalLight lamp;
+    lamp.intensity = planned.lights[light].irradiance;
+    planned.lamps.push_back(lamp);
+    lamp.intensity = context.job->lights.lights[light].irradiance;
+    context.lamps.push_back(lamp);
+  }
+}
+
 // Places in a pixel, -.5..+.5: every first 4^n of them are spread well (Sobol's sequence).
 std::array<std::array<float, 2>, samples_max> sample_pattern() {
   std::array<std::array<float, 2>, samples_max> pattern;
@@ -227,6 +253,10 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   if (!(e.accuracy >= 0 && e.accuracy <= 1)) throw std::invalid_argument("accuracy must be 0 to 1");
   if (e.max_depth < 0 || e.max_depth > 64) throw std::invalid_argument("max_depth must be 0 to 64");
   if (e.max_rays < 0) throw std::invalid_argument("max_rays must be 0 or more");
+  if (e.caustic_photons < 0 || e.caustic_photons > most_caustic_photons) {
+    throw std::invalid_argument("caustic_photons must be 0 to " +
+                                std::to_string(most_caustic_photons));
+  }
   if (e.tile_size < cell_size || e.tile_size % cell_size != 0) {
     throw std::invalid_argument("tile_size must be a multiple of 16");
   }
@@ -263,7 +293,6 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   for (LocalLight& lamp : planned_table->lamps) {
     if (lamp.planned != Vec3f{}) lamp.intensity = lamp.planned;
   }
-  context.planned_table = std::move(planned_table);
   if (context.compact.size() > most_compact_lights) {
     throw std::invalid_argument("a table marks at most " + std::to_string(most_compact_lights) +
                                 " lights as compact");
@@ -290,6 +319,8 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
                     b = d.index(d.height / 2, d.width / 2 + 1);
   context.pixel_angle =
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
+  add_caustics(context, *planned_table);
+  context.planned_table = std::move(planned_table);
   context.columns = (d.width + cell_size - 1) / cell_size;
   context.rows = (d.height + cell_size - 1) / cell_size;
   context.efforts = efforts_of(e);

@@ -30,6 +30,7 @@ struct Effort {
   int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
   int bounce_lamps = 0;     // stand for light between dull surfaces (BouncedLight); 0 = none is
+  int caustic_photons = 0;  // from bright lights through clear bodies (Caustics); 0 = straight on
   bool cull_lights = true;  // skip shadow rays that no object can block
   float accuracy = 0.97F;   // rays whose share of the pixel falls below 1 - accuracy are cut
   bool dark_cuts = false;   // cut rays see nothing, instead of the environment: for charts

@@ -24,8 +24,8 @@ struct GlassParameters {
   float absorption[3] = {0, 0, 0};  // per metre, 0 or more
   float abbe = 0;                   // (n_d - 1) / (n_F - n_C); 0 = no dispersion, else 5 or more
   std::int32_t priority = 0;        // of overlapping bodies, the higher is there
-  // Share of light that goes straight through one surface to what lies behind, for shadows: glass
-  // bends light, and what it gathers elsewhere as caustics is not followed.
+  // Share of light that goes straight through one surface to what lies behind, for shadows of
+  // lights whose caustics are not followed (caustics.h).
   float shadow[3] = {0.92F, 0.92F, 0.92F};
 };
 

@@ -2,6 +2,8 @@
 #include "render/kept_transport.h"
 
 #include <algorithm>
+#include <iterator>
+#include <utility>
 
 #include "render/kernel.h"
 
@@ -15,10 +17,16 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
   light_stays_ = keys.light.all == keys_.light.all;
   scarce_ = bytes_ > max_bytes / 2;
   keys_ = keys;
+  const auto caustics_before = std::exchange(shown_caustics_, frame.caustics);
   if (same_transport && same_size && moved) {
     if (moved->empty()) return;
     if (std::ranges::all_of(*moved, [&](const auto& bounds) { return grid_.holds(bounds); })) {
-      forget(std::move(*moved), frame);
+      std::vector<Scene::Bounds> relit;
+      if (caustics_before && frame.caustics && caustics_before->key() != frame.caustics->key()) {
+        relit = caustics_before->regions();
+        std::ranges::copy(frame.caustics->regions(), std::back_inserter(relit));
+      }
+      forget(std::move(*moved), std::move(relit), frame);
     } else {
       forget_all(scene);
     }
@@ -43,7 +51,9 @@ void KeptTransport::forget_all(const Scene& scene) {
   grid_ = SpaceGrid(scene.virtual_bounds());
 }
 
-void KeptTransport::forget(std::vector<Scene::Bounds> moved, const FrameContext& frame) {
+void KeptTransport::forget(std::vector<Scene::Bounds> moved,
+                           std::vector<Scene::Bounds> relit,
+                           const FrameContext& frame) {
   if (cones_.empty()) cones_ = cell_cones(*frame.inputs.directions, frame.set_from_cam);
   SpaceGrid::Mask receivers{};
   for (const Cell& cell : cells_) {
@@ -51,7 +61,9 @@ void KeptTransport::forget(std::vector<Scene::Bounds> moved, const FrameContext&
     const SpaceGrid::Mask& lit = cell.transport->reach.lit;
     for (std::size_t i = 0; i < lit.size(); ++i) receivers[i] |= lit[i];
   }
-  const MovedThings things(std::move(moved), grid_, *frame.planned_table, receivers);
+  LightTable lights = *frame.planned_table;
+  lights.lamps.resize(frame.job->lights.lamps.size());  // those of caustics are nowhere
+  const MovedThings things(std::move(moved), grid_, lights, receivers, std::move(relit));
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     Cell& cell = cells_[i];
     if (cell.stage == none) continue;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "capture/half.h"
+#include "render/caustics.h"
 #include "render/cell_transport.h"
 
 namespace render {
@@ -67,6 +68,8 @@ class KeptTransport {
   static constexpr int none = -1;
   std::vector<int> stages() const;
 
+  CausticFollower& caustics() { return caustics_; }
+
   // What cells mark where they reach in; stays while any cell is kept.
   const SpaceGrid& grid() const { return grid_; }
 
@@ -88,8 +91,12 @@ class KeptTransport {
            static_cast<std::size_t>(column);
   }
   void forget_all(const Scene& scene);
-  void forget(std::vector<Scene::Bounds> moved, const FrameContext& frame);
+  void forget(std::vector<Scene::Bounds> moved,
+              std::vector<Scene::Bounds> relit,
+              const FrameContext& frame);
 
+  CausticFollower caustics_;
+  std::shared_ptr<const Caustics> shown_caustics_;  // of the frame before
   FrameKeys keys_;
   bool light_stays_ = false;  // the same as in the frame before
   Scene::Places places_;

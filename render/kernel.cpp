@@ -73,8 +73,8 @@ void TileWorkspace::Impl::light(const FrameContext& frame,
     picture.seen.fill(1);
     return;
   }
-  render::relight(cell, {frame.job->lights.lights, frame.job->lights.lamps, frame.levels}, plate,
-                  relight, picture, statistics);
+  render::relight(cell, {frame.job->lights.lights, frame.lamps, frame.levels}, plate, relight,
+                  picture, statistics);
 }
 
 void TileWorkspace::Impl::write(

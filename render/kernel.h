@@ -21,6 +21,10 @@ struct FrameContext {
   const Environment* planned = nullptr;  // its light decides
   std::vector<const capture::Image*> levels, planned_levels;
   std::shared_ptr<const LightTable> planned_table;  // the job's, with its planned irradiances
+  // The job's lamps, and one for each light of the caustics: its intensity is the irradiance of
+  // that light, planned or as it is.
+  std::shared_ptr<const Caustics> caustics;  // or null
+  std::vector<LocalLight> lamps;
   std::vector<std::uint32_t> compact;             // lights of the table that are compact and apart
   std::array<Effort, refinement_stages> efforts;  // of each stage
   int columns = 0, rows = 0;                      // of cells

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 
+#include "render/caustics.h"
 #include "render/lanes.h"
 #include "render/shadow_stream.h"
 #include "render/trace.h"
@@ -146,7 +147,36 @@ void clear_sums(Receivers& r) {
   r.lost_r.fill(0), r.lost_g.fill(0), r.lost_b.fill(0);
 }
 
+// What a cell's centres get of a light's caustics, its colour as tints.
+void add_cell_caustic(const LightContext& context,
+                      const Receivers& r,
+                      std::size_t lamp,
+                      CellLamps& cell) {
+  CellLamps::Factors factors{};
+  const auto place = static_cast<std::uint16_t>(cell.numbers.size());
+  bool any = false;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (!(r.by_lamps[k / 64] >> (k % 64) & 1)) continue;
+    const LampReceiver at = lamp_receiver(r, k);
+    const Vec3f got =
+        context.caustics->at(lamp - context.first_caustic, at.origin, at.geometric_normal);
+    const float most = largest(got);
+    if (!(most > 0)) continue;
+    any = true;
+    factors.at[k] = most;
+    const Vec3f lost = Vec3f{1, 1, 1} - got * (1 / most);
+    if (lost != Vec3f{}) cell.tints.push_back({place, static_cast<std::uint16_t>(k), lost});
+  }
+  if (!any) return;
+  cell.numbers.push_back(static_cast<std::uint16_t>(lamp));
+  cell.factors.push_back(factors);
+}
+
 }  // namespace
+
+unsigned LightContext::mask_to(std::uint32_t light) const {
+  return caustics != nullptr && caustics->follows(light) ? ray_glass_blocks : 0U;
+}
 
 void gather_cell(const LightContext& context,
                  Receivers& r,
@@ -265,7 +295,7 @@ void gather_points(const LightContext& context,
           continue;
         }
       }
-      add_ray(w, r, k, i, l, r.mask[k]);
+      add_ray(w, r, k, i, l, r.mask[k] | context.mask_to(i));
       if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }
   }
@@ -286,8 +316,12 @@ void gather_cell_lamps(const LightContext& context,
     for (std::size_t i = 0; i < count; ++i) {
       const LocalLight& lamp = lamps[first + i];
       w.lit[i] = {};
-      finder.skip_[i] = lamp.ambient != 0;
+      finder.skip_[i] = lamp.ambient != 0 || context.is_caustic(first + i);
       if (lamp.intensity == Vec3f{}) continue;
+      if (context.is_caustic(first + i)) {
+        add_cell_caustic(context, r, first + i, cell);
+        continue;
+      }
       CellLamps::Factors factors{};
       for (std::size_t word = 0; word < 4; ++word) {
         for (std::uint64_t bits = r.by_lamps[word]; bits != 0; bits &= bits - 1) {
@@ -332,9 +366,18 @@ void gather_point_lamps(const LightContext& context,
         {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), share * ray->per_intensity});
   };
   for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-    if (!(r.by_lamps[k / 64] >> (k % 64) & 1)) continue;
+    const bool by_lamps = (r.by_lamps[k / 64] >> (k % 64) & 1) != 0;
+    if (!by_lamps && !(r.by_caustics[k / 64] >> (k % 64) & 1)) continue;
     for (std::uint32_t i = 0; i < lamps.size(); ++i) {
-      if (lamps[i].intensity == Vec3f{}) continue;
+      if (lamps[i].intensity == Vec3f{} || (!by_lamps && !context.is_caustic(i))) continue;
+      if (context.is_caustic(i)) {
+        const LampReceiver at = lamp_receiver(r, k);
+        const Vec3f got =
+            context.caustics->at(i - context.first_caustic, at.origin, at.geometric_normal);
+        if (got == Vec3f{}) continue;
+        reached.push_back({static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), got});
+        continue;
+      }
       const auto ray = ray_to_lamp(lamp_receiver(r, k), lamps[i]);
       if (!ray) continue;
       if (!(ray->far_m > 0)) {

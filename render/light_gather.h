@@ -32,9 +32,10 @@ struct Receivers {
       real_first;  // light that real things block does not count as open
   // Of the pixel: weak points test fewer lights, those of 0 only the compact ones.
   std::array<float, cell_pixels> share;
-  std::array<std::uint64_t, 4> active;    // bit y % 4 * 16 + x of word y / 4
-  std::array<std::uint64_t, 4> by_lamps;  // of these, those that lamps matter to
-  int count = 0;                          // of entries, if not a grid
+  std::array<std::uint64_t, 4> active;       // bit y % 4 * 16 + x of word y / 4
+  std::array<std::uint64_t, 4> by_lamps;     // of these, those that lamps matter to
+  std::array<std::uint64_t, 4> by_caustics;  // of the rest, those that only caustics do
+  int count = 0;                             // of entries, if not a grid
 };
 
 // 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.
@@ -60,11 +61,19 @@ struct GatherWorkspace {
   CellMask same4, same2;    // pixels whose 4x4, 2x2 block is one smooth surface
 };
 
+class Caustics;
+
 // What every cell of a frame shares.
 struct LightContext {
   const Scene* scene = nullptr;
   const LightTable* table = nullptr;
   const Effort* effort = nullptr;
+  const Caustics* caustics = nullptr;  // whose lights follow the table's own lamps, or null
+  std::size_t first_caustic = 0;       // of the lamps
+
+  bool is_caustic(std::size_t lamp) const { return caustics != nullptr && lamp >= first_caustic; }
+  // What shadow rays to a light of the table carry in their mask beside what blocks them.
+  unsigned mask_to(std::uint32_t light) const;
 };
 
 // Light that glass weakens on its way to a pixel's centre.

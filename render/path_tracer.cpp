@@ -251,15 +251,21 @@ Vec3f PathTracer::environment_light(const HitPoint& hit,
                           : weights.diffuse * (cosine / pi / sky->density);
   if (value == Vec3f{} && plain == Vec3f{}) return {};
   const Vec3f origin = offset_origin(hit, l);
-  const Vec3f passing = transmittance(scene_, origin, l, 0, ray_far, rules_.lobe_blockers);
-  if (passing == Vec3f{}) return {};
+  // Clear bodies bend what lobes see: paths find it there.
+  const Vec3f passing =
+      transmittance(scene_, origin, l, 0, ray_far, rules_.lobe_blockers | ray_glass_blocks);
+  value = times(value, passing);
   if (plain != Vec3f{}) {
+    const Vec3f plain_passing =
+        rules_.caustics || !scene_.has_glass()
+            ? passing
+            : transmittance(scene_, origin, l, 0, ray_far, rules_.lobe_blockers);
     const unsigned further = rules_.diffuse_blockers & ~rules_.lobe_blockers;
     const bool blocked = (further & mask_real_blocker) != 0 && scene_.has_real_blockers() &&
                          transmittance(scene_, origin, l, 0, ray_far, further) == Vec3f{};
-    if (!blocked) value += plain;
+    if (!blocked) value += times(plain, plain_passing);
   }
-  return times(times(value, sky->radiance), passing);
+  return times(value, sky->radiance);
 }
 
 // Sends the path on by a lobe. False if it ends here.
@@ -452,6 +458,8 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     Vec3f light = environment_light(hit, surface, weights, lobes, view, numbers);
     if (!lamps_.empty() && weights.diffuse != Vec3f{})
       light += times(weights.diffuse, lamp_irradiance(hit, surface.normal)) * (1 / pi);
+    if (rules_.caustics && !rules_.diffuse_bounces && weights.diffuse != Vec3f{})
+      light += times(weights.diffuse, bent_irradiance(hit, surface.normal, numbers)) * (1 / pi);
     w.result.radiance += times(w.share, light);
     if (split) {
       // All but what goes straight on leave as paths of their own.
@@ -499,6 +507,33 @@ PathTracer::Scattered PathTracer::scattered_path(Vec3f origin,
   w.kind = RayKind::reflection;
   walk(w, numbers);
   return {w.result.radiance, w.met_virtual};
+}
+
+Vec3f PathTracer::bent_irradiance(const HitPoint& hit,
+                                  Vec3f normal,
+                                  SampleSequence& numbers) const {
+  const Vec3f direction = cosine_direction(normal, numbers.next_pair());
+  if (!(dot(direction, hit.geometric_normal) > 0)) return {};
+  Walk w;
+  w.origin = offset_origin(hit, direction);
+  w.direction = direction;
+  w.mask = rules_.diffuse_blockers;
+  w.kind = RayKind::reflection;
+  bool bent = false;
+  for (; w.depth < rules_.max_depth; ++w.depth) {
+    const auto met = closest_hit(scene_, w.origin, w.direction, 0, w.mask, w.kind);
+    if (!met) return bent ? times(w.share, environment_.radiance(w.direction)) * pi : Vec3f{};
+    const HitPoint at =
+        scene_.hit_point(met->geom_id, met->prim_id, met->inst_id, met->u, met->v, w.direction);
+    if (w.media.count > 0) {
+      w.share = times(w.share, passed_through(scene_, w.media, met->distance));
+    }
+    if (!materials_[at.material].glass) return {};
+    pass_glass(w, at, numbers);
+    bent = true;
+    if (!survives(w, numbers)) return {};
+  }
+  return {};
 }
 
 Vec3f PathTracer::virtual_irradiance(const HitPoint& hit, SampleSequence& numbers) const {

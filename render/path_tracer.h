@@ -22,6 +22,7 @@ struct PathRules {
   unsigned scattered_mask = mask_virtual;  // rays mirrored or scattered at a surface
   unsigned diffuse_blockers = mask_virtual | mask_real_blocker;  // of the environment and lamps
   unsigned lobe_blockers = mask_virtual;                         // of the environment in the lobes
+  bool caustics = false;  // clear bodies bend what dull surfaces get, too: none goes straight on
   int max_depth = 128;
 };
 
@@ -43,7 +44,9 @@ struct PathLobes;
 enum class PathLobe : std::uint8_t;
 
 // Traces through one scene under one environment. Safe from any thread; all arguments must outlive
-// it. Unbiased, but for caustics of smooth surfaces on diffuse ones, which are blurred.
+// it. Unbiased, but for caustics of smooth surfaces on diffuse ones, which are blurred where a
+// path leaves those, and clear bodies, through which what is dull sees the light straight on unless
+// the rules say otherwise.
 //
 // The environment is sampled at every surface in proportion to its light, and the lobes in
 // proportion to theirs, both weighted by the balance heuristic (Veach and Guibas, "Optimally
@@ -73,9 +76,12 @@ class PathTracer {
 
   // Irradiance of the lamps on a point, as it arrives.
   Vec3f lamp_irradiance(const HitPoint& hit, Vec3f normal) const;
+  // One sample of the irradiance of the environment that clear bodies bend or mirror to a point.
+  Vec3f bent_irradiance(const HitPoint& hit, Vec3f normal, SampleSequence& numbers) const;
   // One sample of the irradiance that virtual objects send to a point, what they let pass left out.
   Vec3f virtual_irradiance(const HitPoint& hit, SampleSequence& numbers) const;
 
+  const PathRules& rules() const { return rules_; }
   const Scene& scene() const { return scene_; }
   const EnvironmentSampler& environment() const { return environment_; }
 

@@ -54,6 +54,7 @@ struct StandInSums {
   int count = 0;
   Sum through;        // share of the pixel
   Sum open, lost;     // irradiance of the environment, and what virtual objects take; times share
+  Sum gathered;       // irradiance of the environment that clear bodies bend; times share
   Sum irradiance;     // open, not times share
   Sum virtual_light;  // irradiance of lamps (and virtual objects); times share
 };
@@ -139,6 +140,11 @@ class Composite {
       if (s.parameters.catches_shadow != 0)
         share = {passing(s.lost.x(), s.open.x()), passing(s.lost.y(), s.open.y()),
                  passing(s.lost.z(), s.open.z())};
+      if (s.bent || s.parameters.catches_light != 0) {
+        const Vec3f gathered = s.gathered.over(1), open = s.open.over(1);
+        if (open.x > 0 && open.y > 0 && open.z > 0)
+          share += {gathered.x / open.x, gathered.y / open.y, gathered.z / open.z};
+      }
       if (s.bent) {
         rgb += times(s.plate.over(n), share);
         continue;
@@ -197,6 +203,10 @@ class Composite {
     const Vec3f weight = bent ? times(path.through, *bent) : path.through;
     if (bent) sums->plate.add(weight);
     sample_irradiance(path, weight, numbers, *sums);
+    if (tracer_.rules().caustics) {
+      sums->gathered.add(
+          times(weight, tracer_.bent_irradiance(path.hit, path.hit.normal, numbers)));
+    }
     if (sums->parameters.catches_light != 0 && !bent) {
       Vec3f light = tracer_.lamp_irradiance(path.hit, path.hit.normal);
       if (bounces_) light += tracer_.virtual_irradiance(path.hit, numbers);
@@ -222,7 +232,9 @@ class Composite {
         transmittance(scene, origin, sky->direction, 0, ray_far, mask_real_blocker) == Vec3f{};
     if (real_shadow) return;
     const Vec3f open = sky->radiance * (cosine / sky->density);
-    const Vec3f passed = transmittance(scene, origin, sky->direction, 0, ray_far, mask_virtual);
+    const bool caustics = tracer_.rules().caustics;
+    const Vec3f passed = transmittance(scene, origin, sky->direction, 0, ray_far,
+                                       caustics ? mask_virtual | ray_glass_blocks : mask_virtual);
     sums.irradiance.add(open);
     sums.open.add(times(weight, open));
     sums.lost.add(times(weight, times(open, Vec3f{1, 1, 1} - passed)));
@@ -326,6 +338,7 @@ capture::Image render_reference(const FrameInputs& inputs,
   const bool bounces = settings.bounces || bounced;
   PathRules rules;
   rules.max_depth = settings.max_depth;
+  rules.caustics = job.effort.caustic_photons > 0;
   if (bounces) {
     rules.diffuse_bounces = true;
     rules.scattered_mask = rules.lobe_blockers = mask_virtual | mask_real_blocker;

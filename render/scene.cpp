@@ -267,7 +267,12 @@ void Scene::Impl::filter_any(const RTCFilterFunctionNArguments* args) {
     }
     const std::uint32_t prim = RTCHitN_primID(args->hit, args->N, i);
     const std::uint32_t t = part.triangle_of_prim.empty() ? prim : part.triangle_of_prim[prim];
-    const auto& anywhere = impl.compiled->shadow[material_of(mesh, t)];
+    const std::uint32_t material = material_of(mesh, t);
+    if ((RTCRayN_mask(args->ray, args->N, i) & ray_glass_blocks) != 0 &&
+        impl.compiled->glass[material]) {
+      continue;
+    }
+    const auto& anywhere = impl.compiled->shadow[material];
     const Vec3f share = anywhere ? *anywhere : impl.passes(args, i, RayKind::shadow, 0);
     if (share == Vec3f{}) continue;
     if (context.transmittance_r) {

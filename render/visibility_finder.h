@@ -69,7 +69,8 @@ class VisibilityFinder {
       const auto ray = ray_to_lamp(lamp_receiver(r_, point), context_.table->lamps[light]);
       add_ray(w_, r_, point, light, ray->direction, mask, ray->far_m);
     } else {
-      add_ray(w_, r_, point, light, context_.table->lights[light].direction, mask);
+      add_ray(w_, r_, point, light, context_.table->lights[light].direction,
+              mask | context_.mask_to(light));
     }
     if (w_.rays == stream_rays) shoot_rest(first);
   }

@@ -17,6 +17,7 @@ Json effort_json(const render::Effort& effort) {
           {"light_samples", effort.light_samples},
           {"interleave", effort.interleave},
           {"bounce_lamps", effort.bounce_lamps},
+          {"caustic_photons", effort.caustic_photons},
           {"adaptive_visibility", effort.adaptive_visibility},
           {"cull_lights", effort.cull_lights},
           {"accuracy", effort.accuracy},

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "render/caustics.h"
 #include "studio/set_sections.h"
 
 namespace studio {
@@ -131,6 +132,7 @@ render::Effort read_effort_section(Section section) {
   section.integer("interleave", effort.interleave, 1, 4);
   if (effort.interleave == 3) section.fault("interleave", "must be 1, 2 or 4");
   section.integer("bounce_lamps", effort.bounce_lamps, 0, 1024);
+  section.integer("caustic_photons", effort.caustic_photons, 0, render::most_caustic_photons);
   section.boolean("adaptive_visibility", effort.adaptive_visibility);
   section.boolean("cull_lights", effort.cull_lights);
   section.number("accuracy", effort.accuracy, {0, 1});

@@ -317,6 +317,27 @@ TEST(Glass, DimsTheSunThatRoughThingsMirror) {
   }
 }
 
+// Light that a rough thing gets through glass counts once.
+TEST(Glass, LeavesAWhiteRoughThingInAWhiteWorldWhite) {
+  for (const float roughness : {0.2F, 0.5F, 1.0F}) {
+    render::SceneDescription scene = bodies({render::make_box({-2, -2, -2}, {2, 2, 2})}, {{}});
+    render::StandardParameters metal;
+    metal.metallic = 1;
+    metal.roughness = roughness;
+    auto ball = std::make_shared<render::Mesh>(*render::make_sphere(0.5F, 48));
+    ball->materials = {1};
+    scene.meshes.push_back(ball);
+    scene.materials.push_back(render::make_standard_material("metal", metal));
+    scene.instances.emplace_back().mesh = 1;
+    const GlassShot shot =
+        glass_shot(std::move(scene), [](Vec3f) { return 1.0F; }, 16, 40, {0, -5, 0});
+    const capture::Image picture = shot.reference(256);
+    double sum = 0;
+    for (const float v : picture.pixels) sum += v;
+    EXPECT_NEAR(sum / static_cast<double>(picture.pixels.size()), 1, 0.01) << roughness;
+  }
+}
+
 // A glass ball on a stand-in floor, before a plate.
 MadeShot ball_on_plate(int size) {
   render::SceneDescription scene = made_scene();

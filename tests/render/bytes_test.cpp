@@ -19,6 +19,7 @@ FrameJob made_job() {
   job.scene_version = 17;
   job.effort.interleave = 4;
   job.effort.bounce_lamps = 12;
+  job.effort.caustic_photons = 4096;
   job.effort.adaptive_visibility = false;
   job.effort.aa_tolerance = 0.25F;
   job.effort.glint_contrast = 0.75F;
