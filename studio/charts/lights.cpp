@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "studio/charts/bounce_lamps.h"
+#include "studio/charts/caustics.h"
 #include "studio/charts/light_stressors.h"
 #include "studio/charts/matte_shot.h"
 #include "studio/charts/screen_lamps.h"
@@ -97,6 +98,8 @@ class LightsChart {
     add_screen_lamps(quick_, chart);
     progress("light between surfaces", 0.95);
     add_bounce_lamps(quick_, chart);
+    progress("light through glass", 0.97);
+    add_caustics(quick_, chart);
     return chart;
   }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "studio/charts/bounce_lamps.h"
+#include "studio/charts/caustics.h"
 #include "studio/charts/screen_lamps.h"
 #include "tests/studio/quick_chart.h"
 
@@ -129,6 +130,16 @@ TEST(LightsChart, HasARoomNearTheReferenceWithLampsOfBouncedLightAndFarWithout) 
   EXPECT_GT(chart.points[0].error, 0.2) << "the room must need that light";
   EXPECT_LT(chart.points[1].error, 0.6 * chart.points[0].error);
   EXPECT_GT(figure(chart.points[1].figures, "placing_ms"), 0);
+}
+
+TEST(LightsChart, HasABallOfGlassNearTheReferenceWithPhotonsAndFarWithout) {
+  Chart chart;
+  add_caustics(true, chart);
+  ASSERT_EQ(chart.points.size(), 2U);
+  EXPECT_TRUE(chart.points[0].by_default);
+  EXPECT_GT(chart.points[0].error, 0.1) << "straight on";
+  EXPECT_LT(chart.points[1].error, 0.3 * chart.points[0].error);
+  EXPECT_GT(figure(chart.points[1].figures, "finding_ms"), 0);
 }
 
 }  // namespace

@@ -1,0 +1,105 @@
+// Caustics by so many photons.
+#include "studio/charts/caustics.h"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "render/caustics.h"
+#include "render/glass.h"
+#include "render/kept_transport.h"
+#include "render/made_shapes.h"
+#include "render/paper_scenes.h"
+#include "render/reference.h"
+#include "studio/charts/matte_shot.h"
+#include "studio/paper_shot.h"
+
+namespace studio {
+namespace {
+
+double time_ms(const std::function<void()>& work, int runs) {
+  double least = 0;
+  for (int i = 0; i < runs; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    const std::chrono::duration<double, std::milli> taken =
+        std::chrono::steady_clock::now() - start;
+    least = i == 0 ? taken.count() : std::min(least, taken.count());
+  }
+  return least;
+}
+
+// The sun is larger than it is, or paths would hardly ever find it behind the glass.
+constexpr float sun_radius_rad = 0.06F;
+
+render::PaperScene ball_over_floor() {
+  render::PaperScene made;
+  made.name = "ball";
+  made.scene.materials = {make_grey_material("floor"),
+                          render::make_glass_material("ball", {.index = 1.5F})};
+  const auto add = [&](const char* name, render::Mesh mesh) {
+    mesh.materials = {static_cast<std::uint32_t>(made.scene.meshes.size())};
+    render::Instance& instance = made.scene.instances.emplace_back();
+    instance.name = name;
+    instance.mesh = static_cast<std::uint32_t>(made.scene.meshes.size());
+    made.scene.meshes.push_back(std::make_shared<render::Mesh>(std::move(mesh)));
+  };
+  add("floor", render::make_rectangle({-3, -3, 0}, {6, 0, 0}, {0, 6, 0}, 1));
+  render::Mesh ball = render::make_cushion({0.4F, 0.4F, 0.4F}, 2, 48);
+  for (render::Vec3f& p : ball.positions) p.z += 0.5F;
+  add("ball", std::move(ball));
+  made.cam_from_set = calibrate::look_at({0.4, -2.2, 1.5}, {0.1, 0.1, 0.2}, 0);
+  made.horizontal_view_rad = 0.8;
+  made.environment = make_bench_sky({.sun_radius_rad = sun_radius_rad});
+  return made;
+}
+
+}  // namespace
+
+void add_caustics(bool quick, Chart& chart) {
+  const int width = quick ? 48 : 128, height = quick ? 36 : 96, runs = quick ? 1 : 3;
+  const std::vector<int> counts =
+      quick ? std::vector{0, 4096} : std::vector{0, 256, 1024, 4096, 16384, 65536, 262144};
+  BenchScene shot = make_paper_shot(ball_over_floor(), width, height).shot;
+  shot.job.effort.caustic_photons = 1;  // the reference then bends all light
+  const Truth truth = truth_of(shot.plate, [&](std::uint32_t seed) {
+    return render::render_reference(shot.inputs(), shot.job, shot.plate,
+                                    {.samples = quick ? 128 : 4096, .seed = seed});
+  });
+  for (const int count : counts) {
+    shot.job.effort.caustic_photons = count;
+    render::FrameInputs inputs = shot.inputs();
+    render::FrameResult result;
+    const auto frame = [&] { render_frame(inputs, shot.job, shot.half_plate, result); };
+    ChartPoint point;
+    point.time_ms = time_ms(frame, runs);
+    const render::PictureError error = error_of(capture::to_float(result.rgba), truth);
+    const double finding_ms = time_ms(
+        [&] {
+          if (count > 0) render::Caustics(*shot.scene, shot.job.lights, {.photons = count});
+        },
+        runs);
+    render::KeptTransport kept;
+    inputs.kept = &kept;
+    frame();
+    // Light that lives: cells are lit anew, not shown again.
+    const auto live = [&] {
+      for (auto& light : shot.job.lights.lights) light.irradiance *= 1.0001F;
+      frame();
+    };
+    point.scene = "glass ball over a grey floor, against the reference that bends all light";
+    point.method = "photons through glass";
+    point.settings = {{"caustic_photons", static_cast<double>(count)}};
+    point.by_default = count == render::Effort{}.caustic_photons;
+    point.label = fmt::format("{}{}", count, point.by_default ? ": default, straight on" : "");
+    point.error = error.relative_rms;
+    point.error_p99 = error.p99;
+    point.figures = {{"finding_ms", finding_ms}, {"still_ms", time_ms(live, runs)}};
+    chart.points.push_back(std::move(point));
+  }
+}
+
+}  // namespace studio
