@@ -5,7 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <numbers>
-#include <span>
+#include <optional>
+#include <utility>
 
 #include "capture/parallel_loop.h"
 #include "render/glass.h"
@@ -21,11 +22,13 @@ namespace {
 constexpr float pi = std::numbers::pi_v<float>;
 constexpr int deepest = 24;              // surfaces that a photon meets
 constexpr float least_followed = 1e-3F;  // of a photon, whatever accuracy is asked for
-constexpr std::size_t most_ways = 512;   // of a photon and its parts; the rest is lost
+constexpr int most_rays = 128;           // of a photon and its parts; the rest is lost
 constexpr int photons_at_once = 64;
+// Of photons at once: more ways are not known, more landings lost.
+constexpr std::size_t most_ways = 32 * photons_at_once, most_landings = 8 * photons_at_once;
 constexpr std::size_t spots_in_leaf = 8;
 // Standard deviation of a photon's share of the grid, of the distance to the next: photons that do
-// not spread then add up to an even light, but for two thousandths.
+// not spread then add up to an even light, but for four thousandths.
 constexpr float spread_in_grid = 0.7F;
 // The same of a pixel's width.
 constexpr float spread_in_pixel = 0.4F;
@@ -107,11 +110,8 @@ Grid grid_over(const Scene::Bounds& box, Vec3f to_light) {
 // Traces the photons of one grid, some rows at a time.
 class PhotonTracer {
  public:
-  PhotonTracer(const Scene& scene, const CausticSettings& settings, const Grid& grid)
-      : scene_(scene),
-        settings_(settings),
-        grid_(grid),
-        least_(std::max((1 - settings.accuracy) / 4, least_followed)) {}
+  PhotonTracer(const Scene& scene, const PhotonSettings& settings, const Grid& grid)
+      : scene_(scene), grid_(grid), least_(std::max((1 - settings.accuracy) / 4, least_followed)) {}
 
   void trace(int index) {
     const auto column = static_cast<float>(index % grid_.columns) + 0.5F;
@@ -122,13 +122,13 @@ class PhotonTracer {
     photon.direction = -grid_.to_light;
     photon.neighbours[0].step = grid_.a * step;
     photon.neighbours[1].step = grid_.b * step;
-    ways.push_back({photon.origin, grid_.to_light, ray_far});
+    rays_of_photon_ = 0;
+    note(photon.origin, grid_.to_light, ray_far);
     photon.share = transmittance(scene_, photon.origin, grid_.to_light, 0, ray_far,
                                  blockers | ray_glass_blocks);
     if (!(largest(photon.share) > least_)) return;
     waiting_.push_back(photon);
-    const std::size_t last = ways.size() + most_ways;
-    while (!waiting_.empty() && ways.size() < last) {
+    while (!waiting_.empty() && rays_of_photon_ < most_rays) {
       const Photon next = waiting_.back();
       waiting_.pop_back();
       follow(next);
@@ -136,8 +136,9 @@ class PhotonTracer {
     waiting_.clear();
   }
 
-  std::vector<Caustics::Spot> spots;
-  std::vector<Caustics::Way> ways;
+  std::vector<Photons::Landing> landings;
+  std::vector<Photons::Way> ways;
+  bool knows_all_ways = true;
 
  private:
   static constexpr unsigned blockers = mask_virtual | mask_real_blocker;
@@ -156,7 +157,7 @@ class PhotonTracer {
     const auto met =
         closest_hit(scene_, photon.origin, photon.direction, 0,
                     photon.bent ? blockers | mask_stand_in : blockers, RayKind::reflection);
-    ways.push_back({photon.origin, photon.direction, met ? met->distance : ray_far});
+    note(photon.origin, photon.direction, met ? met->distance : ray_far);
     if (!met) return;
     photon.share = photon.share * passed_through(scene_, photon.media, met->distance);
     if (!(largest(photon.share) > least_)) return;
@@ -248,62 +249,83 @@ class PhotonTracer {
     waiting_.push_back(photon);
   }
 
-  // What it lights there: an ellipse with the second moments of all that it stands for.
   void land(const Photon& photon, const HitPoint& hit) {
-    const Vec3f normal = hit.geometric_normal;
-    const Vec3f t = axis(normal), s = cross(normal, t);
-    float tt = 0, ss = 0, ts = 0;
-    const auto add = [&](Vec3f v, float variance) {
-      const float x = dot(v, t), y = dot(v, s);
-      tt += variance * x * x, ss += variance * y * y, ts += variance * x * y;
-    };
-    constexpr float of_grid = spread_in_grid * spread_in_grid, of_disc = 0.25F;
-    add(photon.neighbours[0].step, of_grid), add(photon.neighbours[1].step, of_grid);
-    add(photon.neighbours[2].step, of_disc), add(photon.neighbours[3].step, of_disc);
-    const Vec3f seen = hit.position - settings_.camera;
-    const float pixel_m = length(seen) * settings_.pixel_rad;
-    const Vec3f view = normalize(seen), level = normalize(cross(view, normal));
-    constexpr float of_pixel = spread_in_pixel * spread_in_pixel;
-    if (level != Vec3f{}) {
-      add(level * pixel_m, of_pixel);
-      add(cross(normal, level) * (pixel_m / std::max(std::abs(dot(view, normal)), 0.1F)), of_pixel);
-    } else {
-      add(t * pixel_m, of_pixel), add(s * pixel_m, of_pixel);
+    if (landings.size() >= most_landings) return;
+    Photons::Landing& landing = landings.emplace_back();
+    landing.position = hit.position;
+    landing.normal = hit.geometric_normal;
+    landing.share = photon.share * (grid_.step_m * grid_.step_m);
+    for (std::size_t i = 0; i < landing.neighbours.size(); ++i) {
+      landing.neighbours[i] = photon.neighbours[i].step;
     }
-    // Never narrower than what numbers tell apart.
-    const float size = std::max(
-        {std::abs(hit.position.x), std::abs(hit.position.y), std::abs(hit.position.z), 1e-3F});
-    const float least = size * 1e-5F;
-    tt += least * least, ss += least * least;
-    // Main axes.
-    const float half = 0.5F * (tt - ss), root = calibrate::hypotenuse(half, ts);
-    const float wide = 0.5F * (tt + ss) + root;
-    const float narrow = std::max((tt * ss - ts * ts) / wide, least * least);
-    const float turn = 0.5F * std::atan2(ts, half);
-    const Vec3f a = t * std::cos(turn) + s * std::sin(turn), b = cross(normal, a);
-    // (1 - r^2)^2 on an ellipse has an eighth of its squared radii as moments.
-    const float ra = std::sqrt(8 * wide), rb = std::sqrt(8 * narrow);
-    Caustics::Spot spot;
-    spot.peak = photon.share * (grid_.step_m * grid_.step_m * 3 / (pi * ra * rb));
-    if (!(largest(spot.peak) > dimmest) || !std::isfinite(largest(spot.peak))) return;
-    spot.centre = hit.position;
-    spot.normal = normal;
-    spot.across = a * (1 / ra), spot.along = b * (1 / rb);
-    spot.thickness_m = std::max(rb, 10 * least);
-    const auto reach = [&](float ax, float bx, float nx) {
-      return calibrate::hypotenuse(ra * ax, rb * bx) + spot.thickness_m * std::abs(nx);
-    };
-    const Vec3f r{reach(a.x, b.x, normal.x), reach(a.y, b.y, normal.y), reach(a.z, b.z, normal.z)};
-    spot.bounds = {spot.centre - r, spot.centre + r};
-    spots.push_back(spot);
+  }
+
+  void note(Vec3f from, Vec3f direction, float far_m) {
+    ++rays_of_photon_;
+    if (ways.size() < most_ways) {
+      ways.push_back({from, direction, far_m});
+    } else {
+      knows_all_ways = false;
+    }
   }
 
   const Scene& scene_;
-  const CausticSettings& settings_;
   const Grid& grid_;
   float least_;
+  int rays_of_photon_ = 0;
   std::vector<Photon> waiting_;
 };
+
+// What a photon lights: an ellipse with the second moments of all that it stands for. Nothing if
+// that is too dim.
+std::optional<Caustics::Spot> spot_of(const Photons::Landing& landing, const CausticView& view) {
+  const Vec3f normal = landing.normal;
+  const Vec3f t = axis(normal), s = cross(normal, t);
+  float tt = 0, ss = 0, ts = 0;
+  const auto add = [&](Vec3f v, float variance) {
+    const float x = dot(v, t), y = dot(v, s);
+    tt += variance * x * x, ss += variance * y * y, ts += variance * x * y;
+  };
+  constexpr float of_grid = spread_in_grid * spread_in_grid, of_disc = 0.25F;
+  add(landing.neighbours[0], of_grid), add(landing.neighbours[1], of_grid);
+  add(landing.neighbours[2], of_disc), add(landing.neighbours[3], of_disc);
+  const Vec3f seen = landing.position - view.camera;
+  const float pixel_m = length(seen) * view.pixel_rad;
+  const Vec3f gaze = normalize(seen), level = normalize(cross(gaze, normal));
+  constexpr float of_pixel = spread_in_pixel * spread_in_pixel;
+  if (level != Vec3f{}) {
+    add(level * pixel_m, of_pixel);
+    add(cross(normal, level) * (pixel_m / std::max(std::abs(dot(gaze, normal)), 0.1F)), of_pixel);
+  } else {
+    add(t * pixel_m, of_pixel), add(s * pixel_m, of_pixel);
+  }
+  // Never narrower than what numbers tell apart.
+  const float size = std::max({std::abs(landing.position.x), std::abs(landing.position.y),
+                               std::abs(landing.position.z), 1e-3F});
+  const float least = size * 1e-5F;
+  tt += least * least, ss += least * least;
+  // Main axes.
+  const float half = 0.5F * (tt - ss), root = calibrate::hypotenuse(half, ts);
+  const float wide = 0.5F * (tt + ss) + root;
+  const float narrow = std::max((tt * ss - ts * ts) / wide, least * least);
+  const float turn = 0.5F * std::atan2(ts, half);
+  const Vec3f a = t * std::cos(turn) + s * std::sin(turn), b = cross(normal, a);
+  // (1 - r^2)^2 on an ellipse has an eighth of its squared radii as moments.
+  const float ra = std::sqrt(8 * wide), rb = std::sqrt(8 * narrow);
+  Caustics::Spot spot;
+  spot.peak = landing.share * (3 / (pi * ra * rb));
+  if (!(largest(spot.peak) > dimmest) || !std::isfinite(largest(spot.peak))) return std::nullopt;
+  spot.centre = landing.position;
+  spot.normal = normal;
+  spot.across = a * (1 / ra), spot.along = b * (1 / rb);
+  spot.thickness_m = std::max(rb, 10 * least);
+  const auto reach = [&](float ax, float bx, float nx) {
+    return calibrate::hypotenuse(ra * ax, rb * bx) + spot.thickness_m * std::abs(nx);
+  };
+  const Vec3f r{reach(a.x, b.x, normal.x), reach(a.y, b.y, normal.y), reach(a.z, b.z, normal.z)};
+  spot.bounds = {spot.centre - r, spot.centre + r};
+  return spot;
+}
 
 bool holds(const Scene::Bounds& b, Vec3f p) {
   return p.x >= b.lower.x && p.x <= b.upper.x && p.y >= b.lower.y && p.y <= b.upper.y &&
@@ -311,7 +333,7 @@ bool holds(const Scene::Bounds& b, Vec3f p) {
 }
 
 // Whether the way may pass through the box, or touch it.
-bool meets(const Scene::Bounds& box, const Caustics::Way& way) {
+bool meets(const Scene::Bounds& box, const Photons::Way& way) {
   float first = 0, last = way.far_m;
   const auto cut = [&](float lower, float upper, float from, float direction) {
     const float margin = 1e-5F * std::max({std::abs(lower), std::abs(upper), std::abs(from)});
@@ -347,7 +369,7 @@ std::vector<Grid> find_grids(const Scene& scene,
                              const LightTable& table,
                              const std::vector<std::uint32_t>& lights,
                              int photons,
-                             std::vector<Caustics::Way>& ways) {
+                             std::vector<Photons::Way>& ways) {
   const SceneDescription& description = scene.description();
   std::vector<Grid> grids;
   std::vector<std::array<float, 2>> sizes;
@@ -384,8 +406,8 @@ std::vector<Grid> find_grids(const Scene& scene,
       grid.columns = grid.rows = 0;
       continue;
     }
-    // Whole steps: the last ones may reach past the box.
-    grid.step_m = std::sqrt(wide * high / count);
+    // Whole steps: the last ones may reach past the box. Of a box that is hardly high, one row.
+    grid.step_m = std::max(std::sqrt(wide * high / count), std::max(wide, high) / count);
     grid.columns = static_cast<int>(std::ceil(wide / grid.step_m));
     grid.rows = static_cast<int>(std::ceil(high / grid.step_m));
     grid.corner -= grid.a * (0.5F * (static_cast<float>(grid.columns) * grid.step_m - wide)) +
@@ -397,7 +419,7 @@ std::vector<Grid> find_grids(const Scene& scene,
 
 }  // namespace
 
-Caustics::Caustics(const Scene& scene, const LightTable& planned, const CausticSettings& settings) {
+Photons::Photons(const Scene& scene, const LightTable& planned, const PhotonSettings& settings) {
   lights_ = brightest(planned);
   const std::vector<Grid> grids = find_grids(scene, planned, lights_, settings.photons, ways_);
   // A light that no photon is left for goes straight through.
@@ -406,25 +428,43 @@ Caustics::Caustics(const Scene& scene, const LightTable& planned, const CausticS
   };
   follows_.assign(planned.lights.size(), 0);
   for (std::size_t n = 0; n < lights_.size(); ++n) follows_[lights_[n]] = has_grid(n) ? 1 : 0;
-  spots_.resize(lights_.size());
+  landings_.resize(lights_.size());
   for (const Grid& grid : grids) {
     const int photons = grid.columns * grid.rows;
-    const int parts = (photons + photons_at_once - 1) / photons_at_once;
-    std::vector<std::vector<Spot>> spots(static_cast<std::size_t>(parts));
-    std::vector<std::vector<Way>> ways(spots.size());
-    capture::parallel_for(0, parts, [&](int part) {
+    std::vector<PhotonTracer> parts(
+        static_cast<std::size_t>((photons + photons_at_once - 1) / photons_at_once),
+        PhotonTracer(scene, settings, grid));
+    capture::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t part) {
       prepare_thread();
-      PhotonTracer tracer(scene, settings, grid);
-      const int last = std::min((part + 1) * photons_at_once, photons);
-      for (int i = part * photons_at_once; i < last; ++i) tracer.trace(i);
-      spots[static_cast<std::size_t>(part)] = std::move(tracer.spots);
-      ways[static_cast<std::size_t>(part)] = std::move(tracer.ways);
+      const int first = static_cast<int>(part) * photons_at_once;
+      const int last = std::min(first + photons_at_once, photons);
+      for (int i = first; i < last; ++i) parts[part].trace(i);
     });
-    std::vector<Spot>& all = spots_[grid.number].spots;
-    for (const auto& part : spots) all.insert(all.end(), part.begin(), part.end());
-    for (const auto& part : ways) ways_.insert(ways_.end(), part.begin(), part.end());
+    std::vector<Landing>& all = landings_[grid.number];
+    for (const PhotonTracer& part : parts) {
+      all.insert(all.end(), part.landings.begin(), part.landings.end());
+      ways_.insert(ways_.end(), part.ways.begin(), part.ways.end());
+      knows_all_ways_ = knows_all_ways_ && part.knows_all_ways;
+    }
   }
-  capture::parallel_for(std::size_t{0}, spots_.size(), [&](std::size_t n) { spots_[n].build(); });
+}
+
+bool Photons::pass(const std::vector<Scene::Bounds>& boxes) const {
+  if (!knows_all_ways_ && !boxes.empty()) return true;
+  return std::ranges::any_of(ways_, [&](const Way& way) {
+    return std::ranges::any_of(boxes, [&](const Scene::Bounds& box) { return meets(box, way); });
+  });
+}
+
+Caustics::Caustics(std::shared_ptr<const Photons> photons, const CausticView& view)
+    : photons_(std::move(photons)), spots_(photons_->landings().size()) {
+  capture::parallel_for(std::size_t{0}, spots_.size(), [&](std::size_t n) {
+    prepare_thread();
+    for (const Photons::Landing& landing : photons_->landings()[n]) {
+      if (const auto spot = spot_of(landing, view)) spots_[n].spots.push_back(*spot);
+    }
+    spots_[n].build();
+  });
   const auto mix = [&](std::uint64_t value) {
     key_ = (key_ ^ value) * 0xFF51AFD7ED558CCDULL;
     key_ ^= key_ >> 32;
@@ -433,10 +473,7 @@ Caustics::Caustics(const Scene& scene, const LightTable& planned, const CausticS
     mix(std::uint64_t{std::bit_cast<std::uint32_t>(v.x)} << 32 | std::bit_cast<std::uint32_t>(v.y));
     mix(std::bit_cast<std::uint32_t>(v.z));
   };
-  mix(settings.photons > 0 ? 1 : 0);
-  for (const std::uint8_t follows : follows_) mix(follows);
   for (const Spots& one : spots_) {
-    landed_ += one.spots.size();
     mix(one.spots.size());
     for (const Spot& spot : one.spots) {
       for (const Vec3f& v : {spot.centre, spot.normal, spot.across, spot.along, spot.peak}) {
@@ -460,12 +497,6 @@ std::vector<Scene::Bounds> Caustics::regions() const {
     for (std::size_t i = 0; i < count; ++i) regions.push_back(one.nodes[count - 1 + i]);
   }
   return regions;
-}
-
-bool Caustics::pass(const std::vector<Scene::Bounds>& boxes) const {
-  return std::ranges::any_of(ways_, [&](const Way& way) {
-    return std::ranges::any_of(boxes, [&](const Scene::Bounds& box) { return meets(box, way); });
-  });
 }
 
 void Caustics::Spots::build() {
@@ -532,21 +563,25 @@ Vec3f Caustics::Spots::at(Vec3f position, Vec3f normal) const {
 
 std::shared_ptr<const Caustics> CausticFollower::follow(const Scene& scene,
                                                         const LightTable& planned,
-                                                        const CausticSettings& settings) {
+                                                        const PhotonSettings& settings,
+                                                        const CausticView& view) {
   if (settings.photons <= 0 || !scene.has_glass()) {
-    plan_.reset();
-    caustics_ = nullptr;
-    return caustics_;
+    *this = {};
+    return nullptr;
   }
+  bool stay = false;
   if (plan_ && plan_->settings == settings && plan_->lights == planned.lights) {
     const auto moved = Scene::moved(plan_->places, scene.places());
-    if (moved && !caustics_->pass(*moved)) {
-      plan_->places = scene.places();
-      return caustics_;
-    }
+    stay = moved && !photons_->pass(*moved);
+  }
+  if (stay && view_ == view) {
+    plan_->places = scene.places();
+    return caustics_;
   }
   plan_ = Plan{scene.places(), planned.lights, settings};
-  caustics_ = std::make_shared<const Caustics>(scene, planned, settings);
+  view_ = view;
+  if (!stay) photons_ = std::make_shared<const Photons>(scene, planned, settings);
+  caustics_ = std::make_shared<const Caustics>(photons_, view);
   return caustics_;
 }
 

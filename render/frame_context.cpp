@@ -78,8 +78,8 @@ std::uint64_t transport_key(const FrameContext& context) {
   key.mix(e.max_rays);
   key.mix(std::uint64_t{e.dark_cuts});
   if (context.caustics) {
-    for (const std::uint32_t light : context.caustics->lights()) {
-      key.mix(std::uint64_t{2} * light + (context.caustics->follows(light) ? 1U : 0U));
+    for (const std::uint32_t light : context.caustics->photons().lights()) {
+      key.mix(std::uint64_t{2} * light + (context.caustics->photons().follows(light) ? 1U : 0U));
     }
   }
   return key.value();
@@ -165,14 +165,14 @@ void add_videos(FrameContext& context) {
 void add_caustics(FrameContext& context, LightTable& planned) {
   const FrameInputs& inputs = context.inputs;
   const Effort& effort = context.job->effort;
-  const CausticSettings settings{effort.caustic_photons, effort.accuracy, context.camera,
-                                 context.pixel_angle};
   CausticFollower alone;
   CausticFollower& follower = inputs.kept ? inputs.kept->caustics() : alone;
-  context.caustics = follower.follow(*inputs.scene, planned, settings);
+  context.caustics =
+      follower.follow(*inputs.scene, planned, {effort.caustic_photons, effort.accuracy},
+                      {context.camera, context.pixel_angle});
   context.lamps = context.job->lights.lamps;
   if (!context.caustics) return;
-  for (const std::uint32_t light : context.caustics->lights()) {
+  for (const std::uint32_t light : context.caustics->photons().lights()) {
     LocalLight lamp;
     lamp.intensity = planned.lights[light].irradiance;
     planned.lamps.push_back(lamp);

@@ -175,7 +175,7 @@ void add_cell_caustic(const LightContext& context,
 }  // namespace
 
 unsigned LightContext::mask_to(std::uint32_t light) const {
-  return caustics != nullptr && caustics->follows(light) ? ray_glass_blocks : 0U;
+  return caustics != nullptr && caustics->photons().follows(light) ? ray_glass_blocks : 0U;
 }
 
 void gather_cell(const LightContext& context,

@@ -1,9 +1,6 @@
 // Light between surfaces, by so many lamps.
 #include "studio/charts/bounce_lamps.h"
 
-#include <algorithm>
-#include <chrono>
-#include <functional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -12,26 +9,11 @@
 #include "render/kept_transport.h"
 #include "render/paper_scenes.h"
 #include "render/reference.h"
+#include "studio/charts/least_time.h"
 #include "studio/charts/matte_shot.h"
 #include "studio/paper_shot.h"
 
 namespace studio {
-namespace {
-
-double time_ms(const std::function<void()>& work, int runs) {
-  double least = 0;
-  for (int i = 0; i < runs; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - start;
-    least = i == 0 ? taken.count() : std::min(least, taken.count());
-  }
-  return least;
-}
-
-}  // namespace
-
 void add_bounce_lamps(bool quick, Chart& chart) {
   const int width = quick ? 64 : 240, height = quick ? 48 : 180, runs = quick ? 1 : 3;
   const std::vector<int> counts =
@@ -48,7 +30,7 @@ void add_bounce_lamps(bool quick, Chart& chart) {
   const render::LightTable table = shot.job.lights;
   for (const int count : counts) {
     render::BouncedLight bounced;
-    const double placing_ms = time_ms(
+    const double placing_ms = least_time_ms(
         [&] { bounced = render::BouncedLight(*shot.scene, table, {.lamps = count}); }, runs);
     const std::vector<render::LocalLight> lamps = bounced.lamps(table);
     shot.job.lights = table;
@@ -57,7 +39,7 @@ void add_bounce_lamps(bool quick, Chart& chart) {
     render::FrameResult result;
     const auto frame = [&] { render_frame(inputs, shot.job, shot.half_plate, result); };
     ChartPoint point;
-    point.time_ms = placing_ms + time_ms(frame, runs);
+    point.time_ms = placing_ms + least_time_ms(frame, runs);
     const render::PictureError error = error_of(capture::to_float(result.rgba), truth);
     render::KeptTransport kept;
     inputs.kept = &kept;
@@ -74,7 +56,7 @@ void add_bounce_lamps(bool quick, Chart& chart) {
     point.label = fmt::format("{}{}", count, point.by_default ? ": default" : "");
     point.error = error.relative_rms;
     point.error_p99 = error.p99;
-    point.figures = {{"placing_ms", placing_ms}, {"still_ms", time_ms(live, runs)}};
+    point.figures = {{"placing_ms", placing_ms}, {"still_ms", least_time_ms(live, runs)}};
     chart.points.push_back(std::move(point));
   }
 }

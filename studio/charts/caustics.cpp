@@ -1,9 +1,6 @@
 // Caustics by so many photons.
 #include "studio/charts/caustics.h"
 
-#include <algorithm>
-#include <chrono>
-#include <functional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,26 +11,15 @@
 #include "render/made_shapes.h"
 #include "render/paper_scenes.h"
 #include "render/reference.h"
+#include "studio/charts/least_time.h"
 #include "studio/charts/matte_shot.h"
 #include "studio/paper_shot.h"
 
 namespace studio {
 namespace {
 
-double time_ms(const std::function<void()>& work, int runs) {
-  double least = 0;
-  for (int i = 0; i < runs; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - start;
-    least = i == 0 ? taken.count() : std::min(least, taken.count());
-  }
-  return least;
-}
-
 // The sun is larger than it is, or paths would hardly ever find it behind the glass.
-constexpr float sun_radius_rad = 0.06F;
+constexpr float sun_radius_rad = 0.1F;
 
 render::PaperScene ball_over_floor() {
   render::PaperScene made;
@@ -67,7 +53,7 @@ void add_caustics(bool quick, Chart& chart) {
   shot.job.effort.caustic_photons = 1;  // the reference then bends all light
   const Truth truth = truth_of(shot.plate, [&](std::uint32_t seed) {
     return render::render_reference(shot.inputs(), shot.job, shot.plate,
-                                    {.samples = quick ? 128 : 4096, .seed = seed});
+                                    {.samples = quick ? 1024 : 4096, .seed = seed});
   });
   for (const int count : counts) {
     shot.job.effort.caustic_photons = count;
@@ -75,11 +61,15 @@ void add_caustics(bool quick, Chart& chart) {
     render::FrameResult result;
     const auto frame = [&] { render_frame(inputs, shot.job, shot.half_plate, result); };
     ChartPoint point;
-    point.time_ms = time_ms(frame, runs);
+    point.time_ms = least_time_ms(frame, runs);
     const render::PictureError error = error_of(capture::to_float(result.rgba), truth);
-    const double finding_ms = time_ms(
+    const double finding_ms = least_time_ms(
         [&] {
-          if (count > 0) render::Caustics(*shot.scene, shot.job.lights, {.photons = count});
+          if (count == 0) return;
+          const render::Caustics caustics(
+              std::make_shared<render::Photons>(*shot.scene, shot.job.lights,
+                                                render::PhotonSettings{.photons = count}),
+              {});
         },
         runs);
     render::KeptTransport kept;
@@ -97,7 +87,7 @@ void add_caustics(bool quick, Chart& chart) {
     point.label = fmt::format("{}{}", count, point.by_default ? ": default, straight on" : "");
     point.error = error.relative_rms;
     point.error_p99 = error.p99;
-    point.figures = {{"finding_ms", finding_ms}, {"still_ms", time_ms(live, runs)}};
+    point.figures = {{"finding_ms", finding_ms}, {"still_ms", least_time_ms(live, runs)}};
     chart.points.push_back(std::move(point));
   }
 }

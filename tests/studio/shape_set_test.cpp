@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <future>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -78,21 +79,26 @@ class ShapeSetTest : public MadeShowTest {
   }
 };
 
-// In the place of the models' reader, one that waits until it may go on; the first so many do not.
+// In the place of the models' reader, one that waits until it may go on: each time, or after so
+// many once.
 class Gate {
  public:
-  explicit Gate(const std::filesystem::path& dir, int first_passes = 0) : open_(dir / "open") {
+  explicit Gate(const std::filesystem::path& dir, std::optional<int> once_after = std::nullopt)
+      : open_(dir / "open") {
     const std::filesystem::path helpers = dir / "helpers";
     std::filesystem::create_directory(helpers);
     std::filesystem::create_symlink(capture::helper_path("platelight-decode"),
                                     helpers / "platelight-decode");
-    std::ofstream script(helpers / "platelight-model");
     const std::string reader = "exec " + capture::helper_path("platelight-model") + " \"$@\"\n";
+    std::ofstream script(helpers / "platelight-model");
     script << "#!/bin/sh\n";
-    for (int pass = 0; pass < first_passes; ++pass) {
-      script << "mkdir " << (dir / ("pass_" + std::to_string(pass))).string() << " 2>&- && "
-             << reader;
+    const auto first_to_make = [&](int n) {
+      return "mkdir " + (dir / ("call_" + std::to_string(n))).string() + " 2>&-";
+    };
+    for (int n = 0; n < once_after.value_or(0); ++n) {
+      script << first_to_make(n) << " && " << reader;
     }
+    if (once_after) script << first_to_make(*once_after) << " || " << reader;
     script << "while [ ! -e " << open_.string() << " ]; do sleep 0.01; done\n" << reader;
     script.close();
     std::filesystem::permissions(helpers / "platelight-model", std::filesystem::perms::owner_all);
@@ -245,7 +251,7 @@ TEST_F(ShapeSetTest, WaitsForNoShapeLiveAndTellsOnceThatTheyAreLate) {
 // However often it changes.
 TEST_F(ShapeSetTest, WaitsForNoFileOfTheSetsBefore) {
   if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";
-  const Gate gate(dir_, 1);
+  const Gate gate(dir_, 2);  // the cube, the first shape; then the second is read ahead
   FrameMaker maker(flag_set(""), std::nullopt, true);
   ASSERT_TRUE(maker.make(0));
   std::future<void> changes = std::async(std::launch::async, [&] {
@@ -254,7 +260,7 @@ TEST_F(ShapeSetTest, WaitsForNoFileOfTheSetsBefore) {
       EXPECT_TRUE(maker.make(n));
     }
   });
-  EXPECT_EQ(changes.wait_for(60s), std::future_status::ready);
+  EXPECT_EQ(changes.wait_for(10s), std::future_status::ready);
   gate.open();
   changes.get();
 }
