@@ -90,7 +90,7 @@ Scene::Bounds clear_bounds(const Scene& scene,
   return bounds;
 }
 
-// The grid, but for its step: `step_m` and the counts are of the whole box.
+// The grid, but for its steps.
 Grid grid_over(const Scene::Bounds& box, Vec3f to_light) {
   Grid grid;
   grid.to_light = to_light;
@@ -101,13 +101,12 @@ Grid grid_over(const Scene::Bounds& box, Vec3f to_light) {
     return half.x * std::abs(along.x) + half.y * std::abs(along.y) + half.z * std::abs(along.z);
   };
   const float wide = reach(grid.a), high = reach(grid.b);
-  grid.corner = middle + to_light * (reach(to_light) * 1.01F) - grid.a * wide - grid.b * high;
-  grid.columns = grid.rows = 1;
-  grid.step_m = 0;
+  const float before = reach(to_light) * 1.01F + (wide + high) * 1e-3F;
+  grid.corner = middle + to_light * before - grid.a * wide - grid.b * high;
   return grid;
 }
 
-// Traces the photons of one grid, some rows at a time.
+// Traces some photons of one grid.
 class PhotonTracer {
  public:
   PhotonTracer(const Scene& scene, const PhotonSettings& settings, const Grid& grid)
@@ -450,9 +449,13 @@ Photons::Photons(const Scene& scene, const LightTable& planned, const PhotonSett
 }
 
 bool Photons::pass(const std::vector<Scene::Bounds>& boxes) const {
-  if (!knows_all_ways_ && !boxes.empty()) return true;
+  if (boxes.empty()) return false;
+  if (!knows_all_ways_) return true;
+  Scene::Bounds all = no_bounds;
+  for (const Scene::Bounds& box : boxes) all = joined(all, box);
   return std::ranges::any_of(ways_, [&](const Way& way) {
-    return std::ranges::any_of(boxes, [&](const Scene::Bounds& box) { return meets(box, way); });
+    return meets(all, way) &&
+           std::ranges::any_of(boxes, [&](const Scene::Bounds& box) { return meets(box, way); });
   });
 }
 

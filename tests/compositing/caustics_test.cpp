@@ -202,9 +202,9 @@ TEST(Caustics, AreSeenThroughTheGlass) {
 TEST(Caustics, StayFiniteWhateverTheGlassAndTheLight) {
   for (const float index : {1.0F, 1.0001F, 3.0F, 4.0F}) {
     for (const float absorption : {0.0F, 1e6F}) {
-      BallShot ball(48, {.index = index, .absorption = {absorption, 0, absorption}, .abbe = 10});
+      BallShot ball(24, {.index = index, .absorption = {absorption, 0, absorption}, .abbe = 10});
       ball.shot.job.effort.caustic_photons = 2000;
-      for (const float gain : {0.0F, 1.0F, 1e6F}) {
+      for (const float gain : {0.0F, 1e6F}) {
         for (auto& light : ball.shot.job.lights.lights) light.irradiance = light.planned * gain;
         const auto result = ball.show();
         for (const capture::Half pixel : result.rgba.pixels) {
