@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "render/bounced_light.h"
-#include "render/kept_transport.h"
 #include "render/paper_scenes.h"
 #include "render/reference.h"
 #include "studio/charts/least_time.h"
@@ -35,28 +34,14 @@ void add_bounce_lamps(bool quick, Chart& chart) {
     const std::vector<render::LocalLight> lamps = bounced.lamps(table);
     shot.job.lights = table;
     shot.job.lights.lamps.insert(shot.job.lights.lamps.end(), lamps.begin(), lamps.end());
-    render::FrameInputs inputs = shot.inputs();
-    render::FrameResult result;
-    const auto frame = [&] { render_frame(inputs, shot.job, shot.half_plate, result); };
-    ChartPoint point;
-    point.time_ms = placing_ms + least_time_ms(frame, runs);
-    const render::PictureError error = error_of(capture::to_float(result.rgba), truth);
-    render::KeptTransport kept;
-    inputs.kept = &kept;
-    frame();
-    // Light that lives: cells are lit anew, not shown again.
-    const auto live = [&] {
-      for (auto& light : shot.job.lights.lights) light.irradiance *= 1.0001F;
-      frame();
-    };
+    ChartPoint point = measured_point(shot, truth, runs);
+    point.time_ms += placing_ms;
+    point.figures.emplace_back("placing_ms", placing_ms);
     point.scene = "grey TV room with light between surfaces, against the reference with all of it";
     point.method = "lamps of bounced light";
     point.settings = {{"bounce_lamps", static_cast<double>(count)}};
     point.by_default = count == render::Effort{}.bounce_lamps;
     point.label = fmt::format("{}{}", count, point.by_default ? ": default" : "");
-    point.error = error.relative_rms;
-    point.error_p99 = error.p99;
-    point.figures = {{"placing_ms", placing_ms}, {"still_ms", least_time_ms(live, runs)}};
     chart.points.push_back(std::move(point));
   }
 }

@@ -7,7 +7,6 @@
 
 #include "render/caustics.h"
 #include "render/glass.h"
-#include "render/kept_transport.h"
 #include "render/made_shapes.h"
 #include "render/paper_scenes.h"
 #include "render/reference.h"
@@ -57,12 +56,7 @@ void add_caustics(bool quick, Chart& chart) {
   });
   for (const int count : counts) {
     shot.job.effort.caustic_photons = count;
-    render::FrameInputs inputs = shot.inputs();
-    render::FrameResult result;
-    const auto frame = [&] { render_frame(inputs, shot.job, shot.half_plate, result); };
-    ChartPoint point;
-    point.time_ms = least_time_ms(frame, runs);
-    const render::PictureError error = error_of(capture::to_float(result.rgba), truth);
+    ChartPoint point = measured_point(shot, truth, runs);
     const double finding_ms = least_time_ms(
         [&] {
           if (count == 0) return;
@@ -72,22 +66,12 @@ void add_caustics(bool quick, Chart& chart) {
               {});
         },
         runs);
-    render::KeptTransport kept;
-    inputs.kept = &kept;
-    frame();
-    // Light that lives: cells are lit anew, not shown again.
-    const auto live = [&] {
-      for (auto& light : shot.job.lights.lights) light.irradiance *= 1.0001F;
-      frame();
-    };
+    point.figures.emplace_back("finding_ms", finding_ms);
     point.scene = "glass ball over a grey floor, against the reference that bends all light";
     point.method = "photons through glass";
     point.settings = {{"caustic_photons", static_cast<double>(count)}};
     point.by_default = count == render::Effort{}.caustic_photons;
     point.label = fmt::format("{}{}", count, point.by_default ? ": default, straight on" : "");
-    point.error = error.relative_rms;
-    point.error_p99 = error.p99;
-    point.figures = {{"finding_ms", finding_ms}, {"still_ms", least_time_ms(live, runs)}};
     chart.points.push_back(std::move(point));
   }
 }

@@ -5,6 +5,7 @@
 
 #include "render/sampled_light.h"
 #include "render/standard.h"
+#include "studio/charts/least_time.h"
 
 namespace studio {
 
@@ -15,6 +16,27 @@ BenchLight light_of(const render::Environment& sky, const render::LightTableSett
 
 render::PictureError error_of(const capture::Image& picture, const Truth& truth) {
   return render::picture_error(picture, truth.references, truth.mask);
+}
+
+ChartPoint measured_point(BenchScene& shot, const Truth& truth, int runs) {
+  render::FrameInputs inputs = shot.inputs();
+  render::FrameResult result;
+  const auto frame = [&] { render_frame(inputs, shot.job, shot.half_plate, result); };
+  ChartPoint point;
+  point.time_ms = least_time_ms(frame, runs);
+  const render::PictureError error = error_of(capture::to_float(result.rgba), truth);
+  point.error = error.relative_rms;
+  point.error_p99 = error.p99;
+  render::KeptTransport kept;
+  inputs.kept = &kept;
+  frame();
+  // Light that lives: cells are lit anew, not shown again.
+  const auto live = [&] {
+    for (auto& light : shot.job.lights.lights) light.irradiance *= 1.0001F;
+    frame();
+  };
+  point.figures = {{"still_ms", least_time_ms(live, runs)}};
+  return point;
 }
 
 render::Material make_grey_material(const std::string& name) {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "studio/bench_scene.h"
+#include "studio/chart.h"
 #include "studio/picture_error.h"
 
 namespace studio {
@@ -25,6 +26,10 @@ inline constexpr int default_lights = render::Effort{}.light_samples;
 BenchLight light_of(const render::Environment& sky, const render::LightTableSettings& settings);
 
 render::PictureError error_of(const capture::Image& picture, const Truth& truth);
+
+// A point of a frame: the time of one that keeps nothing and its error, and as the figure still_ms
+// the time of one that keeps all of it while the light lives. Changes the shot's light a little.
+ChartPoint measured_point(BenchScene& shot, const Truth& truth, int runs);
 
 // Lambert's.
 inline constexpr float grey_albedo = 0.5F;
