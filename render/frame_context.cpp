@@ -77,6 +77,7 @@ std::uint64_t transport_key(const FrameContext& context) {
   key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
   key.mix(e.max_rays);
   key.mix(std::uint64_t{e.dark_cuts});
+  key.mix(e.caustic_photons);
   if (context.caustics) {
     for (const std::uint32_t light : context.caustics->photons().lights()) {
       key.mix(std::uint64_t{2} * light + (context.caustics->photons().follows(light) ? 1U : 0U));

@@ -107,12 +107,12 @@ TEST(Caustics, AreInTheVeryFrameInWhichAnythingMoves) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> step(-0.1F, 0.1F);
   capture::HalfImage before;
-  for (int frame = 0; frame < 12; ++frame) {
+  for (int frame = 0; frame < 15; ++frame) {
     const auto warm = ball.show(&kept);
     EXPECT_EQ(warm.rgba.pixels, ball.show().rgba.pixels) << frame;
     EXPECT_NE(warm.rgba.pixels, before.pixels) << frame;
     before = warm.rgba;
-    switch (frame % 4) {
+    switch (frame % 5) {
       case 0:
         ball.move(1, frame % 3, step(random));
         break;
@@ -121,6 +121,9 @@ TEST(Caustics, AreInTheVeryFrameInWhichAnythingMoves) {
         break;
       case 2:
         ball.shot.job.lights.lights[0].irradiance *= 1.5F;
+        break;
+      case 3:
+        ball.shot.job.effort.caustic_photons += 500;
         break;
       default:
         ball.shot.job.cam_from_set.t.x += 0.05;
