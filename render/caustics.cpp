@@ -34,6 +34,10 @@ constexpr float spread_in_grid = 0.7F;
 constexpr float spread_in_pixel = 0.4F;
 // Irradiance of a spot, of its light's, that is not worth noting. Some twelve of them overlap.
 constexpr float dimmest = 2e-4F;
+// How far off the surface a spot still lights, of its smaller radius: of what curves, all but a
+// rim.
+constexpr float thickness = 0.1F;
+constexpr std::size_t most_known_ways = std::size_t{1} << 21;
 // Surfaces that face so far away from the one that a photon fell on are others.
 constexpr float same_way = 0.5F;
 constexpr float flattest = 0.05F;  // cosine, of what spreads over a surface
@@ -101,7 +105,9 @@ Grid grid_over(const Scene::Bounds& box, Vec3f to_light) {
     return half.x * std::abs(along.x) + half.y * std::abs(along.y) + half.z * std::abs(along.z);
   };
   const float wide = reach(grid.a), high = reach(grid.b);
-  const float before = reach(to_light) * 1.01F + (wide + high) * 1e-3F;
+  const Vec3f far = middle + half;
+  const float rounding = std::max({std::abs(far.x), std::abs(far.y), std::abs(far.z)}) * 1e-5F;
+  const float before = reach(to_light) * 1.01F + (wide + high) * 1e-3F + rounding;
   grid.corner = middle + to_light * before - grid.a * wide - grid.b * high;
   return grid;
 }
@@ -137,6 +143,7 @@ class PhotonTracer {
 
   std::vector<Photons::Landing> landings;
   std::vector<Photons::Way> ways;
+  std::size_t rays = 0;
   bool knows_all_ways = true;
 
  private:
@@ -261,6 +268,7 @@ class PhotonTracer {
 
   void note(Vec3f from, Vec3f direction, float far_m) {
     ++rays_of_photon_;
+    ++rays;
     if (ways.size() < most_ways) {
       ways.push_back({from, direction, far_m});
     } else {
@@ -313,11 +321,11 @@ std::optional<Caustics::Spot> spot_of(const Photons::Landing& landing, const Cau
   const float ra = std::sqrt(8 * wide), rb = std::sqrt(8 * narrow);
   Caustics::Spot spot;
   spot.peak = landing.share * (3 / (pi * ra * rb));
-  if (!(largest(spot.peak) > dimmest) || !std::isfinite(largest(spot.peak))) return std::nullopt;
+  if (!(largest(spot.peak) > dimmest) || !is_finite(spot.peak)) return std::nullopt;
   spot.centre = landing.position;
   spot.normal = normal;
   spot.across = a * (1 / ra), spot.along = b * (1 / rb);
-  spot.thickness_m = std::max(rb, 10 * least);
+  spot.thickness_m = std::max(thickness * rb, 10 * least);
   const auto reach = [&](float ax, float bx, float nx) {
     return calibrate::hypotenuse(ra * ax, rb * bx) + spot.thickness_m * std::abs(nx);
   };
@@ -347,28 +355,29 @@ bool meets(const Scene::Bounds& box, const Photons::Way& way) {
          cut(box.lower.z, box.upper.z, way.from.z, way.direction.z);
 }
 
-// The brightest lights that have some share of all.
-std::vector<std::uint32_t> brightest(const LightTable& table) {
+// The brightest lights that have some share of all, at most so many.
+std::vector<std::uint32_t> brightest(const LightTable& table, std::size_t most) {
   float total = 0;
   std::vector<std::uint32_t> numbers;
-  for (const DirectionalLight& light : table.lights) total += sum(light.irradiance);
+  for (const DirectionalLight& light : table.lights) total += std::max(sum(light.irradiance), 0.0F);
   for (std::uint32_t i = 0; i < table.lights.size(); ++i) {
     if (sum(table.lights[i].irradiance) > least_caustic_share * total) numbers.push_back(i);
   }
   std::ranges::stable_sort(numbers, std::greater{},
                            [&](std::uint32_t i) { return sum(table.lights[i].irradiance); });
-  if (numbers.size() > most_caustic_lights) numbers.resize(most_caustic_lights);
+  if (numbers.size() > most) numbers.resize(most);
   std::ranges::sort(numbers);
   return numbers;
 }
 
 // The grids of all lights over all bodies, each as fine as its light counts. Adds to the ways where
-// the bodies are.
+// the bodies are; `whole`: all of them are somewhere.
 std::vector<Grid> find_grids(const Scene& scene,
                              const LightTable& table,
                              const std::vector<std::uint32_t>& lights,
                              int photons,
-                             std::vector<Photons::Way>& ways) {
+                             std::vector<Photons::Way>& ways,
+                             bool& whole) {
   const SceneDescription& description = scene.description();
   std::vector<Grid> grids;
   std::vector<std::array<float, 2>> sizes;
@@ -379,9 +388,12 @@ std::vector<Grid> find_grids(const Scene& scene,
   for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
     const Instance& instance = description.instances[i];
     const Mesh& mesh = *description.meshes[instance.mesh];
-    if (instance.kind != ObjectKind::virtual_object || !has_glass(scene, mesh)) continue;
+    if (!has_glass(scene, mesh)) continue;
     const Scene::Bounds box = clear_bounds(scene, mesh, instance.set_from_object);
-    if (!(box.lower.x <= box.upper.x)) continue;
+    if (!(box.lower.x <= box.upper.x)) {
+      whole = false;
+      continue;
+    }
     ways.push_back({(box.lower + box.upper) * 0.5F, {}, 0});  // the body is in its own way
     for (std::size_t n = 0; n < lights.size(); ++n) {
       const DirectionalLight& light = table.lights[lights[n]];
@@ -391,7 +403,7 @@ std::vector<Grid> find_grids(const Scene& scene,
       grid.rim_rad = light.spread;
       const Vec3f diagonal = ((box.lower + box.upper) * 0.5F - grid.corner) * 2.0F;
       const float wide = dot(diagonal, grid.a), high = dot(diagonal, grid.b);
-      if (!(wide > 0) || !(high > 0) || !std::isfinite(wide * high)) continue;
+      if (!(std::max(wide, high) > 0) || !std::isfinite(wide * high)) continue;
       sizes.push_back({wide, high});
       grids.push_back(grid);
       total += light_of(grid) * wide * high;
@@ -400,27 +412,34 @@ std::vector<Grid> find_grids(const Scene& scene,
   for (std::size_t i = 0; i < grids.size(); ++i) {
     Grid& grid = grids[i];
     const auto [wide, high] = sizes[i];
-    const float count = static_cast<float>(photons) * light_of(grid) * wide * high / total;
-    if (!(count > 1)) {
-      grid.columns = grid.rows = 0;
-      continue;
-    }
+    // Each body has one at least of each light, or would be opaque to it.
+    const float share = light_of(grid) * wide * high / total;
+    const float all = static_cast<float>(photons);
+    const float count = std::clamp(share >= 0 ? share * all : 1.0F, 1.0F, all);
     // Whole steps: the last ones may reach past the box. Of a box that is hardly high, one row.
     grid.step_m = std::max(std::sqrt(wide * high / count), std::max(wide, high) / count);
-    grid.columns = static_cast<int>(std::ceil(wide / grid.step_m));
-    grid.rows = static_cast<int>(std::ceil(high / grid.step_m));
+    grid.columns = std::max(static_cast<int>(std::ceil(wide / grid.step_m)), 1);
+    grid.rows = std::max(static_cast<int>(std::ceil(high / grid.step_m)), 1);
     grid.corner -= grid.a * (0.5F * (static_cast<float>(grid.columns) * grid.step_m - wide)) +
                    grid.b * (0.5F * (static_cast<float>(grid.rows) * grid.step_m - high));
   }
-  std::erase_if(grids, [](const Grid& grid) { return grid.columns == 0; });
   return grids;
 }
 
 }  // namespace
 
 Photons::Photons(const Scene& scene, const LightTable& planned, const PhotonSettings& settings) {
-  lights_ = brightest(planned);
-  const std::vector<Grid> grids = find_grids(scene, planned, lights_, settings.photons, ways_);
+  // No more lights than photons can tell apart on every body.
+  const auto& instances = scene.description().instances;
+  const auto bodies =
+      static_cast<std::size_t>(std::ranges::count_if(instances, [&](const Instance& instance) {
+        return has_glass(scene, *scene.description().meshes[instance.mesh]);
+      }));
+  const std::size_t each =
+      static_cast<std::size_t>(std::max(settings.photons, 0)) / std::max<std::size_t>(bodies, 1);
+  lights_ = brightest(planned, std::min(most_caustic_lights, each));
+  const std::vector<Grid> grids =
+      find_grids(scene, planned, lights_, settings.photons, ways_, knows_all_ways_);
   // A light that no photon is left for goes straight through.
   const auto has_grid = [&](std::size_t n) {
     return std::ranges::any_of(grids, [&](const Grid& grid) { return grid.number == n; });
@@ -442,8 +461,10 @@ Photons::Photons(const Scene& scene, const LightTable& planned, const PhotonSett
     std::vector<Landing>& all = landings_[grid.number];
     for (const PhotonTracer& part : parts) {
       all.insert(all.end(), part.landings.begin(), part.landings.end());
-      ways_.insert(ways_.end(), part.ways.begin(), part.ways.end());
-      knows_all_ways_ = knows_all_ways_ && part.knows_all_ways;
+      rays_ += part.rays;
+      knows_all_ways_ = knows_all_ways_ && part.knows_all_ways &&
+                        ways_.size() + part.ways.size() <= most_known_ways;
+      if (knows_all_ways_) ways_.insert(ways_.end(), part.ways.begin(), part.ways.end());
     }
   }
 }
@@ -581,10 +602,12 @@ std::shared_ptr<const Caustics> CausticFollower::follow(const Scene& scene,
     plan_->places = scene.places();
     return caustics_;
   }
+  // Whatever throws leaves what was.
+  const auto photons = stay ? photons_ : std::make_shared<const Photons>(scene, planned, settings);
+  caustics_ = std::make_shared<const Caustics>(photons, view);
+  photons_ = photons;
   plan_ = Plan{scene.places(), planned.lights, settings};
   view_ = view;
-  if (!stay) photons_ = std::make_shared<const Photons>(scene, planned, settings);
-  caustics_ = std::make_shared<const Caustics>(photons_, view);
   return caustics_;
 }
 

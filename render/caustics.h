@@ -50,7 +50,7 @@ class Photons {
   }
   // Whether anything in those boxes may be in a photon's way, or is one of the bodies.
   bool pass(const std::vector<Scene::Bounds>& boxes) const;
-  std::size_t rays() const { return ways_.size(); }
+  std::size_t rays() const { return rays_; }
 
   // A photon that has fallen on a surface.
   struct Landing {
@@ -73,6 +73,7 @@ class Photons {
   std::vector<std::vector<Landing>> landings_;
   std::vector<Way> ways_;
   bool knows_all_ways_ = true;
+  std::size_t rays_ = 0;
 };
 
 // The irradiance that photons make anywhere, per unit of each light's own, so that it follows live

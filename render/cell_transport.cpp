@@ -144,11 +144,8 @@ void light_shadow_points(const CellTransport& cell, const FrameLight& light, Rel
     w.open_at_points.push_back(open);
   }
   for (const CellTransport::BentCaustic& c : cell.bent_caustics) {
-    const Vec3f open = w.open_at_points[c.point];
-    const Vec3f gathered = c.factor * light.lamps[c.lamp].intensity;
-    if (!(open.x > 0 && open.y > 0 && open.z > 0)) continue;
     w.passing_at_points[c.point] +=
-        Vec3f{gathered.x / open.x, gathered.y / open.y, gathered.z / open.z};
+        brightening(w.open_at_points[c.point], c.factor * light.lamps[c.lamp].intensity);
   }
 }
 

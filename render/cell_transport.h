@@ -166,6 +166,15 @@ inline Vec3f passing(Vec3f open, Vec3f lost) {
   return {share(open.x, lost.x), share(open.y, lost.y), share(open.z, lost.z)};
 }
 
+// By how much of the light that is there other light brightens a place. Nothing where next to none
+// is: that is no measure.
+inline Vec3f brightening(Vec3f open, Vec3f gathered) {
+  const auto share = [](float all, float more) {
+    return all > 0 && more < 1e4F * all ? more / all : 0.0F;
+  };
+  return {share(open.x, gathered.x), share(open.y, gathered.y), share(open.z, gathered.z)};
+}
+
 // A picture's value at a place in its pixels, bilinear; the outermost go on beyond its edge.
 Vec3f plate_at(const capture::Image& level, float x, float y);
 

@@ -164,7 +164,7 @@ void add_cell_caustic(const LightContext& context,
     if (!(most > 0)) continue;
     any = true;
     factors.at[k] = most;
-    const Vec3f lost = Vec3f{1, 1, 1} - got * (1 / most);
+    const Vec3f lost = Vec3f{1, 1, 1} - got / most;
     if (lost != Vec3f{}) cell.tints.push_back({place, static_cast<std::uint16_t>(k), lost});
   }
   if (!any) return;
@@ -295,7 +295,7 @@ void gather_points(const LightContext& context,
           continue;
         }
       }
-      add_ray(w, r, k, i, l, r.mask[k] | context.mask_to(i));
+      add_ray(w, r, k, i, l, r.mask[k] | (r.takes_caustics[k] ? context.mask_to(i) : 0U));
       if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }
   }

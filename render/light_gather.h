@@ -30,6 +30,8 @@ struct Receivers {
   std::array<std::uint32_t, cell_pixels> mask;     // what blocks: mask_virtual, mask_real_blocker
   std::array<std::uint8_t, cell_pixels>
       real_first;  // light that real things block does not count as open
+  // Whether caustics light it: then light does not go straight through clear bodies to it.
+  std::array<std::uint8_t, cell_pixels> takes_caustics;
   // Of the pixel: weak points test fewer lights, those of 0 only the compact ones.
   std::array<float, cell_pixels> share;
   std::array<std::uint64_t, 4> active;       // bit y % 4 * 16 + x of word y / 4

@@ -140,11 +140,7 @@ class Composite {
       if (s.parameters.catches_shadow != 0)
         share = {passing(s.lost.x(), s.open.x()), passing(s.lost.y(), s.open.y()),
                  passing(s.lost.z(), s.open.z())};
-      if (s.bent || s.parameters.catches_light != 0) {
-        const Vec3f gathered = s.gathered.over(1), open = s.open.over(1);
-        if (open.x > 0 && open.y > 0 && open.z > 0)
-          share += {gathered.x / open.x, gathered.y / open.y, gathered.z / open.z};
-      }
+      share += brightening(s.open.over(1), s.gathered.over(1));
       if (s.bent) {
         rgb += times(s.plate.over(n), share);
         continue;
@@ -203,7 +199,7 @@ class Composite {
     const Vec3f weight = bent ? times(path.through, *bent) : path.through;
     if (bent) sums->plate.add(weight);
     sample_irradiance(path, weight, numbers, *sums);
-    if (tracer_.rules().caustics) {
+    if (takes_caustics(*sums)) {
       sums->gathered.add(
           times(weight, tracer_.bent_irradiance(path.hit, path.hit.normal, numbers)));
     }
@@ -214,6 +210,10 @@ class Composite {
     }
     if (sums->parameters.catches_reflection != 0 && sums->parameters.reflectance > 0)
       p.added.add(times(path.through, reflection(path, sums->parameters, numbers)));
+  }
+
+  bool takes_caustics(const StandInSums& sums) const {
+    return tracer_.rules().caustics && (sums.bent || sums.parameters.catches_light != 0);
   }
 
   void sample_irradiance(const CameraPath& path,
@@ -232,9 +232,9 @@ class Composite {
         transmittance(scene, origin, sky->direction, 0, ray_far, mask_real_blocker) == Vec3f{};
     if (real_shadow) return;
     const Vec3f open = sky->radiance * (cosine / sky->density);
-    const bool caustics = tracer_.rules().caustics;
-    const Vec3f passed = transmittance(scene, origin, sky->direction, 0, ray_far,
-                                       caustics ? mask_virtual | ray_glass_blocks : mask_virtual);
+    const Vec3f passed =
+        transmittance(scene, origin, sky->direction, 0, ray_far,
+                      takes_caustics(sums) ? mask_virtual | ray_glass_blocks : mask_virtual);
     sums.irradiance.add(open);
     sums.open.add(times(weight, open));
     sums.lost.add(times(weight, times(open, Vec3f{1, 1, 1} - passed)));

@@ -219,6 +219,27 @@ TEST(Caustics, StayFiniteWhateverTheGlassAndTheLight) {
   }
 }
 
+// A stand-in that takes no light is as it would be without photons.
+TEST(Caustics, LeaveShadowsAloneThatTakeNoLight) {
+  BallShot ball(48);
+  render::SceneDescription scene = ball.shot.scene->description();
+  scene.materials[0] = make_stand_in_material("floor", {.catches_light = 0});
+  scene.instances.pop_back();  // the box
+  ball.shot.scene = std::make_unique<render::Scene>(std::move(scene));
+  const capture::Image without = capture::to_float(ball.show().rgba);
+  ball.shot.job.effort.caustic_photons = 2000;
+  const capture::Image with = capture::to_float(ball.show().rgba);
+  std::size_t floor = 0;
+  for (int y = 0; y < with.height; ++y) {
+    for (int x = 0; x < with.width; ++x) {
+      if (with.at(y, x, 3) > 0) continue;
+      ++floor;
+      EXPECT_EQ(with.at(y, x, 1), without.at(y, x, 1)) << x << ", " << y;
+    }
+  }
+  EXPECT_GT(floor, 500U);
+}
+
 TEST(Caustics, RefuseMorePhotonsThanThereMayBe) {
   BallShot ball(32);
   for (const int photons : {-1, render::most_caustic_photons + 1}) {

@@ -223,6 +223,41 @@ TEST(Caustics, AreFoundAnewOnlyWhereTheyMayChange) {
   EXPECT_EQ(follow(above, 0), nullptr);
 }
 
+// Glass that has few photons beside glass that has all lets light through; what lies under a board
+// gets none.
+TEST(Caustics, LeaveNoBodyWithoutPhotonsAndNoLightUnderABoard) {
+  SceneDescription description =
+      over_floor(make_box({-10, -10, 0}, {10, 10, 0.1F}), {.index = 1.2F}, {0, 0, 2});
+  auto small = std::make_shared<Mesh>(*make_box({14, 0, 0.4F}, {14.1F, 0.1F, 0.41F}));
+  small->materials = {1};
+  description.meshes.push_back(small);
+  description.instances.push_back(description.instances.back());
+  description.instances.back().mesh = 2;
+  auto board = std::make_shared<Mesh>(*make_box({-1, -1, 0.05F}, {1, 1, 0.06F}));
+  description.meshes.push_back(board);
+  description.instances.emplace_back().mesh = 3;
+  const Scene scene(std::move(description));
+  // One photon spreads its light over twice the distance to the next.
+  EXPECT_GT(irradiance(find(scene, sun({0, 0, 1}), photons(500)), 14.05F, 0.05F), 0.2F);
+  const Caustics fine = find(scene, sun({0, 0, 1}), photons(200'000));
+  EXPECT_EQ(irradiance(fine, 0, 0), 0);
+  EXPECT_GT(fine.at(0, {0, 0, 0.06F}, {0, 0, 1}).x, 0.9F);
+}
+
+// Jobs come by wire: their lights may be any finite numbers.
+TEST(Caustics, TakeLightsOfAnyFiniteNumbers) {
+  const Scene scene(over_floor(make_sphere(1, 16), {}, {0, 0, 1.3F}));
+  for (const Vec3f other : {Vec3f{-100, -1, -1}, Vec3f{1e37F, 1e37F, 1e37F}, Vec3f{0, 0, 0}}) {
+    LightTable table = sun({0, 0, 1});
+    table.lights.push_back({{0, 1, 0}, other, 0.1F});
+    table.lights.push_back({{0, 0.6F, 0.8F}, {1.9F, 0, 0}, 0.1F});
+    table.lights.push_back({{0, -0.6F, 0.8F}, {-1.9F, 0, 0}, 0.1F});
+    const Photons found(scene, table, photons(1000));
+    EXPECT_FALSE(found.follows(3));
+    EXPECT_LT(found.rays(), 200'000U);
+  }
+}
+
 // A pane that is seen on edge, bodies in bodies: neither takes photons, or rays, without end.
 TEST(Caustics, TakeNoMoreRaysThanTheyMay) {
   SceneDescription nested = over_floor(make_sphere(1, 24), {.index = 4}, {0, 0, 6});
