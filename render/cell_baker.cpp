@@ -304,8 +304,6 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   const bool real = instance.kind == ObjectKind::stand_in;
   r.mask[k] = real ? mask_virtual : mask_virtual | mask_real_blocker;
   r.real_first[k] = real;
-  r.takes_caustics[k] =
-      p.diffuse != Vec3f{} || p.catches_lamps || (p.kind == RayKind::bent && p.catches_shadow);
   r.surface[k] = p.hit.instance * 4096 + p.hit.material;
   // Further samples of an edge pixel share its weight.
   const float further_share = 1 / static_cast<float>(effort_.aa_samples);
@@ -324,7 +322,6 @@ void CellBaker::receive(int count, bool grid) {
   r.by_lamps = r.by_caustics = {};
   r.count = 0;
   r.real_first.fill(0);
-  r.takes_caustics.fill(0);
   tested_.clear();
   std::array<std::uint16_t, stream_rays> place;     // of points among receivers
   std::array<std::uint16_t, stream_rays> point_at;  // and back
@@ -354,7 +351,8 @@ void CellBaker::receive(int count, bool grid) {
     r.active[k / 64] |= std::uint64_t{1} << (k % 64);
     if (p.diffuse != Vec3f{} || p.catches_lamps || glossy[i] > 1) {
       r.by_lamps[k / 64] |= std::uint64_t{1} << (k % 64);
-    } else if (p.kind == RayKind::bent && p.catches_shadow && frame_->caustics) {
+    }
+    if (p.diffuse != Vec3f{} || p.catches_lamps || (p.kind == RayKind::bent && p.catches_shadow)) {
       r.by_caustics[k / 64] |= std::uint64_t{1} << (k % 64);
     }
   }

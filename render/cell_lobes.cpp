@@ -6,6 +6,7 @@
 #include "render/cell_baker.h"
 #include "render/standard.h"
 #include "render/trace.h"
+#include "render/transform.h"
 
 namespace render {
 namespace {
@@ -32,10 +33,7 @@ Vec3f bounded(Vec3f turn) {
 // Unit vectors across a unit direction.
 struct Across {
   Vec3f a, b;
-  explicit Across(Vec3f direction)
-      : a(normalize(
-            cross(std::abs(direction.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}, direction))),
-        b(cross(direction, a)) {}
+  explicit Across(Vec3f direction) : a(unit_across(direction)), b(cross(direction, a)) {}
 };
 
 // A cone about a direction as wide as that, but round.

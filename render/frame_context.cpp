@@ -80,7 +80,7 @@ std::uint64_t transport_key(const FrameContext& context) {
   key.mix(e.caustic_photons);
   if (context.caustics) {
     for (const std::uint32_t light : context.caustics->photons().lights()) {
-      key.mix(std::uint64_t{2} * light + (context.caustics->photons().follows(light) ? 1U : 0U));
+      key.mix(std::uint64_t{light});
     }
   }
   return key.value();

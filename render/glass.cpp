@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "render/scene.h"
+#include "render/standard.h"
 
 namespace render {
 
@@ -103,6 +104,19 @@ Vec3f refracted(Vec3f incoming, Vec3f normal, float ratio) {
   const float sine2 = ratio * ratio * (1 - cosine * cosine);
   if (sine2 >= 1) return {};
   return normalize(incoming * ratio + normal * (ratio * cosine - std::sqrt(1 - sine2)));
+}
+
+Vec3f mirrored_off(const HitPoint& hit, Vec3f incoming) {
+  const Vec3f direction = normalize(mirrored(-incoming, hit.normal));
+  const float into = dot(direction, hit.geometric_normal);
+  return into < 0 ? direction - hit.geometric_normal * (2 * into) : direction;
+}
+
+Vec3f refracted_into(const HitPoint& hit, Vec3f incoming, float ratio) {
+  const Vec3f direction = refracted(incoming, hit.normal, ratio);
+  const float back = dot(direction, hit.geometric_normal);
+  if (direction == Vec3f{} || !(back > -1e-4F)) return direction;
+  return normalize(direction - hit.geometric_normal * (back + 1e-3F));  // it grazes the other side
 }
 
 std::array<float, 3> indices_of(const GlassParameters& parameters) {

@@ -16,6 +16,7 @@
 
 namespace render {
 
+struct HitPoint;
 class Scene;
 
 // Parameter block of the shader "glass".
@@ -78,6 +79,17 @@ float fresnel(float cosine, float ratio);
 // `incoming` (unit) refracted at a surface of unit normal `normal` that faces it. Zero beyond the
 // critical angle.
 Vec3f refracted(Vec3f incoming, Vec3f normal, float ratio);
+
+// The same two as rays leave a hit, `incoming` being unit: an interpolated normal never sends what
+// is mirrored through the triangle, nor what is refracted back from it. refracted_into() is zero
+// beyond the critical angle.
+Vec3f mirrored_off(const HitPoint& hit, Vec3f incoming);
+Vec3f refracted_into(const HitPoint& hit, Vec3f incoming, float ratio);
+
+// One colour of three.
+inline Vec3f only_colour(Vec3f v, std::size_t channel) {
+  return {channel == 0 ? v.x : 0.0F, channel == 1 ? v.y : 0.0F, channel == 2 ? v.z : 0.0F};
+}
 
 // The index at the wavelengths that stand for red, green, blue (611, 549, 464 nm, the primaries'
 // dominant ones), by Cauchy's equation through the index and Abbe's number.

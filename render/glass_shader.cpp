@@ -12,11 +12,6 @@
 namespace render {
 namespace {
 
-// One colour of three, or all.
-Vec3f only(Vec3f v, int channel) {
-  return {channel == 0 ? v.x : 0.0F, channel == 1 ? v.y : 0.0F, channel == 2 ? v.z : 0.0F};
-}
-
 class GlassShader final : public Shader {
  public:
   void check(const SceneDescription&, const Material& material) const override {
@@ -57,8 +52,8 @@ class GlassShader final : public Shader {
       split(p, crossing, crossing.ratio[0], p.throughput, rays);
       return;
     }
-    for (int c = 0; c < 3; ++c) {
-      split(p, crossing, crossing.ratio[static_cast<std::size_t>(c)], only(p.throughput, c), rays);
+    for (std::size_t c = 0; c < 3; ++c) {
+      split(p, crossing, crossing.ratio[c], only_colour(p.throughput, c), rays);
     }
   }
 
@@ -73,9 +68,7 @@ class GlassShader final : public Shader {
     const float share = fresnel(cosine, ratio);
     const RayKind kind = kind_after(p.kind);
     if (share > 0) {
-      Vec3f direction = normalize(mirrored(view, normal));
-      const float into = dot(direction, p.hit.geometric_normal);
-      if (into < 0) direction -= p.hit.geometric_normal * (2 * into);
+      const Vec3f direction = mirrored_off(p.hit, p.incoming);
       rays.push(p, {offset_origin(p.hit, direction),
                     direction,
                     throughput * share,
@@ -86,14 +79,8 @@ class GlassShader final : public Shader {
                     p.media});
     }
     if (!(share < 1)) return;
-    Vec3f direction = refracted(p.incoming, normal, ratio);
+    const Vec3f direction = refracted_into(p.hit, p.incoming, ratio);
     if (direction == Vec3f{}) return;
-    // An interpolated normal may leave the ray on this side of the triangle: let it graze the
-    // other.
-    const float back = dot(direction, p.hit.geometric_normal);
-    if (back > -1e-4F) {
-      direction = normalize(direction - p.hit.geometric_normal * (back + 1e-3F));
-    }
     rays.push(p, {offset_origin(p.hit, direction),
                   direction,
                   throughput * (1 - share),

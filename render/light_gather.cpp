@@ -156,7 +156,7 @@ void add_cell_caustic(const LightContext& context,
   const auto place = static_cast<std::uint16_t>(cell.numbers.size());
   bool any = false;
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (!(r.by_lamps[k / 64] >> (k % 64) & 1)) continue;
+    if (!in(r.by_caustics, k)) continue;
     const LampReceiver at = lamp_receiver(r, k);
     const Vec3f got =
         context.caustics->at(lamp - context.first_caustic, at.origin, at.geometric_normal);
@@ -295,7 +295,7 @@ void gather_points(const LightContext& context,
           continue;
         }
       }
-      add_ray(w, r, k, i, l, r.mask[k] | (r.takes_caustics[k] ? context.mask_to(i) : 0U));
+      add_ray(w, r, k, i, l, r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
       if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }
   }
@@ -366,10 +366,11 @@ void gather_point_lamps(const LightContext& context,
         {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), share * ray->per_intensity});
   };
   for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-    const bool by_lamps = (r.by_lamps[k / 64] >> (k % 64) & 1) != 0;
-    if (!by_lamps && !(r.by_caustics[k / 64] >> (k % 64) & 1)) continue;
+    const bool by_lamps = in(r.by_lamps, k), by_caustics = in(r.by_caustics, k);
+    if (!by_lamps && !by_caustics) continue;
     for (std::uint32_t i = 0; i < lamps.size(); ++i) {
-      if (lamps[i].intensity == Vec3f{} || (!by_lamps && !context.is_caustic(i))) continue;
+      if (lamps[i].intensity == Vec3f{}) continue;
+      if (!(context.is_caustic(i) ? by_caustics : by_lamps)) continue;
       if (context.is_caustic(i)) {
         const LampReceiver at = lamp_receiver(r, k);
         const Vec3f got =

@@ -30,18 +30,19 @@ struct Receivers {
   std::array<std::uint32_t, cell_pixels> mask;     // what blocks: mask_virtual, mask_real_blocker
   std::array<std::uint8_t, cell_pixels>
       real_first;  // light that real things block does not count as open
-  // Whether caustics light it: then light does not go straight through clear bodies to it.
-  std::array<std::uint8_t, cell_pixels> takes_caustics;
   // Of the pixel: weak points test fewer lights, those of 0 only the compact ones.
   std::array<float, cell_pixels> share;
-  std::array<std::uint64_t, 4> active;       // bit y % 4 * 16 + x of word y / 4
-  std::array<std::uint64_t, 4> by_lamps;     // of these, those that lamps matter to
-  std::array<std::uint64_t, 4> by_caustics;  // of the rest, those that only caustics do
-  int count = 0;                             // of entries, if not a grid
+  std::array<std::uint64_t, 4> active;    // bit y % 4 * 16 + x of word y / 4
+  std::array<std::uint64_t, 4> by_lamps;  // of these, those that lamps matter to
+  // Those that caustics light: to them light does not go straight through clear bodies.
+  std::array<std::uint64_t, 4> by_caustics;
+  int count = 0;  // of entries, if not a grid
 };
 
 // 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.
 using CellMask = std::array<std::uint64_t, 4>;
+
+inline bool in(const CellMask& mask, std::size_t k) { return (mask[k / 64] >> (k % 64) & 1) != 0; }
 
 // Structure of arrays of one stream of shadow rays, and scratch of one gather.
 struct GatherWorkspace {

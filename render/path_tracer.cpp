@@ -370,16 +370,10 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
   w.density = certain;
   const float ratio = crossing.ratio[channel];
   if (numbers.next() < fresnel(-dot(w.direction, hit.normal), ratio)) {
-    const Vec3f direction = normalize(mirrored(-w.direction, hit.normal));
-    leave(dot(direction, hit.geometric_normal) < 0 ? normalize(other_side(hit, direction))
-                                                   : direction);
+    leave(mirrored_off(hit, w.direction));
     return;
   }
-  Vec3f direction = refracted(w.direction, hit.normal, ratio);
-  if (dot(direction, hit.geometric_normal) > -1e-4F) {
-    const float back = dot(direction, hit.geometric_normal);
-    direction = normalize(direction - hit.geometric_normal * (back + 1e-3F));
-  }
+  const Vec3f direction = refracted_into(hit, w.direction, ratio);
   w.media = crossing.after;
   leave(direction);
 }

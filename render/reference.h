@@ -20,6 +20,8 @@ struct ReferenceSettings {
 
 // The composite that the kernel would show with endless samples, with every light in the whole
 // environment (not a table): stand-ins catch shadows by the same formula, in float.
+// Where the job asks for caustic photons, clear bodies bend all light that stand-ins and dull
+// surfaces get; else it goes straight through them to those.
 // Returns (height, width, 4): RGB and coverage. `plate` linear (height, width, 3).
 capture::Image render_reference(const FrameInputs& inputs,
                                 const FrameJob& job,

@@ -35,6 +35,12 @@ inline Vec3f transform_normal(const std::array<float, 9>& m, Vec3f n) {
                          m[6] * n.x + m[7] * n.y + m[8] * n.z});
 }
 
+// A unit vector across a unit direction.
+inline Vec3f unit_across(Vec3f direction) {
+  return normalize(
+      cross(std::abs(direction.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}, direction));
+}
+
 inline bool is_finite(Vec3f p) {
   return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }

@@ -70,7 +70,7 @@ class VisibilityFinder {
       add_ray(w_, r_, point, light, ray->direction, mask, ray->far_m);
     } else {
       add_ray(w_, r_, point, light, context_.table->lights[light].direction,
-              mask | (ray_mask_ == 0 && r_.takes_caustics[point] ? context_.mask_to(light) : 0U));
+              mask | (ray_mask_ == 0 && in(r_.by_caustics, point) ? context_.mask_to(light) : 0U));
     }
     if (w_.rays == stream_rays) shoot_rest(first);
   }

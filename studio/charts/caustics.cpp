@@ -10,8 +10,8 @@
 #include "render/made_shapes.h"
 #include "render/paper_scenes.h"
 #include "render/reference.h"
-#include "studio/charts/least_time.h"
 #include "studio/charts/matte_shot.h"
+#include "studio/least_time.h"
 #include "studio/paper_shot.h"
 
 namespace studio {

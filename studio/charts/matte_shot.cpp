@@ -5,7 +5,7 @@
 
 #include "render/sampled_light.h"
 #include "render/standard.h"
-#include "studio/charts/least_time.h"
+#include "studio/least_time.h"
 
 namespace studio {
 

@@ -2,27 +2,14 @@
 #include "studio/commands/kernel_rate.h"
 
 #include <algorithm>
-#include <chrono>
-#include <functional>
 #include <vector>
 
 #include "render/kernel.h"
 #include "render/ray_log.h"
+#include "studio/least_time.h"
 
 namespace studio {
 namespace {
-
-double best_ms(int runs, const std::function<void()>& work) {
-  double best = 1e30;
-  for (int i = 0; i < runs; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - start;
-    best = std::min(best, taken.count());
-  }
-  return best;
-}
 
 // All rays of a frame as the kernel shoots them.
 render::RayLog log_frame(const BenchScene& shot, const render::FrameJob& job) {
@@ -48,12 +35,12 @@ KernelRate measure_kernel(const BenchScene& shot, const render::FrameJob& job, i
   m.kernel_ms = m.bare_ms = 1e30;
   render::FrameResult result;
   for (int i = 0; i < runs; ++i) {
-    m.kernel_ms =
-        std::min(m.kernel_ms,
-                 best_ms(1, [&] { render_frame(shot.inputs(), job, shot.half_plate, result); }));
+    m.kernel_ms = std::min(
+        m.kernel_ms,
+        least_time_ms([&] { render_frame(shot.inputs(), job, shot.half_plate, result); }, 1));
     for (const bool coherent : {true, false}) {
-      m.bare_ms =
-          std::min(m.bare_ms, best_ms(1, [&] { shoot_logged_rays(*shot.scene, logs, coherent); }));
+      m.bare_ms = std::min(
+          m.bare_ms, least_time_ms([&] { shoot_logged_rays(*shot.scene, logs, coherent); }, 1));
     }
   }
   return m;
@@ -66,10 +53,12 @@ double measure_kept(const BenchScene& shot, const render::FrameJob& job, int run
   render::FrameResult result;
   render_frame(inputs, job, shot.half_plate, result);
   render::FrameJob live = job;
-  return best_ms(runs, [&] {
-    drift(live);
-    render_frame(inputs, live, shot.half_plate, result);
-  });
+  return least_time_ms(
+      [&] {
+        drift(live);
+        render_frame(inputs, live, shot.half_plate, result);
+      },
+      runs);
 }
 
 render::Effort plain_effort(render::Effort effort) {
