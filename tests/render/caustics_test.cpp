@@ -48,6 +48,7 @@ Caustics find(const Scene& scene, const LightTable& table, const PhotonSettings&
 }
 
 float irradiance(const Caustics& caustics, float x, float y) {
+  if (caustics.photons().lights().empty()) return 0;  // no body has any extent
   return caustics.at(0, {x, y, 0}, {0, 0, 1}).x;
 }
 
