@@ -9,7 +9,7 @@
 namespace calibrate {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 // Radii this far beyond the largest one are rounding errors of a pixel at the largest angle.
 constexpr double radius_slack = 1e-12;
 // Closer to the axis than this, sin(angle) / radius is 1 to double precision.

@@ -11,7 +11,7 @@ namespace calibrate {
 namespace {
 
 constexpr double points_in_mm = 72 / 25.4;
-constexpr double edge_mm = 5;
+constexpr double margin_mm = 5;
 constexpr double text_mm = 3;  // size of letters
 constexpr double ruler_mm = 100;
 constexpr double tick_mm = 10;
@@ -49,10 +49,11 @@ struct Strip {
 
 Strip strip_of(const BoardSheet& sheet) {
   if (sheet.upright_strip) {
-    return {edge_mm, sheet.paper.height_mm - edge_mm, true, sheet.paper.height_mm - 2 * edge_mm};
+    return {margin_mm, sheet.paper.height_mm - margin_mm, true,
+            sheet.paper.height_mm - 2 * margin_mm};
   }
-  return {edge_mm, sheet.paper.height_mm - edge_mm - 2 * text_mm - line_mm, false,
-          sheet.paper.width_mm - 2 * edge_mm};
+  return {margin_mm, sheet.paper.height_mm - margin_mm - 2 * text_mm - line_mm, false,
+          sheet.paper.width_mm - 2 * margin_mm};
 }
 
 // Lines of the ruler within the strip, as x0 y0 x1 y1.

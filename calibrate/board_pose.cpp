@@ -18,7 +18,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr std::size_t min_corners = 6;
+constexpr std::size_t corners_for_a_pose = 6;
 // Bearings this far off their mean (by cosine) say little on the plane perpendicular to it.
 constexpr double least_cosine = 0.15;
 constexpr int refinement_steps = 5;
@@ -98,7 +98,7 @@ std::optional<BoardPose> find_board_pose(std::span<const Vec3> bearings,
     board.push_back({p_board[i].x, p_board[i].y});
     plane.push_back({b.x() / b.z(), b.y() / b.z()});
   }
-  if (board.size() < min_corners) return std::nullopt;
+  if (board.size() < corners_for_a_pose) return std::nullopt;
   const auto plane_from_board = find_homography(board, plane);
   if (!plane_from_board) return std::nullopt;
   Matrix3d H =

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "calibrate/angles.h"
 #include "calibrate/lens_seed.h"
 #include "calibrate/lens_warnings.h"
 #include "calibrate/mrcal_lens.h"
@@ -17,7 +18,6 @@
 namespace calibrate {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 // Two pictures whose corners differ by less than this are one.
 constexpr double same_picture_px = 0.1;
 // A view is left out if fewer of its corners fit.

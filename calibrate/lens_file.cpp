@@ -7,6 +7,7 @@
 
 #include <toml++/toml.h>
 
+#include "calibrate/angles.h"
 #include "calibrate/axial_lens.h"
 #include "calibrate/camera_model.h"
 #include "calibrate/lens.h"
@@ -16,8 +17,6 @@
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 [[noreturn]] void fail(const std::string& path,
                        const toml::source_region& at,

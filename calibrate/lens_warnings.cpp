@@ -7,10 +7,11 @@
 #include <numbers>
 #include <optional>
 
+#include "calibrate/angles.h"
+
 namespace calibrate {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 // From these on, something is said.
 constexpr double scatter_px = 1;
 constexpr double bend_m = 0.0005;

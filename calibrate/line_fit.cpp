@@ -24,7 +24,7 @@ namespace {
 
 using Block = std::array<double, 3>;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double loss_scale = line_loss_scale;
 

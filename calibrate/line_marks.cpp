@@ -9,12 +9,12 @@
 
 #include <toml++/toml.h>
 
+#include "calibrate/angles.h"
 #include "calibrate/toml_reader.h"
 
 namespace calibrate {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr std::size_t most_lines = 1000;
 constexpr std::size_t most_pixels = 10000;  // of a line
 

@@ -8,7 +8,7 @@
 namespace calibrate {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 Vec3 least_eigenvector(const Eigen::Matrix3d& M) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(M);

@@ -8,13 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "calibrate/angles.h"
 #include "calibrate/rotation_fit.h"
 #include "calibrate/rotation_vector.h"
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 // The shortest one.
 Mat3 turn_between(Vec3 from, Vec3 to) {

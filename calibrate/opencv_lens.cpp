@@ -11,13 +11,12 @@
 #include <stdexcept>
 #include <vector>
 
+#include "calibrate/angles.h"
 #include "calibrate/opencv_storage.h"
 #include "calibrate/text_file.h"
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 std::string quoted(std::string_view text) { return "\"" + std::string(text.substr(0, 60)) + "\""; }
 

@@ -18,8 +18,6 @@ constexpr std::size_t most_triples = 1000;
 constexpr std::size_t most_seeds = 5;
 constexpr double same_seed = 0.1;
 
-double squared(Vec2 r) { return r.x * r.x + r.y * r.y; }
-
 // A few different poses of triples, the best first.
 class BestSeeds {
  public:

@@ -40,8 +40,6 @@ constexpr double lens_error_in_scale = 0.3;
 
 bool finite(Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-double squared(Vec2 r) { return r.x * r.x + r.y * r.y; }
-
 // How points lie in space.
 struct Spread {
   Vec3 centre;

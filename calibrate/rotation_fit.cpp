@@ -19,9 +19,9 @@ namespace {
 constexpr double least_sine = 0.02;
 constexpr std::size_t most_pairs = 1000;
 // Standard deviations beyond which a direction is wrong.
-constexpr double wrong_beyond = 4;
+constexpr double wrong_beyond_spread = 4;
 // Seeds carry two directions' errors on to all others, enlarged.
-constexpr double seed_loss = 5;
+constexpr double seed_loss_rad = 5;
 // Median of a two-dimensional error's length in standard deviations along one axis.
 constexpr double median_length = 1.1774;
 
@@ -58,7 +58,7 @@ std::optional<Mat3> solve_wahba(std::span<const SeenDirection> directions,
 double cost_of(std::span<const SeenDirection> directions, const Mat3& R) {
   double cost = 0;
   for (const SeenDirection& d : directions) {
-    const double r = residual(d, R) / seed_loss;
+    const double r = residual(d, R) / seed_loss_rad;
     cost += std::log1p(r * r);
   }
   return cost;
@@ -138,7 +138,7 @@ RotationFit fit_rotation(std::span<const SeenDirection> directions) {
   }
   RotationFit fit;
   constexpr std::size_t enough_to_doubt = 5;
-  const double limit = wrong_beyond * spread_of(directions, *R);
+  const double limit = wrong_beyond_spread * spread_of(directions, *R);
   std::size_t count = 0;
   for (std::size_t i = 0; i < directions.size(); ++i) {
     fit.agrees.push_back(directions.size() < enough_to_doubt ||

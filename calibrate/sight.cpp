@@ -12,7 +12,7 @@
 namespace calibrate {
 namespace {
 
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+using Information = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 // Pixels to either side over which the lens's slope is taken.
@@ -45,8 +45,6 @@ Vec2 residual_of_direction(const Sight& sight, Vec3 u) {
   return {arc * dot(sight.right, across), arc * dot(sight.down, across)};
 }
 
-double squared(Vec2 r) { return r.x * r.x + r.y * r.y; }
-
 double loss(double r2, double s) { return std::isinf(s) ? r2 : s * s * std::log1p(r2 / (s * s)); }
 
 double cost_of(std::span<const Sight> sights, const Pose& pose, double s) {
@@ -65,7 +63,7 @@ double median_residual(std::span<const Sight> sights, const Pose& pose) {
 }
 
 struct Normal {
-  Matrix6 matrix = Matrix6::Zero();
+  Information matrix = Information::Zero();
   Vector6 gradient = Vector6::Zero();
 };
 
@@ -164,7 +162,7 @@ RefinedPose refine_pose(std::span<const Sight> sights,
   Normal normal = normal_equations(sights, pose, s);
   double cost = cost_of(sights, pose, s);
   for (int round = 0; round < rounds; ++round) {
-    Matrix6 damped = normal.matrix;
+    Information damped = normal.matrix;
     damped.diagonal() *= 1 + damping;
     const Vector6 step = -damped.ldlt().solve(normal.gradient);
     if (!step.allFinite()) break;
@@ -184,7 +182,7 @@ RefinedPose refine_pose(std::span<const Sight> sights,
     if (step.dot(damped * step) < converged * std::max(1.0, cost)) break;
   }
   refined.cost = cost;
-  Eigen::Map<Matrix6>(refined.information.data()) = normal.matrix;
+  Eigen::Map<Information>(refined.information.data()) = normal.matrix;
   return refined;
 }
 

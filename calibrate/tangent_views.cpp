@@ -6,10 +6,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "calibrate/angles.h"
+
 namespace calibrate {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 constexpr double ring_rad = 55 * degree;
 constexpr int ring_views = 8;
 constexpr double half_angle_rad = 45 * degree;

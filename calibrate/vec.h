@@ -48,6 +48,10 @@ Vec3T<T> normalize(Vec3T<T> a) {
   const T l = length(a);
   return l > T(0) ? a / l : a;
 }
+template <class T>
+bool is_finite(Vec3T<T> a) {
+  return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
+}
 
 using Vec2 = Vec2T<double>;
 using Vec3 = Vec3T<double>;
@@ -55,6 +59,8 @@ using Vec3f = Vec3T<float>;
 
 inline float mean(Vec3f v) { return (v.x + v.y + v.z) * (1.0F / 3); }
 inline float largest(Vec3f v) { return std::max({v.x, v.y, v.z}); }
+inline Vec3f mix(Vec3f a, Vec3f b, float t) { return a + (b - a) * t; }
+inline double squared(Vec2 v) { return v.x * v.x + v.y * v.y; }
 
 // Without the care of std::hypot for numbers near the limits, and several times as fast.
 inline double hypotenuse(double a, double b) { return std::sqrt(a * a + b * b); }

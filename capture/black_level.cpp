@@ -8,6 +8,8 @@
 
 #include <Eigen/Dense>
 
+#include "capture/median.h"
+
 namespace capture {
 namespace {
 
@@ -44,12 +46,6 @@ BlockResiduals residuals_of(const std::vector<BlockMean>& block,
   // Kaufman's approximation: the derivatives without what another light would undo.
   r.jacobian -= exposure * (exposure.transpose() * r.jacobian) / square;
   return r;
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Of chi-square over its degrees of freedom (Wilson and Hilferty, PNAS 17, 1931).
@@ -98,7 +94,7 @@ BlackFit fit_black_level(const std::vector<std::vector<BlockMean>>& blocks,
     constexpr double longest_step = 0.5;
     p[0] -= step[0];
     p.tail(size - 1) -= step.tail(size - 1).cwiseMax(-longest_step).cwiseMin(longest_step);
-    const double next = std::max(1.0, std::sqrt(median_of(std::move(spreads))));
+    const double next = std::max(1.0, std::sqrt(median_in_place(spreads)));
     const bool settled = step.cwiseAbs().maxCoeff() < 1e-6 && std::abs(next - spread) < 1e-3;
     spread = next;
     if (settled) break;

@@ -13,7 +13,7 @@ constexpr std::size_t fewest = 24;
 constexpr double least_explained = 0.7;
 constexpr double least_modulation = 0.01;
 // Below this the camera's rate hides the swing: the mean square of what a swing of 1 would make.
-constexpr double least_seen = 0.02;
+constexpr double least_swing = 0.02;
 
 double seconds(Time time) { return std::chrono::duration<double>(time).count(); }
 
@@ -56,7 +56,7 @@ Flicker FlickerWatch::fit(double light_hz) const {
   }
   const double determinant = ss * cc - sc * sc;
   const double seen = (ss + cc) / static_cast<double>(count);
-  if (!(seen > least_seen) || !(yy > 0)) return {light_hz, 0, 0};
+  if (!(seen > least_swing) || !(yy > 0)) return {light_hz, 0, 0};
   // A camera that sees the swing at two phases only tells one of the two terms.
   const bool both = determinant > 1e-3 * ss * cc;
   const double a = both ? (cc * sy - sc * cy) / determinant : ss > cc ? sy / ss : 0;

@@ -11,7 +11,7 @@
 namespace capture {
 namespace {
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double no_bound = std::numeric_limits<double>::infinity();
 
 void require_exposure(double exposure_s) {
   if (!(exposure_s > 0) || !std::isfinite(exposure_s)) {
@@ -44,7 +44,7 @@ void require_noise(const NoiseModel& noise) {
 
 struct Estimate {
   double radiance = 0;
-  double variance = infinite;
+  double variance = no_bound;
 };
 
 // The mean of a sample's unsaturated shots, weighted by the inverse variances that they have if
@@ -73,9 +73,9 @@ Estimate merge_sample(std::span<const Shot> shots,
                       const Shot& shortest) {
   // At radiance 0 all variances are equal: weights go by exposure alone, and are free of noise.
   Estimate estimate = weighted_mean(shots, sample, noise, 0);
-  if (estimate.variance == infinite) {
+  if (estimate.variance == no_bound) {
     const double bound = static_cast<double>(shortest.linear.pixels[sample]);
-    return {std::isfinite(bound) ? bound / shortest.exposure_s : 0, infinite};
+    return {std::isfinite(bound) ? bound / shortest.exposure_s : 0, no_bound};
   }
   constexpr int rounds = 2;  // a third one changes nothing that noise does not hide
   for (int round = 0; round < rounds; ++round) {
@@ -200,7 +200,7 @@ CodeTable linear_code_table(int bits, double black, double white, const NoiseMod
   for (std::size_t code = 0; code < (std::size_t{1} << bits); ++code) {
     const double value = (static_cast<double>(code) - black) / (white - black);
     table.value.push_back(value);
-    table.variance.push_back(value < noise.saturation ? noise.variance(value) : infinite);
+    table.variance.push_back(value < noise.saturation ? noise.variance(value) : no_bound);
   }
   return table;
 }
@@ -221,7 +221,7 @@ CodeTable response_code_table(const Response& response, int channel, double code
     table.value.push_back(light[static_cast<std::size_t>(code)]);
     // A linear sensor may be full below the last code: its curve is flat from there on.
     const bool full = code >= saturated || !(light[static_cast<std::size_t>(code)] < light.back());
-    table.variance.push_back(full ? infinite : step * step * code_sigma * code_sigma);
+    table.variance.push_back(full ? no_bound : step * step * code_sigma * code_sigma);
   }
   return table;
 }
@@ -238,7 +238,7 @@ MergeTables::MergeTables(std::array<CodeTable, 3> channels, int shots)
     bool unsaturated = false;
     for (const double variance : channel.variance) {
       if (!(variance > 0)) throw std::invalid_argument("a code's variance is above 0");
-      unsaturated = unsaturated || variance < infinite;
+      unsaturated = unsaturated || variance < no_bound;
     }
     if (!unsaturated) throw std::invalid_argument("every code is saturated");
   }
@@ -256,7 +256,7 @@ void MergeTables::set_exposures(std::span<const double> exposures_s) {
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     const CodeTable& table = channels_[c];
     const double least = *std::min_element(table.variance.begin(), table.variance.end());
-    double lightest = infinite;  // weight of any code that counts
+    double lightest = no_bound;  // weight of any code that counts
     for (std::size_t s = 0; s < shots_; ++s) {
       const double t = exposures_s[s] / longest;  // keeps weights in a float's range
       for (std::size_t code = 0; code < codes_; ++code) {
@@ -271,7 +271,7 @@ void MergeTables::set_exposures(std::span<const double> exposures_s) {
     // less than a float's last bit.
     constexpr double negligible = 1e-9;
     for (std::size_t code = 0; code < codes_; ++code) {
-      if (table.variance[code] < infinite) continue;
+      if (table.variance[code] < no_bound) continue;
       const double weight = negligible * lightest;
       entries_[(shortest * channels_.size() + c) * codes_ + code] = {
           static_cast<float>(weight * table.value[code] / exposures_s[shortest]),

@@ -66,7 +66,7 @@ std::size_t samples_of(const LinearCodes& codes) {
   return static_cast<std::size_t>(codes.width) * static_cast<std::size_t>(codes.height) * channels;
 }
 
-void require_exposure(double exposure_s) {
+void require_live_exposure(double exposure_s) {
   if (!(exposure_s >= 1e-9 && exposure_s <= 1e6)) {
     throw std::invalid_argument("an exposure of a live bracket lies between 1 ns and 1e6 s");
   }
@@ -300,7 +300,7 @@ void require_codes(std::span<const Coded> shots, const LinearCodes& codes) {
   }
   const std::size_t samples = samples_of(codes);
   for (const Coded& shot : shots) {
-    require_exposure(shot.exposure_s);
+    require_live_exposure(shot.exposure_s);
     if (shot.codes.size() != samples) {
       throw std::invalid_argument("the shots of a bracket need one size and three channels");
     }
@@ -356,7 +356,7 @@ void merge_window(std::span<const LiveShot> shots,
   require_settings(settings);
   const Image* first = shots[0].linear;
   for (const LiveShot& shot : shots) {
-    require_exposure(shot.exposure_s);
+    require_live_exposure(shot.exposure_s);
     if (shot.linear == nullptr || shot.linear->width != first->width ||
         shot.linear->height != first->height || shot.linear->channels != 3 ||
         shot.linear->empty()) {

@@ -10,12 +10,13 @@
 
 #include <Eigen/Dense>
 
+#include "capture/median.h"
 #include "capture/photon_transfer.h"
 
 namespace capture {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // What rounding makes of the variance of a difference's halves: with D the difference of two
 // values in steps and f its fraction, the steps' difference has the mean square D^2 + f (1 - f)
@@ -38,12 +39,6 @@ struct Group {
   double seen = 0;
 };
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // The mean of those variances that are not outliers: beyond 7 deviations of a normal spread, where
 // a chi-square's own tail does not reach.
 bool group_of(std::span<const NoisePoint> points, Group& group) {
@@ -51,11 +46,11 @@ bool group_of(std::span<const NoisePoint> points, Group& group) {
   constexpr double far = 7;
   std::vector<double> values;
   for (const NoisePoint& point : points) values.push_back(point.variance);
-  const double centre = median_of(values);
+  const double centre = median_in_place(values);
   for (double& value : values) value = std::abs(value - centre);
   constexpr double least_variance = 1.0 / 12;
   const double spread =
-      std::max(sigma_by_median * median_of(values),
+      std::max(sigma_by_median * median_in_place(values),
                std::max(centre, least_variance) * std::sqrt(2 / points.front().freedom));
   double weights = 0;
   double lowest = std::numeric_limits<double>::infinity();

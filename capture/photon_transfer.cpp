@@ -9,17 +9,12 @@
 
 #include "capture/black_level.h"
 #include "capture/code_range.h"
+#include "capture/median.h"
 #include "capture/noise_line.h"
 #include "capture/shot_blocks.h"
 
 namespace capture {
 namespace {
-
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 void check(std::span<const SensorShot> shots, int bits, double exposure_error) {
   if (shots.empty()) throw std::invalid_argument("there are no shots to measure a sensor by");
@@ -119,7 +114,7 @@ Linearity find_linearity(const ColourBlocks& colour,
   for (std::size_t bin = 0; bin < bins; ++bin) {
     const double low = static_cast<double>(bin) / bins;
     if (departures[bin].size() < least || low < lowest_share) continue;
-    const double departure = std::abs(median_of(departures[bin]));
+    const double departure = std::abs(median_in_place(departures[bin]));
     if (low >= fitted_share && departure > bent) {
       linearity.usable = fit.black.value + low * range;
       break;

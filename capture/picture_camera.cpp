@@ -34,7 +34,7 @@ bool is_radiance(const std::string& path) {
 }
 
 // Grey is repeated, alpha left out.
-Image three_channels(Image image) {
+Image as_colour(Image image) {
   if (image.channels == 3) {
     return image;
   }
@@ -73,7 +73,7 @@ class PictureReader {
     if (is_coded_file(path)) return coded_.read(path, image);
     if (!is_exr(path) && !is_radiance(path)) return read_still(path, stills_, image);
     check_is_file(path);
-    image = three_channels(is_exr(path) ? read_exr(path) : read_rgbe(path));
+    image = as_colour(is_exr(path) ? read_exr(path) : read_rgbe(path));
     return is_exr(path) ? "OpenEXR, linear" : "Radiance, linear";
   }
 

@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint32_t wanted_buffers = 4;
 constexpr std::uint32_t least_buffers = 2;
 constexpr std::uint32_t most_buffers = 32;
-constexpr double rate_tolerance = 0.01;
+constexpr double told_rate_tolerance = 0.01;
 
 [[noreturn]] void fail(const std::string& what, int error) {
   throw std::runtime_error(what + ": " + reason_of(error));
@@ -144,7 +144,7 @@ void V4l2Stream::set_rate(const V4l2Choice& choice, const V4l2Request& request) 
   if (!request.rate) return;
   const std::string asked = "rate " + words_of(*request.rate) + " was asked for; the device ";
   if (!told) throw std::runtime_error(asked + "has no rate that can be set");
-  if (std::abs(rate_.value() / request.rate->value() - 1) > rate_tolerance) {
+  if (std::abs(rate_.value() / request.rate->value() - 1) > told_rate_tolerance) {
     throw std::runtime_error(asked + "sets " + words_of(rate_) + " instead");
   }
 }

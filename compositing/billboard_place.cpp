@@ -18,8 +18,6 @@ constexpr double widest_turn_rad = 1.3;
 constexpr double furthest = 20;      // times the camera's distance
 constexpr double straight_m = 1e-3;  // what is nearer than this to the vertical has no azimuth
 
-bool is_finite(Vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
 std::optional<double> azimuth(Vec3 from, Vec3 to) {
   const double x = to.x - from.x, y = to.y - from.y;
   if (!(calibrate::hypotenuse(x, y) > straight_m)) return std::nullopt;

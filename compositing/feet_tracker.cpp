@@ -24,8 +24,6 @@ constexpr double away_m_s = 1;       // how fast what is held becomes uncertain
 constexpr double largest_sigma_m = 100;
 constexpr double furthest_m = 1e4;
 
-bool is_finite(Vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
-
 // Where the pixel's ray meets the floor before the camera.
 std::optional<Vec2> on_floor(const calibrate::Lens& lens,
                              const calibrate::Pose& set_from_cam,

@@ -11,9 +11,9 @@ using calibrate::Vec3f;
 
 constexpr float opaque = 0.998F;
 constexpr float most_steps = 4096;
-constexpr int bisections = 4;        // of a step, where the surface is
-constexpr float nearest_m = 0.1F;    // depth before a camera at which steps are no finer
-constexpr float width_share = 0.5F;  // of a look-up, that is no step
+constexpr int bisections = 4;          // of a step, where the surface is
+constexpr float nearest_m = 0.1F;      // depth before a camera at which steps are no finer
+constexpr float step_of_width = 0.5F;  // of a look-up, that is no step
 
 }  // namespace
 
@@ -99,7 +99,7 @@ float HullMarch::step_of(const HullRay& ray, float from, float to, float coarser
   const float width_m =
       std::min(ray.width_m + ray.width_per_m * from, ray.width_m + ray.width_per_m * to);
   const float step_m = (to - from) / std::ceil(std::min(steps, most_steps));
-  return std::max(step_m, std::min(width_share * width_m, to - from));
+  return std::max(step_m, std::min(step_of_width * width_m, to - from));
 }
 
 HullMarch::Crossing HullMarch::find(const HullRay& ray, float from_m, float to_m) const {

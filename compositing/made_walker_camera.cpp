@@ -6,12 +6,12 @@
 #include <charconv>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "calibrate/angles.h"
 #include "capture/camera.h"
 #include "compositing/made_video_camera.h"
 
@@ -19,7 +19,7 @@ namespace compositing {
 namespace {
 
 constexpr capture::Rational rate{25, 1};
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr std::array screen{0.04, 0.42, 0.1};
 
 Vec3 round_at(double round_deg, double radius_m, double z) {

@@ -12,7 +12,7 @@
 namespace compositing {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr double most_m = 1;
 // What is chosen counts as so much better than it is.
 constexpr double loyalty = 0.85;

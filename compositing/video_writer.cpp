@@ -28,10 +28,6 @@ constexpr int cluster_limit_ms = 500;
 constexpr int cluster_limit_bytes = 1 << 20;
 constexpr std::size_t checkpoints_kept = 8;
 
-struct FreeOutput {
-  void operator()(AVFormatContext* context) const { avformat_free_context(context); }
-};
-
 AVRational av_rational(capture::Rational rate) {
   return {static_cast<int>(rate.num), static_cast<int>(rate.den)};
 }
@@ -144,6 +140,10 @@ struct Checkpoint {
 };
 
 struct VideoWriter::State {
+  struct FreeOutput {
+    void operator()(AVFormatContext* context) const { avformat_free_context(context); }
+  };
+
   explicit State(const VideoSettings& given)
       : settings(given), encoder(open_encoder(given)), file(given.file) {}
 

@@ -178,7 +178,7 @@ class HullShader final : public render::Shader {
     std::size_t bytes = 0;
     for (const MarchView& view : std::span(b.view).first(b.views)) {
       if (const char* fault = compositing::fault_of(view.camera)) refuse(name, fault);
-      if (view.camera.columns == 0 || !render::is_finite(view.position) ||
+      if (view.camera.columns == 0 || !calibrate::is_finite(view.position) ||
           !(view.px_per_tangent > 0 && std::isfinite(view.px_per_tangent)) ||
           !(view.root_aspect > 0 && std::isfinite(1 / view.root_aspect)) ||
           !(view.camera.uv_per_tangent > 0)) {

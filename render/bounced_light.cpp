@@ -5,13 +5,13 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <numeric>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
 
+#include "calibrate/angles.h"
 #include "capture/parallel_loop.h"
 #include "render/bounce_clusters.h"
 #include "render/sample_sequence.h"
@@ -23,7 +23,7 @@
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 constexpr unsigned blockers = mask_virtual | mask_real_blocker;
 // Rays that tell how much of a point's light stays in the set.
 constexpr std::uint32_t leaving_rays = 8;
@@ -94,7 +94,7 @@ std::vector<Place> find_places(const SceneDescription& scene, int count, float& 
 
 Vec3f about(Vec3f normal, std::array<float, 2> random) {
   const float z = 1 - 2 * random[0], r = std::sqrt(std::max(0.0F, 1 - z * z));
-  const float turn = 2 * pi * random[1];
+  const float turn = 2 * pi_f * random[1];
   return normalize(normal + Vec3f{r * std::cos(turn), r * std::sin(turn), z} * (1 - look));
 }
 
@@ -165,7 +165,7 @@ class PointFinder {
     Vec3f gain;
     LampReceiver at;
     explicit Receiver(const SurfacePoint& p)
-        : gain(p.albedo * (p.area_m2 / pi)),
+        : gain(p.albedo * (p.area_m2 / pi_f)),
           at{offset_origin(p.hit, p.hit.geometric_normal), p.hit.normal, p.hit.geometric_normal} {}
   };
 
@@ -274,7 +274,7 @@ Exchange exchange(const Scene& scene,
                  std::span(received).subspan(i * lamps.size(), lamps.size()));
   });
   for (std::size_t k = 0; k < received.size(); ++k) {
-    result.given[k % lamps.size()] += received[k] / pi;
+    result.given[k % lamps.size()] += received[k] / pi_f;
   }
   return result;
 }

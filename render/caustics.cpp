@@ -5,9 +5,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "calibrate/angles.h"
 #include "capture/parallel_loop.h"
 #include "render/blocker_boxes.h"
 #include "render/trace.h"
@@ -16,7 +16,7 @@
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 constexpr std::size_t spots_in_leaf = 8;
 // Standard deviation of a photon's share of the grid, of the distance to the next: photons that do
 // not spread then add up to an even light, but for four thousandths.
@@ -68,7 +68,7 @@ std::optional<Caustics::Spot> spot_of(const Photons::Landing& landing, const Cau
   // (1 - r^2)^2 on an ellipse has an eighth of its squared radii as moments.
   const float ra = std::sqrt(8 * wide), rb = std::sqrt(8 * narrow);
   Caustics::Spot spot;
-  spot.peak = landing.share * (3 / (pi * ra * rb));
+  spot.peak = landing.share * (3 / (pi_f * ra * rb));
   if (!(largest(spot.peak) > dimmest) || !is_finite(spot.peak)) return std::nullopt;
   spot.centre = landing.position;
   spot.normal = normal;

@@ -6,12 +6,13 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "render/lobe_filter.h"
 
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 
 struct Texel {
   int x, y;
@@ -49,8 +50,8 @@ float arc_tangent(float y, float x) {
     angle = angle * s + k;
   }
   angle *= t;
-  if (ay > ax) angle = pi / 2 - angle;
-  if (x < 0) angle = pi - angle;
+  if (ay > ax) angle = pi_f / 2 - angle;
+  if (x < 0) angle = pi_f - angle;
   return y < 0 ? -angle : angle;
 }
 
@@ -61,8 +62,8 @@ struct MapPoint {
 
 MapPoint map_point(Vec3f direction) {
   const float across = std::sqrt(direction.x * direction.x + direction.y * direction.y);
-  return {0.5F - arc_tangent(direction.y, direction.x) / (2 * pi),
-          arc_tangent(across, direction.z) / pi};
+  return {0.5F - arc_tangent(direction.y, direction.x) / (2 * pi_f),
+          arc_tangent(across, direction.z) / pi_f};
 }
 
 constexpr float mirror_alpha = 4e-4F;  // of standard.h's mirror_roughness
@@ -122,7 +123,7 @@ ConeSteps cone_steps(const Environment& env, float alpha, const Spread& spread) 
   const float aa = dot(a, a), bb = dot(b, b);
   if (!(aa + bb > 0) || !std::isfinite(aa + bb)) return {};
   const float longer = std::sqrt(std::max(aa, bb)), shorter = std::sqrt(std::min(aa, bb));
-  const float texel_rad = pi / static_cast<float>(env.smoothed[0].height);
+  const float texel_rad = pi_f / static_cast<float>(env.smoothed[0].height);
   // No finer than what the lobe or the map blurs.
   const float narrow = std::max({shorter, lobe_width * alpha, blur_texels * texel_rad});
   const float count = std::clamp(std::ceil(0.99F * longer / narrow), 1.0F, most_steps);
@@ -167,7 +168,7 @@ class MapSampler {
 
   // A disc of directions.
   void add_cone(MapPoint at, float width_rad, float share) {
-    const float texel_rad = pi / static_cast<float>(env_.smoothed[0].height);
+    const float texel_rad = pi_f / static_cast<float>(env_.smoothed[0].height);
     const float texels = width_rad / (blur_texels * texel_rad);
     if (!(texels > 1) || env_.halved.empty()) return add(0, env_.smoothed[0], at, share);
     const float level = std::min(std::log2(texels), static_cast<float>(env_.halved.size()));
@@ -225,7 +226,7 @@ void diffuse(Environment& env, const CompactTexels& compact) {
 }
 
 // Down to 8 rows: cones as wide as those texels are lobes of the smoothed levels.
-std::size_t halvings(int height) {
+std::size_t halvings_of(int height) {
   std::size_t count = 0;
   for (; height % 2 == 0 && height >= 16; height /= 2) ++count;
   return count;
@@ -242,8 +243,8 @@ void check(const Environment& env) {
 }
 
 Vec3f direction_of_texel(float x, float y, int width, int height) {
-  const float azimuth_rad = (0.5F - (x + 0.5F) / static_cast<float>(width)) * 2 * pi;
-  const float polar_rad = (y + 0.5F) / static_cast<float>(height) * pi;
+  const float azimuth_rad = (0.5F - (x + 0.5F) / static_cast<float>(width)) * 2 * pi_f;
+  const float polar_rad = (y + 0.5F) / static_cast<float>(height) * pi_f;
   const float sine = std::sin(polar_rad);
   return {sine * std::cos(azimuth_rad), sine * std::sin(azimuth_rad), std::cos(polar_rad)};
 }
@@ -347,13 +348,13 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal) {
   std::vector<float> across(static_cast<std::size_t>(map.width));
   for (int x = 0; x < map.width; ++x) {
     const float azimuth_rad =
-        (0.5F - (static_cast<float>(x) + 0.5F) / static_cast<float>(map.width)) * 2 * pi;
+        (0.5F - (static_cast<float>(x) + 0.5F) / static_cast<float>(map.width)) * 2 * pi_f;
     across[static_cast<std::size_t>(x)] =
         normal.x * std::cos(azimuth_rad) + normal.y * std::sin(azimuth_rad);
   }
   std::array<double, 3> sum{};
   for (int y = 0; y < map.height; ++y) {
-    const float polar_rad = (static_cast<float>(y) + 0.5F) / static_cast<float>(map.height) * pi;
+    const float polar_rad = (static_cast<float>(y) + 0.5F) / static_cast<float>(map.height) * pi_f;
     const float sine = std::sin(polar_rad);
     const float along = normal.z * std::cos(polar_rad);
     std::array<float, 3> row{};
@@ -383,7 +384,7 @@ void smooth_for_reflections(Environment& env, const CompactTexels& compact, int 
     throw std::invalid_argument("the map of compact sources does not fit the environment");
   env.smoothed.resize(static_cast<std::size_t>(levels));
   copy_counted(env.radiance, env.smoothed[0]);
-  env.halved.resize(halvings(env.radiance.height));
+  env.halved.resize(halvings_of(env.radiance.height));
   for (std::size_t k = 0; k < env.halved.size(); ++k) {
     const capture::Image& from = k == 0 ? env.smoothed[0] : env.halved[k - 1];
     area_average(from, from.height / 2, env.halved[k]);

@@ -8,7 +8,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // First entry above `value`; the last one that is above its predecessor if rounding passes the end.
 template <class Iterator, class T>

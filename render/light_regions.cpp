@@ -13,7 +13,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // Texels this many times as bright as the mean of the map belong to bright sources, ...
 constexpr double bright_over_mean = 16;

@@ -14,7 +14,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int least_height = 32;
 constexpr int largest_height = 128;
 // Texels per half width of the lobe, so that bilinear look-ups show no facets.

@@ -14,9 +14,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-std::uint32_t index(CarMaterial material) { return static_cast<std::uint32_t>(material); }
+using std::numbers::pi;
 
 StandardParameters plain(float r, float g, float b, float roughness, float metallic = 0) {
   StandardParameters p;

@@ -30,6 +30,7 @@ enum class CarMaterial : std::uint32_t {
   seam,
   count
 };
+inline std::uint32_t index(CarMaterial material) { return static_cast<std::uint32_t>(material); }
 
 struct MadeCarSettings {
   float paint[3] = {0.42F, 0.012F, 0.018F};  // base colour, linear

@@ -13,9 +13,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-std::uint32_t index(CarMaterial material) { return static_cast<std::uint32_t>(material); }
+using std::numbers::pi;
 
 class BodyMaker {
  public:

@@ -10,7 +10,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int angles = 8192;  // of half the outline
 
 double smooth_step(double from, double to, double x) {

@@ -11,8 +11,6 @@
 namespace render {
 namespace {
 
-std::uint32_t index(CarMaterial material) { return static_cast<std::uint32_t>(material); }
-
 using Corners = std::vector<std::array<double, 2>>;
 
 class TrimMaker {

@@ -11,9 +11,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-
-std::uint32_t index(CarMaterial material) { return static_cast<std::uint32_t>(material); }
+using std::numbers::pi;
 
 // Turned about y: profile of (radius, y), angle 0 at +x, from outside (large y) to inside.
 struct ProfilePoint {

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "render/environment.h"
 #include "render/made_scene.h"
 #include "render/made_shapes.h"
@@ -14,7 +15,7 @@
 namespace render {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr capture::Rational plate_rate{25, 1};
 
 // What is brighter than this (in plate radiance) is the sun and the glow about it.

@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "render/transform.h"
+
 namespace render {
 namespace {
 
@@ -70,11 +72,6 @@ void add_turned(Mesh& mesh, std::span<const ProfilePoint> profile, int segments,
     }
     ring = next;
   }
-}
-
-Vec3f unit_across(Vec3f direction) {
-  const Vec3f axis = std::abs(direction.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0};
-  return normalize(cross(axis, direction));
 }
 
 }  // namespace

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "capture/parallel_loop.h"
 #include "render/environment.h"
 #include "render/made_noise.h"
@@ -14,15 +14,13 @@
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
-constexpr float degree = pi / 180;
+using calibrate::pi_f;
+constexpr float degree_f = pi_f / 180;
 constexpr Vec3f sun_colour{1.08F, 1.0F, 0.86F};
 // Edge of the disc: full inside, nothing outside. Half its light lies within 0.5 degrees.
-constexpr float disc_inner_rad = 0.25F * degree;
-constexpr float disc_outer_rad = 0.80F * degree;
+constexpr float disc_inner_rad = 0.25F * degree_f;
+constexpr float disc_outer_rad = 0.80F * degree_f;
 constexpr float disc_share = 0.93F;  // of the sun's irradiance; the rest is glow
-
-Vec3f mix(Vec3f a, Vec3f b, float t) { return a + (b - a) * t; }
 
 struct Weather {
   Vec3f sun;
@@ -85,13 +83,13 @@ Vec3f cloudy_sky(const Weather& weather, Vec3f v) {
 // Trees about the horizon: how high they reach, and how light their leaves are.
 Vec3f skyline(const Weather& weather, Vec3f v, Vec3f behind) {
   const float azimuth = std::atan2(v.y, v.x);
-  const float elevation = std::asin(std::clamp(v.z, -1.0F, 1.0F)) / degree;
+  const float elevation = std::asin(std::clamp(v.z, -1.0F, 1.0F)) / degree_f;
   if (elevation < -0.5F) {
     const Vec3f ground{0.20F, 0.19F, 0.165F};
     return mix(ground, behind, 0.15F);
   }
   constexpr int around = 64;  // noise units in a full turn
-  const float u = (azimuth / (2 * pi) + 0.5F) * around;
+  const float u = (azimuth / (2 * pi_f) + 0.5F) * around;
   Vec3f colour = behind;
   for (int row = 0; row < 2; ++row) {  // the far row first
     const auto seed = weather.seed + 40 + static_cast<std::uint32_t>(row) * 9;
@@ -186,7 +184,7 @@ MadeSky make_sky(const MadeSkySettings& settings) {
       settings.height, [](Vec3f) { return 1; },
       [&](Vec3f v) {
         if (v.z < 0.12F) return Vec3f{};  // trees hide it
-        const float angle = angle_to_sun(v) / degree;
+        const float angle = angle_to_sun(v) / degree_f;
         return mix(sun_colour, Vec3f{1, 1, 1}, 0.5F) *
                (std::exp(-angle / 2.5F) + 0.06F * std::exp(-angle / 12));
       });

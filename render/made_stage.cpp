@@ -19,7 +19,8 @@
 namespace render {
 namespace {
 
-constexpr float left = -4.2F, right = 4.2F, back = 3.4F, front = -6.5F, height = 4.6F, wing = 0.8F;
+constexpr float stage_left = -4.2F, stage_right = 4.2F, stage_back = 3.4F, stage_front = -6.5F,
+                stage_height = 4.6F, wing = 0.8F;
 constexpr int person_texels = 512;
 
 Material polished(const std::string& name, std::array<float, 3> base, std::int32_t texture) {
@@ -35,17 +36,21 @@ Material polished(const std::string& name, std::array<float, 3> base, std::int32
 void add_walls(MadeSceneBuilder& stage) {
   const auto slabs = stage.add(make_paving_texture(512, 4));
   stage.add("floor",
-            make_rectangle({left, front, 0}, {right - left, 0, 0}, {0, back - front, 0}, 4.2F),
+            make_rectangle({stage_left, stage_front, 0}, {stage_right - stage_left, 0, 0},
+                           {0, stage_back - stage_front, 0}, 4.2F),
             polished("floor", {0.62F, 0.66F, 0.80F}, slabs));
-  Mesh walls = make_rectangle({left, back, 0}, {right - left, 0, 0}, {0, 0, height}, 1);
-  append(walls, make_rectangle({left, wing, 0}, {0, back - wing, 0}, {0, 0, height}, 1));
-  append(walls, make_rectangle({right, back, 0}, {0, wing - back, 0}, {0, 0, height}, 1));
+  Mesh walls = make_rectangle({stage_left, stage_back, 0}, {stage_right - stage_left, 0, 0},
+                              {0, 0, stage_height}, 1);
+  append(walls,
+         make_rectangle({stage_left, wing, 0}, {0, stage_back - wing, 0}, {0, 0, stage_height}, 1));
+  append(walls, make_rectangle({stage_right, stage_back, 0}, {0, wing - stage_back, 0},
+                               {0, 0, stage_height}, 1));
   stage.add("walls", std::move(walls), {0.16F, 0.20F, 0.34F}, 1, -1, 0);
   // Strips of light along the back wall.
   Mesh strips;
   for (const float x : {-3.3F, -1.1F, 1.1F, 3.3F}) {
-    append(strips, make_box_faces({x - 0.06F, back - 0.05F, 0.3F}, {x + 0.06F, back, 3.2F},
-                                  "-x +x -y -z +z", 1));
+    append(strips, make_box_faces({x - 0.06F, stage_back - 0.05F, 0.3F},
+                                  {x + 0.06F, stage_back, 3.2F}, "-x +x -y -z +z", 1));
   }
   StandardParameters glow;
   std::fill_n(glow.base_color, 3, 0.2F);

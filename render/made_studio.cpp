@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "calibrate/angles.h"
 #include "render/environment.h"
 #include "render/made_lamp.h"
 #include "render/photograph_view.h"
@@ -20,7 +21,7 @@
 namespace render {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr capture::Rational plate_rate{25, 1};
 
 // A cloud's shadow takes at most this share of the sun's light.

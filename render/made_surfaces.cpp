@@ -16,8 +16,6 @@
 namespace render {
 namespace {
 
-Vec3f mix(Vec3f a, Vec3f b, float t) { return a + (b - a) * t; }
-
 // A number in -1..1 of its own for every texel.
 float grain(int x, int y, std::uint32_t seed) {
   const auto key = static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) << 32 |
@@ -31,6 +29,7 @@ float band(float value, float half_width, float soft) {
 }
 
 // Albedo at texel (x, y), (u, v) in 0..1.
+using calibrate::mix;
 using Paint = std::function<Vec3f(int x, int y, float u, float v)>;
 
 Texture paint_texture(int size, const Paint& paint) {

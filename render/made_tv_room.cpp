@@ -48,7 +48,7 @@ Material glowing(const std::string& name, Base base, Base radiance, std::int32_t
   return make_standard_material(name, p);
 }
 
-void add_walls(MadeSceneBuilder& room) {
+void add_room(MadeSceneBuilder& room) {
   const auto boards = room.add(make_board_texture(512, 21));
   StandardParameters parquet;
   parquet.base_color_texture = boards;
@@ -346,7 +346,7 @@ void add_plant(MadeSceneBuilder& room) {
 
 SceneDescription make_tv_room(bool lamp_on) {
   MadeSceneBuilder room;
-  add_walls(room);
+  add_room(room);
   add_television(room);
   add_lowboard(room);
   add_table(room);

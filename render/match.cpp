@@ -10,7 +10,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 // Turns a median absolute deviation into a standard deviation.
 constexpr double deviation_of_median = 1.4826;
 // Plate pixels to look at along a texel's side, and the largest step that leaves out others.

@@ -29,7 +29,7 @@
 namespace render {
 namespace {
 
-constexpr int max_node_depth = 256;
+constexpr int max_depth = 256;
 // Metres from the origin: farther out, floats and Embree overflow.
 constexpr float farthest = 1e9F;
 
@@ -136,7 +136,7 @@ class ModelBuilder {
              bool hidden,
              int depth,
              std::vector<bool>& found) {
-    if (depth > max_node_depth) throw std::runtime_error("its nodes are nested too deeply");
+    if (depth > max_depth) throw std::runtime_error("its nodes are nested too deeply");
     const std::string name = node.mName.C_Str();
     for (std::size_t i = 0; i < found.size(); ++i) {
       if (options_.hide[i] != name) continue;

@@ -3,9 +3,9 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "render/join_scenes.h"
 #include "render/made_car.h"
 #include "render/made_headlight.h"
@@ -17,7 +17,7 @@
 namespace render {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr int map_height = 256;
 
 constexpr std::string_view pomi = "Pomi et al., VMV 2003, table 1";

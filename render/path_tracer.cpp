@@ -5,17 +5,17 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
+#include "calibrate/angles.h"
 #include "render/stand_in_parameters.h"
 #include "render/trace.h"
 
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 constexpr float certain =
     std::numeric_limits<float>::infinity();  // density of a mirror's direction
 constexpr int roulette_depth = 4;
@@ -35,7 +35,7 @@ Vec3f times(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 Vec3f cosine_direction(Vec3f normal, std::array<float, 2> random) {
   const float z = 1 - 2 * random[0];
   const float r = std::sqrt(std::max(0.0F, 1 - z * z));
-  const float phi = 2 * pi * random[1];
+  const float phi = 2 * pi_f * random[1];
   const Vec3f on_sphere{r * std::cos(phi), r * std::sin(phi), z};
   const Vec3f direction = normalize(normal + on_sphere);
   return dot(direction, direction) > 0.5F ? direction : normal;
@@ -106,7 +106,7 @@ LobeValue lobe_value(const StandardSurface& surface,
                      bool with_diffuse) {
   LobeValue result;
   if (with_diffuse) {
-    const float d = std::max(0.0F, dot(surface.normal, direction)) / pi;
+    const float d = std::max(0.0F, dot(surface.normal, direction)) / pi_f;
     result.value += weights.diffuse * d;
     result.density += lobes.diffuse * d;
   }
@@ -248,7 +248,7 @@ Vec3f PathTracer::environment_light(const HitPoint& hit,
   // Diffuse light that is not followed comes from here alone.
   const Vec3f plain = rules_.diffuse_bounces || !(cosine > 0)
                           ? Vec3f{}
-                          : weights.diffuse * (cosine / pi / sky->density);
+                          : weights.diffuse * (cosine / pi_f / sky->density);
   if (value == Vec3f{} && plain == Vec3f{}) return {};
   const Vec3f origin = offset_origin(hit, l);
   // Clear bodies bend what lobes see: paths find it there.
@@ -451,9 +451,9 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     const PathLobes lobes(surface, weights, rules_.diffuse_bounces, split);
     Vec3f light = environment_light(hit, surface, weights, lobes, view, numbers);
     if (!lamps_.empty() && weights.diffuse != Vec3f{})
-      light += times(weights.diffuse, lamp_irradiance(hit, surface.normal)) * (1 / pi);
+      light += times(weights.diffuse, lamp_irradiance(hit, surface.normal)) * (1 / pi_f);
     if (rules_.caustics && !rules_.diffuse_bounces && weights.diffuse != Vec3f{})
-      light += times(weights.diffuse, bent_irradiance(hit, surface.normal, numbers)) * (1 / pi);
+      light += times(weights.diffuse, bent_irradiance(hit, surface.normal, numbers)) * (1 / pi_f);
     w.result.radiance += times(w.share, light);
     if (split) {
       // All but what goes straight on leave as paths of their own.
@@ -516,7 +516,7 @@ Vec3f PathTracer::bent_irradiance(const HitPoint& hit,
   bool bent = false;
   for (; w.depth < rules_.max_depth; ++w.depth) {
     const auto met = closest_hit(scene_, w.origin, w.direction, 0, w.mask, w.kind);
-    if (!met) return bent ? times(w.share, environment_.radiance(w.direction)) * pi : Vec3f{};
+    if (!met) return bent ? times(w.share, environment_.radiance(w.direction)) * pi_f : Vec3f{};
     const HitPoint at =
         scene_.hit_point(met->geom_id, met->prim_id, met->inst_id, met->u, met->v, w.direction);
     if (w.media.count > 0) {
@@ -542,7 +542,7 @@ Vec3f PathTracer::virtual_irradiance(const HitPoint& hit, SampleSequence& number
   w.sky_straight_on = false;
   if (!lamps_.empty()) w.glow_share = {};
   walk(w, numbers);
-  return w.result.radiance * pi;
+  return w.result.radiance * pi_f;
 }
 
 }  // namespace render

@@ -19,7 +19,7 @@ using calibrate::Lens;
 using calibrate::Pose;
 using calibrate::Vec3;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr int least_height = 8;
 constexpr int largest_height = 4096;
 // One register: left to itself, the compiler gathers channels from many pixels, at twice the time.

@@ -21,7 +21,7 @@ using calibrate::Pose;
 using calibrate::Vec2;
 using calibrate::Vec3;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 // Shrunk pixels per texel, along each side, at least.
 constexpr double pixels_per_texel = 2;
 // Directions per shrunk pixel, along each side, that a texel is sampled by.

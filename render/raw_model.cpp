@@ -165,8 +165,9 @@ RawSizes parse_head(std::span<const std::byte> bytes, RawModel& model) {
 
 void check_arrays(const Mesh& mesh) {
   const std::size_t count = mesh.positions.size();
-  bool sound = std::ranges::all_of(mesh.positions, is_finite) &&
-               std::ranges::all_of(mesh.normals, is_finite);
+  const auto finite = [](Vec3f v) { return is_finite(v); };
+  bool sound =
+      std::ranges::all_of(mesh.positions, finite) && std::ranges::all_of(mesh.normals, finite);
   for (const auto& [u, v] : mesh.uvs) sound = sound && std::isfinite(u) && std::isfinite(v);
   for (const auto& tangent : mesh.tangents) {
     for (const float x : tangent) sound = sound && std::isfinite(x);

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <vector>
 
+#include "calibrate/angles.h"
 #include "capture/parallel_loop.h"
 #include "render/cell_transport.h"
 #include "render/environment_sampler.h"
@@ -25,7 +25,7 @@ using calibrate::DirectionTable;
 using calibrate::Mat3;
 using calibrate::Pose;
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 
 Vec3f times(Vec3f a, Vec3f b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 
@@ -155,7 +155,7 @@ class Composite {
         rgb +=
             times(plate, {light.x / irradiance.x, light.y / irradiance.y, light.z / irradiance.z});
       else
-        added += times(albedo, light) * (sensitivity / pi);
+        added += times(albedo, light) * (sensitivity / pi_f);
     }
     rgb = with_light(rgb, added);
     return {rgb.x, rgb.y, rgb.z, static_cast<float>(1 - p.seen / n)};

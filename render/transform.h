@@ -41,8 +41,4 @@ inline Vec3f unit_across(Vec3f direction) {
       cross(std::abs(direction.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}, direction));
 }
 
-inline bool is_finite(Vec3f p) {
-  return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
-}
-
 }  // namespace render

@@ -2,13 +2,13 @@
 #include "studio/demo.h"
 
 #include <algorithm>
-#include <numbers>
 #include <numeric>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "calibrate/angles.h"
 #include "calibrate/lens.h"
 #include "capture/camera.h"
 #include "capture/exr.h"
@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 render::Placement placement_of(const render::MadeStand& stand) {
-  constexpr double degree = std::numbers::pi / 180;
+  using calibrate::degree;
   return render::placed(stand.foot, static_cast<float>(stand.yaw_deg * degree));
 }
 

@@ -7,7 +7,7 @@ cd "$(dirname "$0")/.."
 out=${1:-demo}
 studio/install-deps.sh
 build=${PLATELIGHT_BUILD:-build}
-cmake -S . -B "$build" -G Ninja >/dev/null
+cmake -S . -B "$build" -G Ninja -DCMAKE_UNITY_BUILD=ON >/dev/null
 cmake --build "$build" --target platelight
 platelight=$build/studio/platelight
 [ -f "$out/car.toml" ] || "$platelight" demo "$out"

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
-#include <numbers>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "calibrate/angles.h"
 #include "capture/parallel_loop.h"
 #include "compositing/billboard_place.h"
 #include "compositing/person_box.h"
@@ -27,7 +27,7 @@ using namespace std::chrono_literals;
 using calibrate::Vec3;
 using compositing::FeetStatus;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 // Below this the key is uncertain, and the show says so.
 constexpr float sure = 0.5F;
 // A camera that was left out is taken back after it has been well for so long.

@@ -1,12 +1,12 @@
 // Set files: persons.
 #include <algorithm>
-#include <numbers>
 #include <numeric>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "calibrate/angles.h"
 #include "compositing/billboard.h"
 #include "compositing/hull_march.h"
 #include "compositing/visual_hull.h"
@@ -16,7 +16,7 @@
 namespace studio {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr Range metres{-farthest_m, farthest_m};
 constexpr Range share{0, 1};
 

@@ -1,12 +1,12 @@
 // Set files: the camera and the probe.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <system_error>
 
 #include <fmt/format.h>
 
+#include "calibrate/angles.h"
 #include "calibrate/track.h"
 #include "calibrate/vignetting.h"
 #include "studio/set_sections.h"
@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr Range metres{-farthest_m, farthest_m};
 constexpr Range exposure_range{1e-9, 3600};
 constexpr Range angle_range{-3600, 3600};

@@ -1,16 +1,16 @@
 // Set files: objects, stand-ins, lamps.
 #include <algorithm>
-#include <numbers>
 
 #include <fmt/format.h>
 
+#include "calibrate/angles.h"
 #include "capture/sequence.h"
 #include "studio/set_sections.h"
 
 namespace studio {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr Range metres{-farthest_m, farthest_m};
 constexpr Range size_range{1e-6, farthest_m};
 constexpr Range share{0, 1};

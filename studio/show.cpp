@@ -34,15 +34,6 @@ struct Overloaded : Handlers... {
 // What the recording is to do from a frame on.
 using RecorderCommand = std::variant<StartRecording, StopRecording>;
 
-// What travels from the thread that makes inputs to the one that makes pictures.
-struct Work {
-  PreparedFrame frame;
-  std::int64_t dropped = 0;  // frames left out so far
-  capture::CameraStatistics plate;
-  std::optional<render::RayView> view;
-  std::vector<RecorderCommand> recorder;  // before this frame
-};
-
 compositing::DisplaySettings display_settings(const Set& set) {
   compositing::DisplaySettings settings;
   if (!set.display.display.empty()) settings.display = set.display.display;
@@ -131,6 +122,15 @@ class Show::Stages {
   }
 
  private:
+  // What travels from the thread that makes inputs to the one that makes pictures.
+  struct Work {
+    PreparedFrame frame;
+    std::int64_t dropped = 0;  // frames left out so far
+    capture::CameraStatistics plate;
+    std::optional<render::RayView> view;
+    std::vector<RecorderCommand> recorder;  // before this frame
+  };
+
   struct Closing {
     Handover<Work>& work;
     ~Closing() { work.close(); }

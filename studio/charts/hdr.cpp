@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <functional>
 #include <limits>
 #include <numbers>
@@ -19,6 +18,7 @@
 #include "capture/live_merge.h"
 #include "capture/made_sensor.h"
 #include "studio/charts/opencv_merge.h"
+#include "studio/machine.h"
 
 namespace studio {
 namespace {
@@ -177,8 +177,6 @@ double bound_stops(const Shots& shots, const Image& truth) {
   return std::sqrt(sum / count) / std::numbers::ln2;
 }
 
-double cpu_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
 class HdrChart {
  public:
   HdrChart(const ChartRequest& request, Console& console)
@@ -321,9 +319,9 @@ class HdrChart {
       for (Candidate& candidate : candidates_) {
         ChartPoint& p = candidate.point;
         console_.progress(0.2 + 0.4 * round / rounds, p.method);
-        const double begin_ms = cpu_ms();
+        const double begin_ms = cpu_ms_so_far();
         candidate.work();
-        const double taken_ms = std::max(1e-3, cpu_ms() - begin_ms);
+        const double taken_ms = std::max(1e-3, cpu_ms_so_far() - begin_ms);
         p.time_ms = round == 0 ? taken_ms : std::min(p.time_ms, taken_ms);
         if (round > 0) continue;
         const Error error = error_stops(candidate.radiance(), truth_);
@@ -342,7 +340,7 @@ class HdrChart {
                                       samples / 3);
     double best_ms = std::numeric_limits<double>::infinity();
     for (int round = 0; round < (quick_ ? 3 : 15); ++round) {
-      const double begin_ms = cpu_ms();
+      const double begin_ms = cpu_ms_so_far();
       std::uint64_t sum = 0;
       for (const auto& shot : coded_.bytes) {
         for (std::size_t i = 0; i + 8 <= shot.size(); i += 8) {
@@ -352,7 +350,7 @@ class HdrChart {
         }
       }
       std::memset(written.data(), static_cast<int>(sum % 256), written.size());
-      best_ms = std::min(best_ms, std::max(1e-3, cpu_ms() - begin_ms));
+      best_ms = std::min(best_ms, std::max(1e-3, cpu_ms_so_far() - begin_ms));
     }
     return best_ms;
   }

@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <list>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "calibrate/angles.h"
 #include "compositing/billboard.h"
 #include "compositing/billboard_place.h"
 #include "compositing/key_error.h"
@@ -30,7 +30,7 @@ namespace {
 using calibrate::Vec3;
 using compositing::BillboardCamera;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr double distance_m = 4, camera_m = 1.4, look_at_m = 0.9;
 // The walker comes towards the middle between the first two cameras, past the set's origin.
 constexpr double apart_deg = 60, way_deg = 30;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <ctime>
 #include <functional>
 #include <string>
 #include <vector>
@@ -11,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "compositing/key_trial.h"
+#include "studio/machine.h"
 
 namespace studio {
 namespace {
@@ -46,15 +46,13 @@ std::vector<Setting> settings() {
   return all;
 }
 
-double cpu_ms() { return 1e3 * static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
 // Of a few runs, the least.
 double least_ms(int runs, const std::function<void()>& work) {
   double least = 1e30;
   for (int i = 0; i < runs; ++i) {
-    const double start = cpu_ms();
+    const double start = cpu_ms_so_far();
     work();
-    least = std::min(least, cpu_ms() - start);
+    least = std::min(least, cpu_ms_so_far() - start);
   }
   return std::max(least, 1e-3);
 }

@@ -27,7 +27,7 @@ namespace {
 
 constexpr int side = 1024;
 constexpr double exposures_s[] = {1e-4, 1.6e-3, 4e-4, 1.6e-2, 6.4e-3};
-constexpr capture::Rational rate{60, 1};
+constexpr capture::Rational bracket_rate{60, 1};
 constexpr int frames_of_pass = 40;
 
 struct Format {
@@ -86,7 +86,7 @@ class ReadyCamera final : public capture::Camera {
       : reader_({.fourcc = *capture::fourcc_of_name(format.fourcc), .width = side, .height = side},
                 {{.transfer = capture::Transfer::linear}, std::nullopt, true}) {
     info_.width = info_.height = side;
-    info_.rate = rate;
+    info_.rate = bracket_rate;
     const capture::Image room = made_room();
     for (const double exposure_s : exposures_s)
       pictures_.push_back(coded(format, room, exposure_s));
@@ -105,7 +105,7 @@ class ReadyCamera final : public capture::Camera {
     reader_.read(pictures_[static_cast<std::size_t>(made) % pictures_.size()], {0, 0, side, side},
                  *image);
     capture::Frame frame;
-    frame.time = capture::time_of_frame(number_, rate);
+    frame.time = capture::time_of_frame(number_, bracket_rate);
     frame.number = number_++;
     frame.image = image;
     read_ms_ += cpu_ms_so_far() - begin_ms;
@@ -170,7 +170,7 @@ void bench_hdr(int runs, Console& console) {
   nlohmann::ordered_json figures;
   for (const Format& format : formats) {
     const Cost cost = measure(format, runs);
-    const double share = cost.total_ms() * rate.value() / 2000;
+    const double share = cost.total_ms() * bracket_rate.value() / 2000;
     console.say(fmt::format("{:<15} {:>5.1f}  {:>5.1f}  {:>5.1f}  {:>5.1f}   {:>5.0f} %",
                             format.name, cost.read_ms, cost.label_ms, cost.merge_ms,
                             cost.total_ms(), 100 * share));

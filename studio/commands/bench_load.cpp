@@ -26,7 +26,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
-constexpr int width = 640, height = 480;
+constexpr int width_px = 640, height_px = 480;
 
 double seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) * 1e-6;
@@ -75,13 +75,16 @@ BenchScene shot_of(const render::LoadReport& report) {
   const double size = std::max(length(upper - lower), 1e-6);
   shot.job.cam_from_set =
       calibrate::look_at(middle + calibrate::Vec3{0.8, -0.8, 0.5} * size, middle, 0);
-  const double focal_px = 1.1 * width;
+  const double focal_px = 1.1 * width_px;
   shot.directions = calibrate::make_direction_table(
-      {"pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}});
+      {"pinhole",
+       width_px,
+       height_px,
+       {focal_px, focal_px, (width_px - 1) / 2.0, (height_px - 1) / 2.0}});
   render::LightFollower follower;
   BenchLight light = follow_bench_sky(follower, make_bench_sky({}), {.count = 64});
   shot.environment = std::move(light.environment);
-  shot.plate = capture::make_image(height, width, 3);
+  shot.plate = capture::make_image(height_px, width_px, 3);
   shot.half_plate = capture::to_half(shot.plate);
   shot.job.lights = std::move(light.table);
   // As the headlight's paper while anything moves: one ray a pixel, the contribution cut at 95 %.

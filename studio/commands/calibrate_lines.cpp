@@ -1,7 +1,6 @@
 // platelight calibrate lines: a fish-eye's lens, from straight lines of the scene.
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -9,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/angles.h"
 #include "calibrate/lens.h"
 #include "calibrate/line_fit.h"
 #include "studio/commands/commands.h"
@@ -18,7 +18,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 struct LinesOptions {
   std::string lines;

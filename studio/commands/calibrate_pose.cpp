@@ -1,7 +1,6 @@
 // platelight calibrate pose: where a camera stands and looks, from surveyed markers or a board.
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -10,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/angles.h"
 #include "calibrate/board_detector.h"
 #include "calibrate/corner_refinement.h"
 #include "calibrate/markers.h"
@@ -25,7 +25,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 struct PoseOptions {
   std::string lens;

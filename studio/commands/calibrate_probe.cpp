@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -12,6 +11,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/angles.h"
 #include "calibrate/markers.h"
 #include "calibrate/pose_file.h"
 #include "calibrate/registration.h"
@@ -27,7 +27,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 struct ProbeOptions {
   std::string lens;

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -17,6 +16,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/angles.h"
 #include "calibrate/board_detector.h"
 #include "calibrate/corner_refinement.h"
 #include "calibrate/rig.h"
@@ -33,7 +33,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr std::size_t most_pictures = 500;  // of a camera
 
 struct RigOptions {

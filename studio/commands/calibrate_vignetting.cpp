@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -11,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/angles.h"
 #include "calibrate/pose_file.h"
 #include "calibrate/vignetting_fit.h"
 #include "capture/camera.h"
@@ -21,7 +21,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 // Of pictures of codes, where 1 is saturated. Brighter values are of HDR pictures.
 constexpr double saturation_of_codes = 0.98;
 

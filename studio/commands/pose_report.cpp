@@ -2,19 +2,19 @@
 #include "studio/commands/pose_report.h"
 
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/angles.h"
 #include "calibrate/pose_file.h"
 #include "studio/arguments.h"
 
 namespace studio {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 calibrate::Vec3 row(const calibrate::Mat3& m, std::size_t i) {
   return {m.m[3 * i], m.m[3 * i + 1], m.m[3 * i + 2]};

@@ -12,6 +12,7 @@
 #include <random>
 #include <string>
 
+#include "calibrate/angles.h"
 #include "calibrate/board_drawing.h"
 #include "calibrate/charuco.h"
 #include "calibrate/corner_refinement.h"
@@ -27,7 +28,6 @@ namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 
-constexpr double degree = std::numbers::pi / 180;
 const Board chessboard{Board::Kind::chessboard, 8, 5, .04, 0, ""};
 const Board charuco{Board::Kind::charuco, 8, 5, .04, .03, "DICT_5X5_100"};
 const Lens pinhole{"pinhole", 640, 480, {560, 560, 318, 241}};

@@ -4,15 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 #include <random>
 
+#include "calibrate/angles.h"
 #include "tests/calibrate/made_board_picture.h"
 
 namespace calibrate {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
 const Board board{Board::Kind::chessboard, 7, 5, .04, 0, ""};
 const Lens fisheye{"kannala_brandt", 640, 640, {205, 205, 318.3, 321.6, -.01, .002}};
 

@@ -1,14 +1,11 @@
 // The table of directions agrees with the lens.
 #include <gtest/gtest.h>
 
-#include <numbers>
-
+#include "calibrate/angles.h"
 #include "calibrate/lens.h"
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 void expect_table_of(const Lens& lens, int step) {
   SCOPED_TRACE(lens.model);

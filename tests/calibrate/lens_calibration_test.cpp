@@ -3,17 +3,15 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "calibrate/angles.h"
 #include "calibrate/made_boards.h"
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 using ::testing::AnyOf;
 using ::testing::Contains;

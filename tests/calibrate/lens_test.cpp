@@ -8,11 +8,12 @@
 #include <random>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
+
 namespace calibrate {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr double degree = pi / 180;
+using std::numbers::pi;
 
 // Lenses with the angle up to which each is defined.
 struct Sample {

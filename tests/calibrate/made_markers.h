@@ -9,11 +9,12 @@
 
 #include <Eigen/Dense>
 
+#include "calibrate/angles.h"
 #include "calibrate/registration.h"
 
 namespace made {
 
-inline constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 // Sees up to 110 degrees off its axis.
 inline calibrate::Lens fish_eye() {

@@ -4,16 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <numbers>
 #include <random>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "calibrate/track.h"
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 Vec3 random_vector(std::mt19937& random, double sigma) {
   std::normal_distribution<double> normal(0, sigma);

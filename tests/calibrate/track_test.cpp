@@ -13,7 +13,7 @@
 namespace calibrate {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // About the set's z by an angle.
 Quaternion turn(double angle_rad) {

@@ -5,16 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <random>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "calibrate/vignetting.h"
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 Lens fish_eye() { return {"equisolid", 200, 200, {70, 99.5, 99.5}, 85 * degree}; }
 

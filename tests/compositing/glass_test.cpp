@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
-#include <numbers>
 #include <random>
 
+#include "calibrate/angles.h"
 #include "render/kept_transport.h"
 #include "render/light_follower.h"
 #include "render/reference.h"
@@ -21,7 +21,7 @@ namespace {
 
 using render::Vec3f;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 TEST(Fresnel, IsWhatTheFormulasSayAtEveryAngle) {
   for (const double index : {1.0, 1.33, 1.5, 2.4, 3.0}) {

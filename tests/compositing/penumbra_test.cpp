@@ -19,7 +19,7 @@ namespace {
 using calibrate::Vec3;
 using render::Vec3f;
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // A round lamp far away, as rings of a map about its middle: radiance by angle, in double.
 struct Lamp {

@@ -5,16 +5,16 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <vector>
 
+#include "calibrate/angles.h"
 #include "compositing/made_walker.h"
 
 namespace compositing {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 // Seen by cameras about the origin. Nobody: no view.
 std::vector<OutlinedView> views_of(const std::vector<Capsule>& shape,

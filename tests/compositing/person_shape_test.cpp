@@ -5,15 +5,16 @@
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <random>
 #include <stdexcept>
 #include <vector>
 
+#include "calibrate/angles.h"
+
 namespace compositing {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 double hull_error_at(std::vector<double> cameras_deg, double view_deg) {
   for (double& camera : cameras_deg) camera *= degree;

@@ -4,17 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
 #include "../render/plain_shapes.h"
 #include "../render/sun_and_sky.h"
+#include "calibrate/angles.h"
 #include "compositing/stand_in.h"
 
 namespace {
 
 using namespace render;  // the reference is render's; only its stand-ins need this folder
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 
 // A floor of the real world under a camera that looks straight down from 10 m: pixels of 0.1 m.
 struct Floor {
@@ -107,13 +107,13 @@ TEST(RenderReference, TakesTheShareOfTheSkyThatAnObjectHides) {
 TEST(RenderReference, LightsTheFloorByAVirtualLampThroughThePlatesOwnAlbedo) {
   Floor floor(3);
   const float plate = floor.middle(floor.plate, 0);
-  const Environment even = make_even_environment(1, 64);  // irradiance pi
+  const Environment even = make_even_environment(1, 64);  // irradiance pi_f
   floor.job.lights.lamps.push_back({{0, 0, 1}, {}, {2, 2, 2}});
   const capture::Image picture = floor.render(even, 256);
-  // albedo = pi plate / pi, out = plate + albedo / pi * 2.
-  EXPECT_NEAR(floor.middle(picture, 0), plate + plate / pi * 2, 0.01 * plate);
+  // albedo = pi_f plate / pi_f, out = plate + albedo / pi_f * 2.
+  EXPECT_NEAR(floor.middle(picture, 0), plate + plate / pi_f * 2, 0.01 * plate);
   const Environment dark = make_even_environment(0, 8);
-  EXPECT_NEAR(floor.middle(floor.render(dark, 64), 0), plate + 0.2F / pi * 2, 2e-3)
+  EXPECT_NEAR(floor.middle(floor.render(dark, 64), 0), plate + 0.2F / pi_f * 2, 2e-3)
       << "no light, no albedo: the set's";
 }
 

@@ -52,8 +52,8 @@ TEST(FrameJob, RendersTheSameBitsInAnotherProcess) {
   std::ofstream(dir / "in", std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()),
              static_cast<std::streamsize>(bytes.size()));
-  const std::string command = std::string(PLATELIGHT_RENDER_CHILD) + " < " + (dir / "in").string() +
-                              " > " + (dir / "out").string();
+  const std::string command =
+      PLATELIGHT_RENDER_CHILD " < " + (dir / "in").string() + " > " + (dir / "out").string();
   ASSERT_EQ(std::system(command.c_str()), 0);
   std::ifstream out(dir / "out", std::ios::binary);
   const std::vector<char> got{std::istreambuf_iterator<char>(out), {}};

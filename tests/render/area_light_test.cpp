@@ -11,7 +11,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // A sheet of width x height metres in the plane z = `z`, facing down, in steps x steps squares.
 SceneDescription sheet(float width, float height, float z, int steps = 1) {

@@ -11,7 +11,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 StandardParameters matte(float r, float g, float b) {
   StandardParameters p;

@@ -13,7 +13,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // A body of glass over a dull floor of half width 20 at z = 0.
 SceneDescription over_floor(std::shared_ptr<const Mesh> body,

@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "calibrate/angles.h"
 #include "render/light_follower.h"
 #include "render/lobe_filter.h"
 #include "render/shader.h"
@@ -21,7 +22,7 @@
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 
 Vec3f random_direction(std::mt19937& random) {
   std::normal_distribution<float> normal;
@@ -73,7 +74,7 @@ TEST(IrradianceOf, IsPiUnderAnEvenSkyFromEverySide) {
   const Environment env = make_even_environment(1, 64);
   std::mt19937 random(2);
   for (int i = 0; i < 20; ++i) {
-    EXPECT_NEAR(irradiance_of(env, random_direction(random)).y, pi, 2e-3F);
+    EXPECT_NEAR(irradiance_of(env, random_direction(random)).y, pi_f, 2e-3F);
   }
 }
 

@@ -4,16 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <limits>
-#include <numbers>
 #include <random>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "tests/render/sun_and_sky.h"
 
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 
 // A plate camera under the sky, and what it films at a gain, with values above 1 clipped.
 struct MadePlate {
@@ -108,7 +108,7 @@ TEST(MatchByPatch, FindsTheGainThatGivesThePatchItsAlbedo) {
   }
   plate.at(12, 25, 0) = 1.0F;  // a glint
   const Patch patch{20, 10, 20, 10};
-  const Vec3f irradiance{2 * pi, pi, pi / 2};
+  const Vec3f irradiance{2 * pi_f, pi_f, pi_f / 2};
   MatchResult result = match_by_patch(plate, patch, {0.6F, 0.6F, 0.6F}, irradiance);
   EXPECT_NEAR(result.gain[0], 0.25F, 1e-6F);
   EXPECT_NEAR(result.gain[1], 0.5F, 1e-6F);

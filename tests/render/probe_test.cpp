@@ -8,6 +8,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "tests/render/sun_and_sky.h"
 
 namespace render {
@@ -18,8 +19,8 @@ using calibrate::Pose;
 using calibrate::Vec2;
 using calibrate::Vec3;
 
-constexpr double pi = std::numbers::pi;
-constexpr double degree = pi / 180;
+using calibrate::degree;
+using std::numbers::pi;
 
 Lens fisheye(int size, double max_angle_deg = 93) {
   const double centre = (size - 1) / 2.0;

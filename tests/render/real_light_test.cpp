@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <numbers>
 #include <optional>
 
+#include "calibrate/angles.h"
 #include "capture/make_hdr.h"
 #include "capture/rgbe.h"
 #include "render/light_table.h"
@@ -17,7 +17,7 @@
 namespace render {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 std::filesystem::path real_data() {
   const char* place = std::getenv("PLATELIGHT_DATA");

@@ -18,7 +18,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 // One pixel that sees the origin from `from`, a few millimetres of it.
 struct Look {

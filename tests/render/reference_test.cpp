@@ -5,16 +5,16 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <numbers>
 #include <string>
 
+#include "calibrate/angles.h"
 #include "plain_shapes.h"
 #include "sun_and_sky.h"
 
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 
 struct Shot {
   calibrate::DirectionTable directions;
@@ -130,10 +130,10 @@ TEST(RenderReference, ShadesAPlaneAsItsIntegralSays) {
   const StandardWeights w = standard_weights(surface, view);
   const Vec3f irradiance = irradiance_of(sky, {0, 0, 1});
   const Vec3f mirrored_sky = radiance_of(sky, normalize(Vec3f{-1, 0, 1}), 0);
-  EXPECT_NEAR(picture.at(0, 0, 0), w.diffuse.x * irradiance.x / pi + w.specular.x * mirrored_sky.x,
-              0.004);
-  EXPECT_NEAR(picture.at(0, 0, 2), w.diffuse.z * irradiance.z / pi + w.specular.z * mirrored_sky.z,
-              0.004);
+  EXPECT_NEAR(picture.at(0, 0, 0),
+              w.diffuse.x * irradiance.x / pi_f + w.specular.x * mirrored_sky.x, 0.004);
+  EXPECT_NEAR(picture.at(0, 0, 2),
+              w.diffuse.z * irradiance.z / pi_f + w.specular.z * mirrored_sky.z, 0.004);
 }
 
 TEST(RenderReference, SplitsTwoSurfacesIntoTheirLobesAsTheirIntegralsSay) {
@@ -165,7 +165,7 @@ TEST(RenderReference, SplitsTwoSurfacesIntoTheirLobesAsTheirIntegralsSay) {
   const float mirrored_sky = radiance_of(sky, normalize(Vec3f{-1, 0, 1}), 0).y;
   const StandardWeights floor = standard_weights(surface, view);
   const float floor_light =
-      floor.diffuse.y * irradiance_of(sky, {0, 0, 1}).y / pi + floor.specular.y * mirrored_sky;
+      floor.diffuse.y * irradiance_of(sky, {0, 0, 1}).y / pi_f + floor.specular.y * mirrored_sky;
   surface.base = {1, 0.7F, 1};
   surface.transmission = 1;
   const StandardWeights through = standard_weights(surface, view);
@@ -182,7 +182,7 @@ TEST(RenderReference, SplitsTwoSurfacesIntoTheirLobesAsTheirIntegralsSay) {
 TEST(RenderReference, GathersALobeAsItsIntegralSays) {
   SunAndSky made;
   made.sun_radius_rad = 0.06F;
-  made.sun_azimuth_rad = pi;  // before the camera, so that its reflection is near
+  made.sun_azimuth_rad = pi_f;  // before the camera, so that its reflection is near
   made.sun_elevation_rad = 0.9F;
   const Environment sky = make_sun_and_sky(made, 128);
   for (const float roughness : {0.15F, 0.3F, 0.7F}) {
@@ -297,7 +297,7 @@ TEST(RenderReference, LightsASurfaceByTheLawOfTheInverseSquare) {
   surface.base = {1, 1, 1};
   surface.normal = surface.coat_normal = {0, 0, 1};
   const float diffuse = standard_weights(surface, {0, 0, 1}).diffuse.x;
-  EXPECT_NEAR(picture.at(0, 0), diffuse * 8 / 4 / pi, 1e-3);
+  EXPECT_NEAR(picture.at(0, 0), diffuse * 8 / 4 / pi_f, 1e-3);
 }
 
 TEST(RenderReference, StaysFiniteUnderAnOddSky) {

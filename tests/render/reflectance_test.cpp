@@ -14,7 +14,7 @@
 namespace render {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 constexpr Vec3f up{0, 0, 1};
 constexpr std::array cosines{1.0F, 0.9F, 0.7F, 0.5F, 0.3F, 0.1F, 0.02F};
 constexpr std::array roughnesses{mirror_roughness, 0.05F, 0.1F, 0.2F, 0.4F, 0.7F, 1.0F};

@@ -2,21 +2,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <random>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "calibrate/angles.h"
 #include "calibrate/lens_calibration.h"
 #include "calibrate/made_boards.h"
 #include "calibrate/rotation_fit.h"
 
 namespace calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
 
 using ::testing::Contains;
 using ::testing::HasSubstr;

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "calibrate/angles.h"
 #include "calibrate/track.h"
 #include "capture/camera.h"
 #include "compositing/made_walker_camera.h"
@@ -28,7 +28,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 constexpr int video_width = 160, video_height = 200;
 constexpr int walking = 16;  // frame of the made walker at which the videos begin
 

@@ -23,12 +23,11 @@ namespace {
 using calibrate::Vec3;
 
 bool has_data() {
-  return std::filesystem::exists(std::string(PLATELIGHT_SOURCE_DIR) +
-                                 "/../shared/data/MANIFEST.md");
+  return std::filesystem::exists(PLATELIGHT_SOURCE_DIR "/../shared/data/MANIFEST.md");
 }
 
 std::string set_path(const std::string& name) {
-  return std::string(PLATELIGHT_SOURCE_DIR) + "/studio/sets/" + name;
+  return PLATELIGHT_SOURCE_DIR "/studio/sets/" + name;
 }
 
 struct Shot {

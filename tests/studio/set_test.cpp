@@ -7,16 +7,17 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <numbers>
 #include <string>
 #include <vector>
+
+#include "calibrate/angles.h"
 
 namespace studio {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double degree = std::numbers::pi / 180;
+using calibrate::degree;
 
 // A directory of this test's own, removed at its end.
 class SetFile : public testing::Test {
