@@ -9,6 +9,7 @@
 
 #include "render/embree_context.h"
 #include "render/kept_transport.h"
+#include "render/refinement.h"
 #include "render/standard.h"
 #include "render/trace.h"
 
@@ -58,6 +59,8 @@ void CellBaker::bake(const FrameContext& frame,
                       std::min(cell_size, table.height - y0)};
   if (frame.inputs.count_rays) transport.counts.resize(cell_pixels);
   counting_ = frame.inputs.count_rays ? transport.counts.data() : nullptr;
+  smooths_ = stage == smoothed_stage;
+  blend_contrast_ = blend_contrast_of_stage(frame.job->effort, stage);
   cuts_glass_later_ = effort_.aa_samples > 1 && stage == finished_stage;
   compares_centres_ = effort_.aa_samples > 1;
   compares_further_ = effort_.aa_tolerance > 0 || counting_ != nullptr;
@@ -72,15 +75,17 @@ void CellBaker::bake(const FrameContext& frame,
   compact_shares_.clear();
   lamps_apart_.fill(0);
   sent_.fill(0);
+  looked_up_.direction = {};
   trace_centres();
-  const bool smooth_edges = effort_.aa_samples > 1;
-  if (smooth_edges) keep_centres();
+  const bool finds_edges = effort_.aa_samples > 1;
+  if (finds_edges) keep_centres();
   shade_centres();
-  if (smooth_edges) {
+  if (finds_edges) {
     trace_ring();
     find_edges();
     find_glints();
     sample_edges();
+    blend_neighbours();
     if (counting_) count_errors();
   }
   pack();

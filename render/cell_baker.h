@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -94,11 +95,23 @@ class CellBaker final : public RaySink {
     surface,  // another surface begins: those that meet what a neighbour met share its radiance
     glint,    // mirrored light changes quickly: they share only the light that arrives
     shadow,   // the light that arrives does: they share nothing
+    blend,    // light changes, but too little for rays yet: neighbours are blended
   };
 
   struct Further {
     std::uint16_t pixel;
     std::uint16_t index;  // in the frame's pattern
+  };
+
+  // What a cone sees of the environment.
+  struct LookUp {
+    Vec3f direction;  // none is zero
+    float roughness;
+    Spread spread;
+    bool diffused;  // without compact sources
+    std::size_t count = 0;
+    std::array<MapSample, most_map_samples> places;
+    std::optional<Vec3f> radiance;  // if it was asked for
   };
 
   // Of points: the irradiance that is planned.
@@ -177,6 +190,9 @@ class CellBaker final : public RaySink {
   bool glows_by_lamps(const ShadePoint& p) const;
   void add_lamps_of_centre(const Lobe& lobe, std::size_t centre);
   void add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed);
+  LookUp& look_up(Vec3f direction, float roughness, const Spread& spread, bool diffused);
+  Vec3f planned_radiance(LookUp& looked_up) const;
+  bool compact_is_seen_in(const Lobe& lobe) const;
   float compact_density(const Lobe& lobe, std::size_t light) const;
   void add_environment(std::size_t slot,
                        std::size_t target,
@@ -194,6 +210,9 @@ class CellBaker final : public RaySink {
   void find_glints();
   bool lit_unlike(std::size_t a, std::size_t b) const;
   void sample_edges();
+  void blend_neighbours();
+  void take_from_centre(std::size_t k, int dx, int dy, int times);
+  void trace_further(int count);
   void finish_further(int count);
   int neighbour_of(int i, const Further& f) const;
   CellMask edges() const;
@@ -202,7 +221,9 @@ class CellBaker final : public RaySink {
   Vec3f spread_of_further(std::size_t k) const;
   void count_errors();
   Vec3f direction_in(int x, int y, const std::array<float, 2>& offset) const;
-  void add_further(std::size_t k, const Sample& sample);
+  bool takes_rays(std::size_t k) const { return edge_[k] != Edge::none && edge_[k] != Edge::blend; }
+  void clear_further(std::size_t k);
+  void add_further(std::size_t k, const Sample& sample, int times);
 
   RayStream stream_;
   GatherWorkspace gather_;
@@ -228,6 +249,7 @@ class CellBaker final : public RaySink {
   std::vector<Lobe> lobes_;
   std::vector<Vec3f> compact_shares_;    // (compact light, centre): what glass lets by; none = all
   std::vector<QueuedRay> queue_;         // capacity reserved
+  LookUp looked_up_{};                   // last, in this cell
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
   std::uint32_t pushed_ = 0;
   std::array<int, cell_pixels> sent_{};  // rays that surfaces have sent on, by pixel
@@ -254,6 +276,8 @@ class CellBaker final : public RaySink {
   RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for
   // Whether anything is decided by what samples see: centres', further ones'.
   bool compares_centres_ = false, compares_further_ = false;
+  bool smooths_ = false;           // only edges of things take rays
+  float blend_contrast_ = 0;       // 0 = neighbours are not blended
   bool cuts_glass_later_ = false;  // rays inside clear bodies are followed further than others
   int x0_ = 0, y0_ = 0;
   int block_ = 1;      // pixels a side that share a camera ray

@@ -75,7 +75,7 @@ bool CellBaker::add_plate(std::size_t slot,
        static_cast<float>((q->y + 0.5) * shrunk - 0.5), static_cast<std::uint16_t>(target),
        static_cast<std::uint16_t>(frame_->first_plate_level + static_cast<std::size_t>(level)),
        shadow_point});
-  samples_[slot].added += weight * radiance_of(*frame_->planned, planned_direction, 0);
+  samples_[slot].added += weight * planned_radiance(look_up(planned_direction, 0, {}, false));
   return true;
 }
 

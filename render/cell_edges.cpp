@@ -20,6 +20,7 @@ constexpr Scene::Surface no_hit{~0U, ~0U};
 constexpr int few_samples = 4;
 constexpr int pattern_middle = 1;
 constexpr std::size_t own_centre = 4;  // of a pixel's neighbours, row by row
+constexpr float blend_parts = 1024;    // of a blend of neighbours, in whole numbers
 
 Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
@@ -115,12 +116,15 @@ void CellBaker::find_glints() {
     if (!is_inside(a) || !is_inside(b)) return;
     const Vec3f shown_a = clipped(samples_[a].added), shown_b = clipped(samples_[b].added);
     const float brightest = std::clamp(std::max(largest(shown_a), largest(shown_b)), darkest, 1.0F);
-    if (largest(abs(shown_a - shown_b)) > least * std::sqrt(brightest)) {
-      for (const std::size_t k : {a, b}) {
+    const float step = largest(abs(shown_a - shown_b)) / std::sqrt(brightest);
+    for (const std::size_t k : {a, b}) {
+      if (step > least && !smooths_) {
         if (edge_[k] != Edge::shadow) edge_[k] = Edge::glint;
+      } else if (blend_contrast_ > 0 && step > blend_contrast_) {
+        if (edge_[k] == Edge::none) edge_[k] = Edge::blend;
       }
     }
-    if (lit_unlike(a, b)) edge_[a] = edge_[b] = Edge::shadow;
+    if (!smooths_ && lit_unlike(a, b)) edge_[a] = edge_[b] = Edge::shadow;
   };
   for (std::size_t y = 0; y < cell_size; ++y) {
     for (std::size_t x = 0; x < cell_size; ++x) {
@@ -176,23 +180,38 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
   return found;
 }
 
+// The camera rays of `further_`.
+void CellBaker::trace_further(int count) {
+  trace(count, true, RayKind::camera,
+        frame_->pixel_angle / std::sqrt(static_cast<float>(samples_each_)));
+  statistics_->primary_rays += static_cast<std::uint64_t>(count);
+  for (int i = 0; counting_ && i < count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (stream_.mask[k]) ++counting_[further_[k].pixel].rays;
+  }
+}
+
+// So many of a pixel's further samples are what the centre beside it shows.
+void CellBaker::take_from_centre(std::size_t k, int dx, int dy, int times) {
+  const int centre = static_cast<int>(k) + dy * cell_size + dx;
+  add_further(k, samples_[static_cast<std::size_t>(centre)], times);
+  std::uint16_t& taken = borrowed_[k][static_cast<std::size_t>((dy + 1) * 3 + dx + 1)];
+  taken = static_cast<std::uint16_t>(taken + times);
+}
+
 void CellBaker::finish_further(int count) {
   const float finer = 1 / std::sqrt(static_cast<float>(samples_each_));
-  trace(count, true, RayKind::camera, frame_->pixel_angle * finer);
-  statistics_->primary_rays += static_cast<std::uint64_t>(count);
+  trace_further(count);
   int shaded = 0;
   std::size_t leaving = 0;
   std::array<std::uint16_t, stream_rays> pixel_of;
   std::size_t used = 0;
   for (int i = 0; i < count; ++i) {
     const Further& f = further_[static_cast<std::size_t>(i)];
-    if (counting_ && stream_.mask[static_cast<std::size_t>(i)]) ++counting_[f.pixel].rays;
     const int neighbour = neighbour_of(i, f);
     if (neighbour >= 0 && edge_[f.pixel] == Edge::surface) {
-      add_further(f.pixel, samples_[static_cast<std::size_t>(neighbour)]);
-      const int dx = neighbour % cell_size - f.pixel % cell_size;
-      const int dy = neighbour / cell_size - f.pixel / cell_size;
-      ++borrowed_[f.pixel][static_cast<std::size_t>((dy + 1) * 3 + dx + 1)];
+      take_from_centre(f.pixel, neighbour % cell_size - f.pixel % cell_size,
+                       neighbour / cell_size - f.pixel / cell_size, 1);
       continue;
     }
     const std::size_t slot = cell_pixels + used;
@@ -213,22 +232,22 @@ void CellBaker::finish_further(int count) {
   lender_.fill(-1);
   bounce();
   for (std::size_t i = 0; i < used; ++i) {
-    add_further(pixel_of[i], samples_[cell_pixels + i]);
+    add_further(pixel_of[i], samples_[cell_pixels + i], 1);
   }
 }
 
-// More camera rays in pixels that an edge crosses. The centre's own sample makes room for them; at
-// a stage of few rays it is the one of them that goes through the middle. Pixels that are still
-// uncertain take more, three times as many as they have, and again.
+// More camera rays in pixels that an edge crosses. While edges are only smoothed, these are edges
+// of things alone, and nearly all of the rays show what a centre beside them does. The centre's own
+// sample makes room for them; at a stage of few rays it is the one of them that goes through the
+// middle. Pixels that are still uncertain take more, three times as many as they have, and again.
 void CellBaker::sample_edges() {
   const bool takes_centre = effort_.aa_samples <= few_samples;
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (edge_[k] == Edge::none) continue;
-    squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
-    borrowed_[k] = {};
+    if (!takes_rays(k)) continue;
+    clear_further(k);
     if (!takes_centre) continue;
     borrowed_[k][own_centre] = 1;
-    add_further(k, samples_[k]);
+    add_further(k, samples_[k], 1);
   }
   int first = 0;
   for (int end = effort_.aa_samples; end <= samples_max; first = end, end *= 4) {
@@ -255,10 +274,36 @@ void CellBaker::sample_edges() {
   }
 }
 
+// By a tent as wide as two pixels, of those that show the same surface. What is brighter than a
+// display counts the less, so that its edge is smooth as displayed.
+void CellBaker::blend_neighbours() {
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (edge_[k] != Edge::blend) continue;
+    clear_further(k);
+    const int x = static_cast<int>(k % cell_size), y = static_cast<int>(k / cell_size);
+    const auto met = [&](int px, int py) -> const Met& {
+      return met_[static_cast<std::size_t>((py + 1) * ring_size + px + 1)];
+    };
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int px = x + dx, py = y + dy;
+        const bool in = px >= 0 && py >= 0 && px < cell_size && py < cell_size &&
+                        is_inside(static_cast<std::size_t>(py * cell_size + px)) &&
+                        continuous(met(x, y), met(px, py), frame_->pixel_angle, frame_->camera);
+        if (!in) continue;
+        const auto tent = static_cast<float>((2 - std::abs(dx)) * (2 - std::abs(dy)));
+        const float shown = largest(samples_[static_cast<std::size_t>(py * cell_size + px)].added);
+        const float times = blend_parts * tent / std::max(shown, 1.0F);
+        take_from_centre(k, dx, dy, std::max(static_cast<int>(times), 1));
+      }
+    }
+  }
+}
+
 CellMask CellBaker::edges() const {
   CellMask mask{};
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (edge_[k] != Edge::none) mask[k / 64] |= std::uint64_t{1} << (k % 64);
+    if (takes_rays(k)) mask[k / 64] |= std::uint64_t{1} << (k % 64);
   }
   return mask;
 }
@@ -301,9 +346,10 @@ void CellBaker::count_errors() {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     const auto n = static_cast<float>(counts_[k]);
     if (edge_[k] == Edge::none || !(n > 1)) continue;
-    // Not less than rounding leaves.
+    // Not less than rounding leaves. What was blended is as sure as one of it.
     const float spread = std::max(largest(spread_of_further(k)), 0.0F);
-    counting_[k].error = std::sqrt(spread / (n * (n - 1)));
+    const bool blended = edge_[k] == Edge::blend;
+    counting_[k].error = std::sqrt(spread / (blended ? n : n * (n - 1)));
   }
 }
 
@@ -321,14 +367,20 @@ Vec3f CellBaker::direction_in(int x, int y, const std::array<float, 2>& offset) 
   return a + (b - a) * fx + (c - a) * fy;
 }
 
-void CellBaker::add_further(std::size_t k, const Sample& sample) {
-  ++counts_[k];
+void CellBaker::clear_further(std::size_t k) {
+  squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
+  borrowed_[k] = {};
+}
+
+void CellBaker::add_further(std::size_t k, const Sample& sample, int times) {
+  counts_[k] = static_cast<std::uint16_t>(counts_[k] + times);
+  const auto n = static_cast<float>(times);
   const Vec3f shown = clipped(sample.added);
   // Whatever the plate shows: decisions hold from frame to frame.
   const Vec3f behind = sample.plate * plate_contrast;
-  shown_sum_[k] += shown;
-  behind_sum_[k] += behind;
-  squares_[k] += shown * shown + behind * behind;
+  shown_sum_[k] += shown * n;
+  behind_sum_[k] += behind * n;
+  squares_[k] += (shown * shown + behind * behind) * n;
 }
 
 }  // namespace render

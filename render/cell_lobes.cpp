@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "calibrate/angles.h"
 #include "render/cell_baker.h"
 #include "render/standard.h"
 #include "render/trace.h"
@@ -11,7 +12,7 @@
 namespace render {
 namespace {
 
-constexpr float pi = std::numbers::pi_v<float>;
+using calibrate::pi_f;
 constexpr float widest_rad = 1;  // cones end here
 // A lobe whose alpha is more than so many radii of a compact source sees it as a point, others in
 // so many parts.
@@ -23,6 +24,9 @@ constexpr float far_source = 3;
 // not what they see where they come out, and that may be the sun. One ray a pixel shows nothing
 // that small, and pictures that still sharpen have no time for it.
 constexpr float inside_glass = 0.125F;
+// What compact lights may add in a lobe at most, of what a ray that is not followed may show, for
+// nobody to ask whether they are in sight.
+constexpr float unseen_compact = 1.0F / 64;
 
 // Not wider than cones get.
 Vec3f bounded(Vec3f turn) {
@@ -71,7 +75,7 @@ bool CellBaker::turn_within_lobe(const ShadePoint& from, std::uint32_t number, N
   const float density = lobe_density(ray.normal, view, ray.roughness, direction);
   if (!(density > 0)) return false;
   const float own_rad = 0.5F * (length(ray.spread.a) + length(ray.spread.b));
-  const float share_rad = 2 / std::sqrt(pi * density * static_cast<float>(samples_each_));
+  const float share_rad = 2 / std::sqrt(pi_f * density * static_cast<float>(samples_each_));
   const float width_rad = std::min(calibrate::hypotenuse(own_rad, share_rad), widest_rad);
   const float into = dot(direction, from.hit.geometric_normal);
   if (into < 0) direction -= from.hit.geometric_normal * (2 * into);
@@ -102,9 +106,16 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
                             : share_without_compact(*frame_->planned, ray.roughness, ray.spread);
     if (share > 0 || lamps) {
       const float area = length(asked.spread.a) * length(asked.spread.b);
-      lobes_.push_back({&from, SeenLobe(asked.normal, from.hit.geometric_normal, -from.incoming),
-                        asked.throughput, 0.5F * std::sqrt(area), asked.roughness, share, pushed_,
-                        asked.kind == RayKind::difference, lamps});
+      const Lobe lobe{&from,
+                      SeenLobe(asked.normal, from.hit.geometric_normal, -from.incoming),
+                      asked.throughput,
+                      0.5F * std::sqrt(area),
+                      asked.roughness,
+                      share,
+                      pushed_,
+                      asked.kind == RayKind::difference,
+                      lamps};
+      if (lamps || compact_is_seen_in(lobe)) lobes_.push_back(lobe);
     }
   }
   // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
@@ -118,9 +129,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const Spread cone = straight || weight >= least ? ray.spread : rounded(ray.spread, ray.direction);
   const auto too_dim = [&] {
     if (straight || weight >= least) return weight < least;
-    const float brightest =
-        std::max(largest(radiance_of(*frame_->planned, ray.direction, ray.roughness, cone)),
-                 frame_->brightest_video);
+    const Vec3f radiance = planned_radiance(look_up(ray.direction, ray.roughness, cone, false));
+    const float brightest = std::max(largest(radiance), frame_->brightest_video);
     return weight * brightest < least;
   };
   if (deep || many || too_dim()) {
@@ -145,6 +155,33 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
                     static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps, ray.media});
 }
 
+// Places in the environment. A ray that is cut asks twice: how bright is it there, and what then.
+CellBaker::LookUp& CellBaker::look_up(Vec3f direction,
+                                      float roughness,
+                                      const Spread& spread,
+                                      bool diffused) {
+  LookUp& l = looked_up_;
+  if (l.direction == direction && l.roughness == roughness && l.spread.a == spread.a &&
+      l.spread.b == spread.b && l.diffused == diffused)
+    return l;
+  l.direction = direction, l.roughness = roughness, l.spread = spread, l.diffused = diffused;
+  l.radiance.reset();
+  l.count = diffused ? find_diffused_samples(*frame_->planned, direction, spread, l.places)
+                     : find_map_samples(*frame_->planned, direction, roughness, spread, l.places);
+  return l;
+}
+
+// Of the planned light.
+Vec3f CellBaker::planned_radiance(LookUp& l) const {
+  if (l.radiance) return *l.radiance;
+  Vec3f sum{};
+  for (const auto& [x, y, share, level] : std::span(l.places).first(l.count)) {
+    sum += radiance_at(*frame_->planned_levels[level], x, y) * share;
+  }
+  l.radiance = sum;
+  return sum;
+}
+
 void CellBaker::add_environment(std::size_t slot,
                                 std::size_t target,
                                 Vec3f direction,
@@ -152,18 +189,13 @@ void CellBaker::add_environment(std::size_t slot,
                                 const Spread& spread,
                                 bool one_of_many,
                                 Vec3f weight) {
-  std::array<MapSample, most_map_samples> places;
-  const std::size_t count =
-      one_of_many ? find_diffused_samples(*frame_->planned, direction, spread, places)
-                  : find_map_samples(*frame_->planned, direction, roughness, spread, places);
-  const bool decides = slot < cell_pixels ? compares_centres_ : compares_further_;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto& [x, y, share, level] = places[i];
+  LookUp& l = look_up(direction, roughness, spread, one_of_many);
+  for (const auto& [x, y, share, level] : std::span(l.places).first(l.count)) {
     transport_->environment.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
                                        static_cast<std::uint16_t>(level)});
-    if (!decides) continue;
-    samples_[slot].added += weight * radiance_at(*frame_->planned_levels[level], x, y) * share;
   }
+  const bool decides = slot < cell_pixels ? compares_centres_ : compares_further_;
+  if (decides) samples_[slot].added += weight * planned_radiance(l);
 }
 
 // What lobes mirror of compact lights that their points see; of a real surface's, less those that
@@ -239,6 +271,19 @@ void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
   samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;
 }
 
+// Whether the compact lights, were nothing in their way, would add enough in a lobe to be worth
+// shadow rays.
+bool CellBaker::compact_is_seen_in(const Lobe& lobe) const {
+  const float least = (1 - effort_.accuracy) * unseen_compact;
+  float sum = 0;
+  for (const std::uint32_t light : frame_->compact) {
+    const Vec3f most = lobe.throughput * frame_->planned_table->lights[light].irradiance;
+    sum += largest(most) * compact_density(lobe, light) * lobe.share;
+    if (sum >= least) return true;
+  }
+  return false;
+}
+
 // Whether a lobe mirrors lamps: where it is wider than each of them, so that they add up to the
 // surface that they are samples of. A narrower one has to meet that itself.
 bool CellBaker::mirrors_lamps(const ShadePoint& from, const NewRay& ray) const {
@@ -250,7 +295,7 @@ bool CellBaker::mirrors_lamps(const ShadePoint& from, const NewRay& ray) const {
   for (const LocalLight& lamp : frame_->job->lights.lamps) {
     if (lamp.instance == no_instance) continue;
     const Vec3f to = lamp.position - from.hit.position;
-    if (lamp.area_m2 > pi * dot(to, to) * squared_rad) return false;
+    if (lamp.area_m2 > pi_f * dot(to, to) * squared_rad) return false;
     any = true;
   }
   return any;
@@ -287,7 +332,7 @@ void CellBaker::add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed) {
   const Vec3f direction = to / std::sqrt(squared);
   const float facing = -dot(lamp.normal, direction);
   if (!(facing > 0)) return;
-  const float disc = lamp.area_m2 / pi;
+  const float disc = lamp.area_m2 / pi_f;
   const float blur_rad = calibrate::hypotenuse(std::sqrt(disc / squared), lobe.cone_rad);
   const float density = lobe.seen.blurred(lobe.roughness, blur_rad, direction);
   const Vec3f weight = lobe.throughput * passed * (density * facing / (squared + disc));
@@ -332,7 +377,7 @@ float CellBaker::compact_density(const Lobe& lobe, std::size_t light) const {
   for (std::uint32_t i = 0; i < parts_of_source; ++i) {
     const auto [area, turn] = numbers_of(p, number, sample_of(p) * parts_of_source + i).next_pair();
     const float radius = std::sqrt(area);
-    sum += part(radius * std::cos(2 * pi * turn), radius * std::sin(2 * pi * turn), blur_rad);
+    sum += part(radius * std::cos(2 * pi_f * turn), radius * std::sin(2 * pi_f * turn), blur_rad);
   }
   return sum * (1.0F / parts_of_source);
 }

@@ -85,6 +85,7 @@ void subtract_open(Receivers& r, std::size_t k, const DirectionalLight& light) {
 // That a tested light may stand for: where a point faces few of those that it tests, they are too
 // few to tell how much light there is.
 constexpr float most_stood_for = 16;
+constexpr float rough_accuracy = 0.5F;  // from here on, points that count little test half as many
 
 struct Box {
   Vec3f centre, half;
@@ -133,7 +134,8 @@ std::uint32_t stride_of(const Effort& effort, float share, const DirectionalLigh
   if (light.compact != 0) return 1;
   if (share == 0) return 0;
   if (effort.accuracy >= 1 || share >= 0.5F) return 1;
-  return share >= 0.2F ? 2 : share >= 0.05F ? 4 : 8;
+  const std::uint32_t stride = share >= 0.2F ? 2 : share >= 0.05F ? 4 : 8;
+  return effort.accuracy > rough_accuracy ? stride : 2 * stride;
 }
 
 bool shines_on(const Receivers& r, std::size_t k, Vec3f l) {

@@ -7,7 +7,8 @@ namespace render {
 
 namespace {
 
-constexpr float coarse_accuracy = 0.8F, coarse_contrast = 0.4F;
+constexpr float coarsest_accuracy = 0.5F, coarse_accuracy = 0.8F;
+constexpr float coarse_contrast = 0.4F, blended_contrast = 0.1F;
 
 }  // namespace
 
@@ -17,7 +18,8 @@ Effort effort_of_stage(const Effort& effort, int stage) {
   Effort coarse = effort;
   if (stage >= finished_stage) return coarse;
   const bool blocks = stage < one_ray_stage;
-  coarse.accuracy = std::min(effort.accuracy, coarse_accuracy);
+  coarse.accuracy =
+      std::min(effort.accuracy, stage < few_rays_stage ? coarsest_accuracy : coarse_accuracy);
   // Of a block, the pixel that stands for all would see the same share of the lights everywhere.
   if (blocks) coarse.interleave = 1;
   if (stage > one_ray_stage) {
@@ -30,6 +32,11 @@ Effort effort_of_stage(const Effort& effort, int stage) {
     coarse.aa_samples = 1;
   }
   return coarse;
+}
+
+float blend_contrast_of_stage(const Effort& effort, int stage) {
+  if (stage < smoothed_stage || stage == finished_stage || !(effort.glint_contrast > 0)) return 0;
+  return std::max(effort.glint_contrast, blended_contrast);
 }
 
 }  // namespace render

@@ -13,21 +13,21 @@ namespace {
 using render::finished_stage, render::one_ray_stage;
 
 constexpr double share_of_frame = 0.7;  // of its time, for rendering
-constexpr double share_at_rest = 0.8;   // ... where nothing is found anew, and cells can wait
+constexpr double share_at_rest = 0.85;  // ... where nothing is found anew, and cells can wait
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
 // What a cell takes at each stage, of the coarsest one's, as long as nothing better is known: as in
 // the papers' scenes (`platelight bench drag`), where a few rays at edges are little more than one
 // everywhere.
-constexpr std::array<double, render::refinement_stages> expected_cost{1, 2, 6, 14, 18, 60};
+constexpr std::array<double, render::refinement_stages> expected_cost{1, 2, 6, 14, 15, 18, 60};
 // Of the cells, as many are found in a frame with a ray a pixel however long they take.
 constexpr double least = 0.01;
 // A stage that takes less than this times the one before takes its place.
 constexpr double worth_a_stage = 2.5;
-// A few rays at edges, which is to be there within a second: where it can, only those stages come
-// first that take a small part of its time.
-constexpr std::size_t anti_aliased = one_ray_stage + 1;
-constexpr double small_part = 0.125;
+// Smooth edges, which are to be there within a second: where they can, or nearly, only those stages
+// come first that take a small part of the time.
+constexpr std::size_t anti_aliased = render::smoothed_stage;
+constexpr double small_part = 0.0625, seconds_to_go_straight = 1.5;
 
 // The step through all cells in which they take their turns, spread over the picture: by the golden
 // section (Knuth, "The Art of Computer Programming" 3, 6.4).
@@ -66,14 +66,16 @@ std::size_t Sharpening::stage_of_lost(std::size_t lost) const {
 std::size_t Sharpening::after(std::size_t stage, std::size_t coarse) const {
   std::size_t next = stage + 1;
   if (live_ && stage < anti_aliased &&
-      static_cast<double>(coarse) * cost_[anti_aliased] <= frames_a_second_ * rest_ms(true)) {
+      static_cast<double>(coarse) * cost_[anti_aliased] <=
+          seconds_to_go_straight * frames_a_second_ * rest_ms(true)) {
     next = anti_aliased;
     for (std::size_t s = stage + 1; s < anti_aliased; ++s) {
       if (cost_[s] <= small_part * cost_[anti_aliased]) next = s;
     }
     return next;
   }
-  while (next < finished_stage && cost_[next + 1] < worth_a_stage * cost_[next]) ++next;
+  const std::size_t last = stage < anti_aliased ? anti_aliased : finished_stage;
+  while (next < last && cost_[next + 1] < worth_a_stage * cost_[next]) ++next;
   return next;
 }
 
@@ -107,7 +109,11 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept) {
   if (live_) {
     left = rest_ms(lost == 0);
   } else {
-    const double rest = cost_[one_ray_stage + 1] + cost_[finished_stage];
+    double rest = 0;
+    for (std::size_t stage = one_ray_stage; stage < finished_stage;) {
+      stage = after(stage, 0);
+      rest += cost_[stage];
+    }
     left = static_cast<double>(kept.size()) * rest / std::max(frames_a_second_ - 1, 1.0);
   }
   left -= static_cast<double>(lost) * cost_[first];

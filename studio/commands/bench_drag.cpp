@@ -24,8 +24,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr capture::Rational rate{25, 1};
 constexpr int dragged = 25, waited = 250;  // frames; less if the picture is sharp before
-// A few rays in the pixels that need them.
-constexpr int anti_aliased_stage = render::one_ray_stage + 1;
 
 struct Drag {
   const char* scene;
@@ -133,7 +131,7 @@ class Dragging {
         after_1_s = capture::to_float(result_.rgba);
         sharpness_after_1_s_ = sharpening_.share();
       }
-      if (anti_aliased_after_s_ < 0 && coarsest_ >= anti_aliased_stage) {
+      if (anti_aliased_after_s_ < 0 && coarsest_ >= render::smoothed_stage) {
         anti_aliased_after_s_ = passed_ms * 1e-3;
       }
       if (sharpening_.share() == 1) sharp_after_s_ = passed_ms * 1e-3;
