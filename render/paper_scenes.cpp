@@ -72,6 +72,31 @@ Environment make_daylight() {
   return smoothed(map);
 }
 
+// The headlight's paper took the foyer of its institute, as a map of high dynamic range: daylight
+// through a glass front and a skylight, lamps on the ceiling, all else dim. Ours bundles its light
+// more than a flat with windows does, and less than a hall with bare lamps.
+Environment make_foyer() {
+  std::vector<SoftBox> boxes{
+      {{0.25F, 0.1F, 1}, 0.7F, 0.4F, {9.0F, 9.5F, 10.5F}},       // skylight
+      {{-1, 0.45F, 0.1F}, 0.3F, 0.6F, {0.9F, 0.75F, 0.5F}},      // lit door
+      {{-1, -0.35F, 0.22F}, 0.45F, 0.3F, {0.3F, 0.21F, 0.14F}},  // panelling
+      {{0.35F, -1, 0.1F}, 0.6F, 0.5F, {0.12F, 0.25F, 0.6F}},     // desk of the porter
+      {{1, -0.5F, -0.25F}, 0.5F, 0.2F, {0.75F, 0.68F, 0.55F}},   // daylight on the floor
+  };
+  constexpr int panes = 5;
+  for (int i = 0; i < panes; ++i) {
+    const float azimuth = 0.35F + 0.26F * static_cast<float>(i);
+    boxes.push_back({{std::cos(azimuth), std::sin(azimuth), 0.3F}, 0.2F, 0.75F, {5.5F, 6, 6.8F}});
+  }
+  constexpr int lamps = 8;
+  for (int i = 0; i < lamps; ++i) {
+    const float x = 0.9F - 0.6F * static_cast<float>(i / 2), y = i % 2 == 0 ? 0.55F : -0.55F;
+    boxes.push_back({{x, y, 0.8F}, 0.05F, 0.05F, {44, 39, 29}});
+  }
+  return smoothed(make_soft_box_map(map_height, {0.45F, 0.44F, 0.42F}, {0.3F, 0.29F, 0.27F},
+                                    {0.16F, 0.12F, 0.08F}, boxes));
+}
+
 PaperScene make_room(bool lit) {
   PaperScene made;
   made.scene = make_tv_room(!lit);
@@ -111,7 +136,7 @@ PaperScene make_headlight_scene() {
   made.scene = make_headlight();
   made.cam_from_set = calibrate::look_at({0.63, 0.24, 0.06}, {-0.035, 0, 0.002}, 0);
   made.horizontal_view_rad = 26 * degree;
-  made.environment = make_daylight();
+  made.environment = make_foyer();
   return made;
 }
 
