@@ -175,6 +175,7 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
   p.slot = slot;
   p.kind = RayKind::camera;
   p.depth = 0;
+  p.path = 1;
   p.media.count = 0;
 }
 

@@ -55,6 +55,8 @@ class CellBaker final : public RaySink {
     std::uint8_t depth;
     bool one_of_many;  // of rays all over a rough lobe: its compact light is found apart
     bool lamps_apart;  // and so are the lamps that it mirrors: it does not see what glows by them
+    bool beyond_cut;   // followed by chance: what is straight on is counted, for all that are not
+    std::uint32_t path;
     Media media;
   };
 
@@ -183,6 +185,8 @@ class CellBaker final : public RaySink {
   std::uint32_t sample_of(const ShadePoint& p) const;
   SampleSequence numbers_of(const ShadePoint& p, std::uint32_t number, std::uint32_t sample) const;
   bool turn_within_lobe(const ShadePoint& from, std::uint32_t number, NewRay& ray) const;
+  std::uint32_t pixel_in_picture(const ShadePoint& p) const;
+  float chance_of(const ShadePoint& from, std::uint32_t path) const;
   void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
   void find_compact_tints();
   void add_compact(const Lobe& lobe, std::size_t light, Vec3f passed);

@@ -53,6 +53,7 @@ void CellBaker::bounce() {
       const QueuedRay& q = queue_[from + i];
       const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
       const std::size_t target = q.slot < cell_pixels ? q.pixel : cell_pixels + q.pixel;
+      if (!hit && q.beyond_cut) continue;
       if (!hit && q.kind != RayKind::camera) {
         if (q.kind == RayKind::bent) {
           leave_bent(q.slot, q.pixel, q.direction, q.spread, q.throughput);
@@ -62,7 +63,9 @@ void CellBaker::bounce() {
         }
         continue;
       }
-      if (hit && q.kind == RayKind::difference) {
+      if (hit && q.beyond_cut && q.kind == RayKind::bent) {
+        leave_bent(q.slot, q.pixel, q.direction, q.spread, -q.throughput);
+      } else if (hit && (q.kind == RayKind::difference || q.beyond_cut)) {
         add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
                         -q.throughput);
       }
@@ -83,6 +86,7 @@ void CellBaker::bounce() {
       p.media = q.media;
       p.kind = q.kind == RayKind::difference ? RayKind::reflection : q.kind;
       p.depth = q.depth;
+      p.path = q.path;
     }
     queue_.resize(from);
     run_background({group_.data(), leaving});

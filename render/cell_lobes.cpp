@@ -24,9 +24,16 @@ constexpr float far_source = 3;
 // not what they see where they come out, and that may be the sun. One ray a pixel shows nothing
 // that small, and pictures that still sharpen have no time for it.
 constexpr float inside_glass = 0.125F;
+// Of a ray that is not cut at all: those of less are followed by chance.
+constexpr float surely_followed = 2.0F / 3;
 // What compact lights may add in a lobe at most, of what a ray that is not followed may show, for
 // nobody to ask whether they are in sight.
 constexpr float unseen_compact = 1.0F / 64;
+
+// Which of a path's surfaces' rays were followed, as a number.
+std::uint32_t next_path(std::uint32_t path, std::uint32_t number) {
+  return (path ^ (number + 1)) * 0x9E3779B1U + (path >> 15);
+}
 
 // Not wider than cones get.
 Vec3f bounded(Vec3f turn) {
@@ -58,9 +65,13 @@ std::uint32_t CellBaker::sample_of(const ShadePoint& p) const {
 SampleSequence CellBaker::numbers_of(const ShadePoint& p,
                                      std::uint32_t number,
                                      std::uint32_t sample) const {
+  return {number * 64U + p.depth, pixel_in_picture(p), sample};
+}
+
+std::uint32_t CellBaker::pixel_in_picture(const ShadePoint& p) const {
   const std::uint32_t x = static_cast<std::uint32_t>(x0_) + p.pixel % cell_size;
   const std::uint32_t y = static_cast<std::uint32_t>(y0_) + p.pixel / cell_size;
-  return {number * 64U + p.depth, y << 16U | x, sample};
+  return y << 16U | x;
 }
 
 // Further samples of a pixel share a rough lobe among them: each follows one of its directions, and
@@ -123,17 +134,22 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const bool many = sent_[from.pixel] >= effort_.max_rays || queue_.size() == queue_.capacity();
   statistics_->depth_limit_hits += deep;
   statistics_->ray_limit_hits += many;
-  const bool later = ray.media.count > 0 && cuts_glass_later_;
+  const bool later = ray.media.count > 0 && cuts_glass_later_ && !effort_.chance_cuts;
   const float least = (1 - effort_.accuracy) * (later ? inside_glass : 1);
   // What little a ray adds is not worth many steps along its cone.
-  const Spread cone = straight || weight >= least ? ray.spread : rounded(ray.spread, ray.direction);
-  const auto too_dim = [&] {
-    if (straight || weight >= least) return weight < least;
+  const bool dim = weight < least;
+  const Spread cone = straight || !dim ? ray.spread : rounded(ray.spread, ray.direction);
+  const auto chance = [&]() -> float {
+    if (deep || many) return 0;
+    if (!dim) return 1;
+    if (straight) return 0;
     const Vec3f radiance = planned_radiance(look_up(ray.direction, ray.roughness, cone, false));
     const float brightest = std::max(largest(radiance), frame_->brightest_video);
-    return weight * brightest < least;
+    if (!effort_.chance_cuts) return weight * brightest < least ? 0.0F : 1.0F;
+    return std::min(weight * std::max(brightest, 1.0F) / (surely_followed * least), 1.0F);
   };
-  if (deep || many || too_dim()) {
+  const float followed = chance();
+  if (followed < 1) {
     if (effort_.dark_cuts) return;
     if (straight) {
       CellTransport::Base& base = base_[target_of(from)];
@@ -147,12 +163,29 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
       add_environment(from.slot, target_of(from), ray.direction, ray.roughness, cone, one_of_many,
                       ray.throughput);
     }
-    return;
+    if (!(followed > 0) || !(chance_of(from, next_path(from.path, pushed_)) < followed)) return;
+    // It stands for those that are not, and adds what it meets less what was taken for it above.
+    ray.throughput = ray.throughput * (1 / followed);
+    ray.spread = cone;
   }
   ++sent_[from.pixel];
   queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.steps,
                     ray.roughness, from.pixel, from.slot, ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps, ray.media});
+                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps, followed < 1,
+                    next_path(from.path, pushed_), ray.media});
+}
+
+// A number in 0..1: well spread over the samples of a pixel, those of centres over the picture.
+//
+// Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018.
+float CellBaker::chance_of(const ShadePoint& from, std::uint32_t path) const {
+  if (from.slot >= cell_pixels)
+    return SampleSequence(path, pixel_in_picture(from), sample_of(from)).next();
+  constexpr double a = 0.7548776662466927, b = 0.5698402909980532;
+  const int x = x0_ + static_cast<int>(from.pixel % cell_size);
+  const int y = y0_ + static_cast<int>(from.pixel / cell_size);
+  const double place = double{SampleSequence{path, 0, 0}.next()} + a * x + b * y;
+  return static_cast<float>(place - std::floor(place));
 }
 
 // Places in the environment. A ray that is cut asks twice: how bright is it there, and what then.

@@ -76,7 +76,7 @@ std::uint64_t transport_key(const FrameContext& context) {
   key.mix(e.interleave), key.mix(std::uint64_t{e.adaptive_visibility});
   key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
   key.mix(e.max_rays);
-  key.mix(std::uint64_t{e.dark_cuts});
+  key.mix(std::uint64_t{e.chance_cuts}), key.mix(std::uint64_t{e.dark_cuts});
   key.mix(e.caustic_photons);
   if (context.caustics) {
     for (const std::uint32_t light : context.caustics->photons().lights()) {

@@ -16,7 +16,7 @@ void for_each_setting(E& effort, F&& visit) {
       visit(effort.light_samples), visit(effort.interleave), visit(effort.bounce_lamps),
       visit(effort.caustic_photons);
   visit(effort.adaptive_visibility), visit(effort.cull_lights), visit(effort.accuracy),
-      visit(effort.dark_cuts);
+      visit(effort.chance_cuts), visit(effort.dark_cuts);
   visit(effort.max_depth), visit(effort.max_rays), visit(effort.tile_size);
 }
 

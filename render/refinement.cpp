@@ -17,6 +17,7 @@ int block_of_stage(int stage) { return 1 << std::max(one_ray_stage - stage, 0); 
 Effort effort_of_stage(const Effort& effort, int stage) {
   Effort coarse = effort;
   if (stage >= finished_stage) return coarse;
+  coarse.chance_cuts = false;  // of few rays it is noise
   const bool blocks = stage < one_ray_stage;
   coarse.accuracy =
       std::min(effort.accuracy, stage < few_rays_stage ? coarsest_accuracy : coarse_accuracy);

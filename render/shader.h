@@ -50,7 +50,8 @@ struct ShadePoint {
   std::uint32_t slot = 0;   // the sample that the result is added to
   RayKind kind = RayKind::camera;
   std::uint8_t depth = 0;
-  Media media;  // that the ray arrived in
+  std::uint32_t path = 1;  // a number for the surfaces' rays that led here
+  Media media;             // that the ray arrived in
   // From shade(), cleared before: all that is sent back along `incoming`. Each is multiplied by
   // throughput by the kernel.
   Vec3f radiance;               // its own light

@@ -44,6 +44,7 @@ EffortPoint point_of(const Json& point, render::Effort effort) {
   effort.interleave = whole(settings, "interleave", 1, 4);
   effort.adaptive_visibility = settings.at("adaptive_visibility").get<bool>();
   effort.accuracy = settings.at("accuracy").get<float>();
+  effort.chance_cuts = settings.value("chance_cuts", effort.chance_cuts);
   const EffortPoint result{effort, point.at("time_ms").get<double>(),
                            point.at("error").get<double>()};
   const bool good = effort.interleave != 3 && effort.accuracy >= 0 && effort.accuracy <= 1 &&
@@ -62,7 +63,8 @@ std::vector<std::pair<std::string, ChartValue>> settings_of(const render::Effort
           {"light_samples", static_cast<double>(effort.light_samples)},
           {"interleave", static_cast<double>(effort.interleave)},
           {"adaptive_visibility", effort.adaptive_visibility},
-          {"accuracy", as_written(effort.accuracy)}};
+          {"accuracy", as_written(effort.accuracy)},
+          {"chance_cuts", effort.chance_cuts}};
 }
 
 std::string effort_points_file(const std::string& set_path) {

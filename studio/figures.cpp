@@ -21,6 +21,7 @@ Json effort_json(const render::Effort& effort) {
           {"adaptive_visibility", effort.adaptive_visibility},
           {"cull_lights", effort.cull_lights},
           {"accuracy", effort.accuracy},
+          {"chance_cuts", effort.chance_cuts},
           {"max_depth", effort.max_depth},
           {"max_rays", effort.max_rays},
           {"tile_size", effort.tile_size}};

@@ -136,6 +136,7 @@ render::Effort read_effort_section(Section section) {
   section.boolean("adaptive_visibility", effort.adaptive_visibility);
   section.boolean("cull_lights", effort.cull_lights);
   section.number("accuracy", effort.accuracy, {0, 1});
+  section.boolean("chance_cuts", effort.chance_cuts);
   section.integer("max_depth", effort.max_depth, 1, 64);
   section.integer("max_rays", effort.max_rays, 0, 1'000'000);
   section.integer("tile_size", effort.tile_size, 16, 1024);

@@ -387,6 +387,57 @@ TEST(Glass, ShowsThePlateBehindItAsTheReferenceDoes) {
             0.05);
 }
 
+// A glass ball in a box of walls that glow, through whose windows one looks: what lies straight on
+// for a ray that is cut is the sky, but it would meet a wall.
+GlassShot ball_between_walls() {
+  render::SceneDescription scene = bodies({render::make_sphere(0.5F, 48)}, {{.index = 1.8F}});
+  render::StandardParameters dim;
+  std::fill_n(dim.base_color, 3, 0.0F);
+  std::fill_n(dim.emission, 3, 0.05F);
+  dim.specular = 0;
+  scene.materials.push_back(render::make_standard_material("wall", dim));
+  for (const auto& wall :
+       {render::make_box({-2, -1, -2}, {-1.9F, 3, 2}), render::make_box({1.9F, -1, -2}, {2, 3, 2}),
+        render::make_box({-2, -1, 1.9F}, {2, 3, 2}), render::make_box({-2, 2.9F, -2}, {2, 3, 2})}) {
+    auto mesh = std::make_shared<render::Mesh>(*wall);
+    mesh->materials = {1};
+    scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size());
+    scene.meshes.push_back(std::move(mesh));
+  }
+  return glass_shot(std::move(scene), [](Vec3f d) { return d.z < -0.3F ? 2.0F : 0.9F; }, 64, 150,
+                    {0, -5, 0});
+}
+
+// Over all pixels and channels.
+double mean_of(const capture::Image& picture) {
+  double sum = 0;
+  for (const float v : picture.pixels) sum += v;
+  return sum / static_cast<double>(picture.pixels.size());
+}
+
+TEST(Glass, IsRightInTheMeanWhereRaysAreFollowedByChance) {
+  GlassShot shot = ball_between_walls();
+  render::Effort& effort = shot.job.effort;
+  effort.aa_samples = 1;
+  const double truth = mean_of(shot.kernel());
+  effort.accuracy = 0.8F;
+  const double cut = std::abs(mean_of(shot.kernel()) / truth - 1);
+  EXPECT_GT(cut, 0.02);  // else this test shows nothing
+  effort.chance_cuts = true;
+  EXPECT_LT(std::abs(mean_of(shot.kernel()) / truth - 1), 0.1 * cut);
+}
+
+TEST(Glass, IsTheSameWhateverTilesWhereRaysAreFollowedByChance) {
+  GlassShot shot = ball_between_walls();
+  shot.job.effort.accuracy = 0.8F;
+  shot.job.effort.chance_cuts = true;
+  const capture::Image once = shot.kernel();
+  shot.job.effort.tile_size = 64;
+  EXPECT_EQ(once.pixels, shot.kernel().pixels);
+  shot.job.effort.chance_cuts = false;
+  EXPECT_NE(once.pixels, shot.kernel().pixels);
+}
+
 TEST(Glass, IsTheSameWhateverTheTilesAndWhatIsKept) {
   MadeShot shot = ball_on_plate(80);
   const calibrate::Lens lens = lens_of(shot);

@@ -68,6 +68,20 @@ TEST(GlassAtTheEdge, KeepsLightWithAnyIndex) {
   }
 }
 
+// What a ray that is followed by chance adds is what it meets less what was taken for it: nothing,
+// where all is alike.
+TEST(GlassAtTheEdge, KeepsLightWhateverIsFollowedByChance) {
+  for (const float accuracy : {0.0F, 0.5F, 0.95F}) {
+    SCOPED_TRACE(accuracy);
+    GlassShot shot = glass_shot(bodies({render::make_sphere(1, 24), render::make_sphere(0.6F, 24)},
+                                       {{.index = 1.5F}, {.index = 2, .priority = 1}}),
+                                [](Vec3f) { return 1.0F; }, 32, 40, {0, -4, 1});
+    shot.job.effort.accuracy = accuracy;
+    shot.job.effort.chance_cuts = true;
+    expect_even(shot.kernel());
+  }
+}
+
 TEST(GlassAtTheEdge, KeepsLightWhereFacesCoincide) {
   const auto box = render::make_box({-1, -1, -1}, {1, 1, 1});
   const auto beside = render::make_box({1, -1, -1}, {3, 1, 1});
