@@ -2,11 +2,15 @@
 #include "studio/charts/glass.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "render/paper_scenes.h"
 #include "studio/paper_shot.h"
 #include "studio/picture_error.h"
 
@@ -18,6 +22,23 @@ constexpr float whole_tree = 0.9999F;
 // Camera rays along a pixel's side: each in the middle of its part, so that all of the pixel is
 // seen, as the reference sees it, and nothing adapts to what they meet.
 constexpr int rays_across = 4;
+
+// What becomes of rays that are cut.
+enum class Cuts { environment, nothing, chance };
+constexpr std::array<std::string_view, 3> methods{"cut rays see the environment",
+                                                  "cut rays see nothing",
+                                                  "some cut rays are followed, by chance"};
+
+constexpr std::string_view in_the_sun = "headlight in the sun";
+
+// The papers' scenes, and the headlight in the light of their car: a sun that ribs and facets break
+// up is the hardest that a lamp is seen in.
+PaperShot shot_of(std::string_view scene, int width, int height) {
+  if (scene != in_the_sun) return make_paper_shot(scene, width, height);
+  render::PaperScene paper = render::made_paper_scene("headlight");
+  paper.environment = render::made_paper_scene("car").environment;
+  return make_paper_shot(std::move(paper), width, height);
+}
 
 // The mean of every rays_across x rays_across pixels.
 capture::Image averaged(const capture::Image& fine) {
@@ -53,7 +74,7 @@ class GlassChart {
     chart.error_name = "relative RMS error of cutting rays";
     const std::vector<std::string_view> scenes =
         quick_ ? std::vector<std::string_view>{"glass_sphere"}
-               : std::vector<std::string_view>{"headlight", "glass_sphere"};
+               : std::vector<std::string_view>{"headlight", in_the_sun, "glass_sphere"};
     for (std::size_t i = 0; i < scenes.size(); ++i) {
       add_scene(scenes[i], static_cast<double>(i) / static_cast<double>(scenes.size()),
                 1.0 / static_cast<double>(scenes.size()), chart);
@@ -92,18 +113,19 @@ class GlassChart {
   }
 
   // The same camera rays at any accuracy.
-  static render::Effort effort_of(float accuracy, bool dark, int max_depth) {
+  static render::Effort effort_of(float accuracy, Cuts cuts, int max_depth) {
     render::Effort effort;
     effort.aa_samples = 1;
     effort.aa_tolerance = effort.glint_contrast = 0;
     effort.accuracy = accuracy;
-    effort.dark_cuts = dark;
+    effort.dark_cuts = cuts == Cuts::nothing;
+    effort.chance_cuts = cuts == Cuts::chance;
     effort.max_depth = max_depth;
     return effort;
   }
 
   Truth truth_of_scene(std::string_view name) const {
-    const BenchScene shot = make_paper_shot(name, width_, height_).shot;
+    const BenchScene shot = shot_of(name, width_, height_).shot;
     return truth_of(shot.plate, [&](std::uint32_t seed) {
       return render_reference(shot.inputs(), shot.job, shot.plate,
                               {.samples = quick_ ? 16 : 64, .seed = seed});
@@ -117,8 +139,8 @@ class GlassChart {
     progress(0, "reference");
     const Truth truth = truth_of_scene(name);
     progress(0.3, "all rays");
-    const BenchScene shot = make_paper_shot(name, width_ * rays_across, height_ * rays_across).shot;
-    const Shown whole = render(shot, effort_of(whole_tree, false, 64));
+    const BenchScene shot = shot_of(name, width_ * rays_across, height_ * rays_across).shot;
+    const Shown whole = render(shot, effort_of(whole_tree, Cuts::environment, 64));
     const auto error_of = [&](const Shown& shown) {
       return render::picture_error(shown.picture, whole.picture, truth.mask);
     };
@@ -127,15 +149,18 @@ class GlassChart {
     };
     const std::vector<float> accuracies =
         quick_ ? std::vector{0.8F, 0.95F} : std::vector{0.8F, 0.9F, 0.95F, 0.97F, 0.99F, 0.999F};
-    for (const bool dark : {false, true}) {
+    for (const Cuts cuts : {Cuts::environment, Cuts::nothing, Cuts::chance}) {
+      const auto method = static_cast<std::size_t>(cuts);
       for (const float accuracy : accuracies) {
-        progress(dark ? 0.7 : 0.5, "accuracy");
-        const Shown shown = render(shot, effort_of(accuracy, dark, 64));
+        progress(0.5 + 0.15 * static_cast<double>(method), "accuracy");
+        const Shown shown = render(shot, effort_of(accuracy, cuts, 64));
         const render::PictureError error = error_of(shown);
         ChartPoint point;
         point.scene = name;
-        point.method = dark ? "cut rays see nothing" : "cut rays see the environment";
-        point.settings = {{"accuracy", double{accuracy}}, {"dark_cuts", dark}};
+        point.method = methods[method];
+        point.settings = {{"accuracy", double{accuracy}},
+                          {"dark_cuts", cuts == Cuts::nothing},
+                          {"chance_cuts", cuts == Cuts::chance}};
         point.time_ms = shown.time_ms;
         point.error = error.relative_rms;
         point.error_p99 = error.p99;
@@ -145,7 +170,7 @@ class GlassChart {
             {"secondary_rays", static_cast<double>(shown.statistics.secondary_rays) / rays},
             {"shadow_rays", static_cast<double>(shown.statistics.shadow_rays) / rays},
             {"depth_limit_hits", static_cast<double>(shown.statistics.depth_limit_hits)}};
-        point.by_default = !dark && accuracy == render::Effort{}.accuracy;
+        point.by_default = cuts == Cuts::environment && accuracy == render::Effort{}.accuracy;
         point.label = fmt::format("{:.3g} %", 100 * accuracy);
         chart.points.push_back(std::move(point));
       }
@@ -153,8 +178,8 @@ class GlassChart {
     Stressor depth;
     depth.stressor = fmt::format("deepest ray, {}", name);
     for (const int limit : {1, 2, 4, 8, 16, 32, 64}) {
-      progress(0.9, "depth");
-      const Shown shown = render(shot, effort_of(0.99F, false, limit));
+      progress(0.95, "depth");
+      const Shown shown = render(shot, effort_of(0.99F, Cuts::environment, limit));
       depth.samples.push_back(
           {static_cast<double>(limit), error_of(shown).relative_rms, std::nullopt,
            shown.statistics.depth_limit_hits > 0 ? "some rays ended by the limit" : "ok"});
