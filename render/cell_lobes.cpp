@@ -24,7 +24,8 @@ constexpr float far_source = 3;
 // not what they see where they come out, and that may be the sun. One ray a pixel shows nothing
 // that small, and pictures that still sharpen have no time for it.
 constexpr float inside_glass = 0.125F;
-// Of a ray that is not cut at all: those of less are followed by chance.
+// With cuts by chance: from so much of 1 - accuracy on a ray is always followed, below it by
+// chance.
 constexpr float surely_followed = 2.0F / 3;
 // What compact lights may add in a lobe at most, of what a ray that is not followed may show, for
 // nobody to ask whether they are in sight.
