@@ -49,6 +49,7 @@ void CellBaker::bake(const FrameContext& frame,
   x0_ = x0;
   y0_ = y0;
   block_ = block_of_stage(stage);
+  if (effort_.soft_lights) shadow_rays_.parts = &frame.soft_lights;
   transport_ = &transport;
   statistics_ = &statistics;
   const std::uint64_t rays_before =
@@ -298,6 +299,17 @@ void CellBaker::shade_centres() {
   bounce();
 }
 
+// Which part of wide lights a point looks for. Where one sample stands for all of a pixel,
+// neighbours that mirror something would tell noise apart from steps of light.
+std::uint8_t CellBaker::part_of(const ShadePoint& p) const {
+  if (p.slot >= cell_pixels) {
+    const std::uint32_t of_pixel = p.pixel * 7 + p.pixel / cell_size * 3;
+    return SoftLights::part_of_sample(index_of_slot_[p.slot - cell_pixels] + of_pixel);
+  }
+  if (p.kind != RayKind::camera) return SoftLights::middle;
+  return SoftLights::part_of_pixel(p.pixel % cell_size, p.pixel / cell_size);
+}
+
 void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   Receivers& r = receivers_;
   const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
@@ -310,6 +322,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   const bool real = instance.kind == ObjectKind::stand_in;
   r.mask[k] = real ? mask_virtual : mask_virtual | mask_real_blocker;
   r.real_first[k] = real;
+  r.part[k] = part_of(p);
   r.surface[k] = p.hit.instance * 4096 + p.hit.material;
   // Further samples of an edge pixel share its weight.
   const float further_share = 1 / static_cast<float>(effort_.aa_samples);
@@ -381,8 +394,8 @@ void CellBaker::receive(int count, bool grid) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const std::size_t k = place[i];
     if (k == nowhere) continue;
-    const Vec3f open{r.open_r[k], r.open_g[k], r.open_b[k]};
-    light_of_point_[i] = {open, open - Vec3f{r.lost_r[k], r.lost_g[k], r.lost_b[k]}, {}};
+    const Vec3f open = r.light.open(k);
+    light_of_point_[i] = {open, open - r.light.lost(k), {}};
     if (!grid) continue;
     light_[k] = light_of_point_[i];
     add_centre(points_[i]);

@@ -162,9 +162,10 @@ std::vector<CellCone> cell_cones(const calibrate::DirectionTable& table,
 MovedThings::MovedThings(std::vector<Scene::Bounds> where,
                          const SpaceGrid& grid,
                          const LightTable& lights,
+                         const SoftLights& soft,
                          const SpaceGrid::Mask& receivers,
                          std::vector<Scene::Bounds> relit)
-    : where_(std::move(where)), lights_(lights), relit_(std::move(relit)) {
+    : where_(std::move(where)), lights_(lights), soft_(soft), relit_(std::move(relit)) {
   for (const Scene::Bounds& bounds : where_) grid.mark_bounds(bounds, filled_);
   for (int i = 0; i < SpaceGrid::side * SpaceGrid::side * SpaceGrid::side; ++i) {
     const auto at = static_cast<std::size_t>(i);
@@ -174,21 +175,21 @@ MovedThings::MovedThings(std::vector<Scene::Bounds> where,
   for (const Scene::Bounds& bounds : relit_) grid.mark_bounds(bounds, shaded_);
 }
 
-// Whether anything that moved lies between any of those points and a light: between their middle
-// and the light, if it is larger by as much as they are apart.
+// Whether anything that moved lies between any of those points and a light: for a lamp, between
+// their middle and the lamp, if it is larger by as much as they are apart.
 bool MovedThings::may_shade(const Scene::Bounds& receivers) const {
   constexpr float margin = 1.02F;
   const Vec3f from = middle(receivers);
   const Vec3f half = half_size(receivers) * margin;
+  const Scene::Bounds around{from - half, from + half};
   return std::ranges::any_of(where_, [&](const Scene::Bounds& bounds) {
+    for (std::size_t i = 0; i < lights_.lights.size(); ++i) {
+      if (may_be_met(bounds, around, soft_.range(i))) return true;
+    }
     const Scene::Bounds larger = grown(bounds, half);
-    return std::ranges::any_of(lights_.lights,
-                               [&](const DirectionalLight& l) {
-                                 return meets(larger, from, l.direction, infinite);
-                               }) ||
-           std::ranges::any_of(lights_.lamps, [&](const LocalLight& lamp) {
-             return meets(larger, from, lamp.position - from, 1);
-           });
+    return std::ranges::any_of(lights_.lamps, [&](const LocalLight& lamp) {
+      return meets(larger, from, lamp.position - from, 1);
+    });
   });
 }
 

@@ -12,6 +12,7 @@
 #include "render/blocker_boxes.h"
 #include "render/light_gather.h"
 #include "render/light_table.h"
+#include "render/soft_lights.h"
 
 namespace render {
 
@@ -71,6 +72,7 @@ class MovedThings {
   MovedThings(std::vector<Scene::Bounds> where,
               const SpaceGrid& grid,
               const LightTable& lights,
+              const SoftLights& soft,
               const SpaceGrid::Mask& receivers,
               std::vector<Scene::Bounds> relit = {});
 
@@ -82,6 +84,7 @@ class MovedThings {
 
   std::vector<Scene::Bounds> where_;
   const LightTable& lights_;
+  const SoftLights& soft_;
   std::vector<Scene::Bounds> relit_;
   SpaceGrid::Mask filled_{}, shaded_{};
 };

@@ -11,49 +11,6 @@
 namespace render {
 namespace {
 
-// Irradiance at the centres: of all light that is not behind real things, and what of it virtual
-// objects take.
-void add_irradiance(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
-  const std::size_t count = std::min(light.lights.size(), cell.visibility.lit.size());
-  for (std::size_t k = 0; k < cell_pixels; k += lanes) {
-    const auto bits_at = [k](const CellMask& mask) {
-      return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
-    };
-    Lanes open_r = all(0), open_g = all(0), open_b = all(0);
-    Lanes lost_r = all(0), lost_g = all(0), lost_b = all(0);
-    if (bits_at(cell.receiving)) {
-      const Lanes nx = load(&cell.nx[k]), ny = load(&cell.ny[k]), nz = load(&cell.nz[k]);
-      for (std::size_t i = 0; i < count; ++i) {
-        const unsigned lit = bits_at(cell.visibility.lit[i]);
-        if (!lit) continue;
-        const DirectionalLight& l = light.lights[i];
-        const Lanes cosine = both(dot(nx, ny, nz, l.direction), mask_of(lit));
-        const Lanes r = multiply(cosine, all(l.irradiance.x));
-        const Lanes g = multiply(cosine, all(l.irradiance.y));
-        const Lanes b = multiply(cosine, all(l.irradiance.z));
-        open_r = add(open_r, r), open_g = add(open_g, g), open_b = add(open_b, b);
-        const unsigned hidden = lit & ~bits_at(cell.visibility.seen[i]);
-        if (!hidden) continue;
-        const Lanes mask = mask_of(hidden);
-        lost_r = add(lost_r, both(r, mask));
-        lost_g = add(lost_g, both(g, mask));
-        lost_b = add(lost_b, both(b, mask));
-      }
-    }
-    store(&w.open_r[k], open_r), store(&w.open_g[k], open_g), store(&w.open_b[k], open_b);
-    store(&w.lost_r[k], lost_r), store(&w.lost_g[k], lost_g), store(&w.lost_b[k], lost_b);
-  }
-  for (const TintedLight& tint : cell.visibility.tints) {
-    const std::size_t k = tint.centre;
-    const DirectionalLight& l = light.lights[tint.light];
-    const float cosine =
-        cell.nx[k] * l.direction.x + cell.ny[k] * l.direction.y + cell.nz[k] * l.direction.z;
-    w.lost_r[k] += cosine * l.irradiance.x * tint.lost_share.x;
-    w.lost_g[k] += cosine * l.irradiance.y * tint.lost_share.y;
-    w.lost_b[k] += cosine * l.irradiance.z * tint.lost_share.z;
-  }
-}
-
 // Irradiance of the lamps at the centres.
 void add_lamps(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
   const CellLamps& lamps = cell.lamps;
@@ -85,8 +42,7 @@ void light_centres(const CellTransport& cell, RelightWorkspace& w) {
     w.share[k] = base.plate;
     w.passed[k] = base.passed;
     if (!(cell.receiving[k / 64] >> (k % 64) & 1)) continue;
-    const Vec3f open{w.open_r[k], w.open_g[k], w.open_b[k]};
-    const Vec3f lost{w.lost_r[k], w.lost_g[k], w.lost_b[k]};
+    const Vec3f open = w.light.open(k), lost = w.light.lost(k);
     w.arriving[k] = open - lost + Vec3f{w.lamps_r[k], w.lamps_g[k], w.lamps_b[k]};
     w.passing[k] = passing(open, lost);
     w.added[k] += cell.diffuse[k] * w.arriving[k];
@@ -112,8 +68,7 @@ void light_catchers(const CellTransport& cell,
     const bool centre = k < cell_pixels;
     const Vec3f irradiance = centre ? Vec3f{w.lamps_r[k], w.lamps_g[k], w.lamps_b[k]} : w.caught[i];
     if (irradiance == Vec3f{}) continue;
-    const Vec3f open =
-        centre ? Vec3f{w.open_r[k], w.open_g[k], w.open_b[k]} : w.open_at_points[k - cell_pixels];
+    const Vec3f open = centre ? w.light.open(k) : w.open_at_points[k - cell_pixels];
     const Vec3f behind = plate[c.slot % cell_pixels];
     if (std::max({behind.x, behind.y, behind.z}) >= clipped_plate) ++statistics.clipped_plate;
     if (plate_tells_albedo(behind, open) && open.x > 0 && open.y > 0 && open.z > 0) {
@@ -188,7 +143,7 @@ void CellTransport::clear() {
   diffuse.fill({});
   shadow.fill({});
   receiving = {};
-  visibility.lit.clear(), visibility.seen.clear(), visibility.tints.clear();
+  visibility.clear();
   shared.clear(), lights.clear();
   environment.clear(), shadow_points.clear(), shadow_lights.clear();
   lamps.numbers.clear(), lamps.factors.clear(), lamps.tints.clear();
@@ -202,10 +157,10 @@ void CellTransport::clear() {
 std::size_t CellTransport::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
   return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
-         of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
-         of(lamps.numbers) + of(lamps.factors) + of(lamps.tints) + of(lamp_terms) + of(catchers) +
-         of(caught) + of(bent) + of(bent_caustics) + of(video) + of(borrowed) + of(further) +
-         of(counts);
+         of(visibility.near) + of(visibility.windows) + of(shared) + of(lights) + of(environment) +
+         of(shadow_points) + of(shadow_lights) + of(lamps.numbers) + of(lamps.factors) +
+         of(lamps.tints) + of(lamp_terms) + of(catchers) + of(caught) + of(bent) +
+         of(bent_caustics) + of(video) + of(borrowed) + of(further) + of(counts);
 }
 
 void relight(const CellTransport& cell,
@@ -215,7 +170,8 @@ void relight(const CellTransport& cell,
              CellPicture& picture,
              RenderStatistics& statistics) {
   if (cell.receiving != CellMask{}) {
-    add_irradiance(cell, light, w);
+    add_up_light({cell.receiving, cell.nx, cell.ny, cell.nz}, light.lights, cell.visibility,
+                 w.light, w.soft);
     add_lamps(cell, light, w);
   }
   light_centres(cell, w);

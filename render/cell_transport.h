@@ -180,7 +180,7 @@ Vec3f plate_at(const capture::Image& level, float x, float y);
 
 // What relight() works in.
 struct RelightWorkspace {
-  alignas(64) std::array<float, cell_pixels> open_r, open_g, open_b, lost_r, lost_g, lost_b;
+  LightSums light, soft;
   alignas(64) std::array<float, cell_pixels> lamps_r, lamps_g, lamps_b;
   std::array<Vec3f, slots> added, share;
   std::array<float, slots> passed;

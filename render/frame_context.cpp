@@ -74,7 +74,8 @@ std::uint64_t transport_key(const FrameContext& context) {
   const Effort& e = job.effort;
   key.mix(e.aa_samples), key.mix(e.aa_tolerance), key.mix(e.glint_contrast);
   key.mix(e.interleave), key.mix(std::uint64_t{e.adaptive_visibility});
-  key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
+  key.mix(std::uint64_t{e.soft_lights}), key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy),
+      key.mix(e.max_depth);
   key.mix(e.max_rays);
   key.mix(std::uint64_t{e.chance_cuts}), key.mix(std::uint64_t{e.dark_cuts});
   key.mix(e.caustic_photons);
@@ -321,6 +322,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.pixel_angle =
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
   add_caustics(context, *planned_table);
+  context.soft_lights = SoftLights(planned_table->lights, e.soft_lights);
   context.planned_table = std::move(planned_table);
   context.columns = (d.width + cell_size - 1) / cell_size;
   context.rows = (d.height + cell_size - 1) / cell_size;

@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t frame_job_magic = 0x384A4650;  // "PFJ8"
+constexpr std::uint32_t frame_job_magic = 0x394A4650;  // "PFJ9"
 constexpr std::uint32_t tile_job_magic = 0x314A5450;   // "PTJ1"
 
 // Calls visit on every single number of an Effort, so that writing and reading cannot differ.
@@ -15,8 +15,8 @@ void for_each_setting(E& effort, F&& visit) {
   visit(effort.aa_samples), visit(effort.glint_contrast), visit(effort.aa_tolerance),
       visit(effort.light_samples), visit(effort.interleave), visit(effort.bounce_lamps),
       visit(effort.caustic_photons);
-  visit(effort.adaptive_visibility), visit(effort.cull_lights), visit(effort.accuracy),
-      visit(effort.chance_cuts), visit(effort.dark_cuts);
+  visit(effort.adaptive_visibility), visit(effort.soft_lights), visit(effort.cull_lights),
+      visit(effort.accuracy), visit(effort.chance_cuts), visit(effort.dark_cuts);
   visit(effort.max_depth), visit(effort.max_rays), visit(effort.tile_size);
 }
 

@@ -31,6 +31,9 @@ struct Effort {
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
   int bounce_lamps = 0;     // stand for light between dull surfaces (BouncedLight); 0 = none is
   int caustic_photons = 0;  // from bright lights through clear bodies (Caustics); 0 = straight on
+  // Pixels look for wide lights all over the regions that these stand for, and share what they
+  // find: soft shadows instead of steps.
+  bool soft_lights = true;
   bool cull_lights = true;  // skip shadow rays that no object can block
   float accuracy = 0.97F;   // rays whose share of the pixel falls below 1 - accuracy are cut
   // Of rays that would be cut, some are followed and stand for all of them, by chance: right in the

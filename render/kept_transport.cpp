@@ -63,7 +63,8 @@ void KeptTransport::forget(std::vector<Scene::Bounds> moved,
   }
   LightTable lights = *frame.planned_table;
   lights.lamps.resize(frame.job->lights.lamps.size());  // those of caustics are nowhere
-  const MovedThings things(std::move(moved), grid_, lights, receivers, std::move(relit));
+  const MovedThings things(std::move(moved), grid_, lights, frame.soft_lights, receivers,
+                           std::move(relit));
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     Cell& cell = cells_[i];
     if (cell.stage == none) continue;

@@ -9,6 +9,7 @@
 #include "render/refinement.h"
 #include "render/renderer.h"
 #include "render/shader.h"
+#include "render/soft_lights.h"
 
 namespace render {
 
@@ -25,6 +26,7 @@ struct FrameContext {
   // that light, planned or as it is.
   std::shared_ptr<const Caustics> caustics;  // or null
   std::vector<LocalLight> lamps;
+  SoftLights soft_lights;
   std::vector<std::uint32_t> compact;             // lights of the table that are compact and apart
   std::array<Effort, refinement_stages> efforts;  // of each stage
   int columns = 0, rows = 0;                      // of cells

@@ -5,62 +5,32 @@
 #include <bit>
 #include <cmath>
 
+#include "render/blocker_boxes.h"
 #include "render/caustics.h"
 #include "render/lanes.h"
 #include "render/shadow_stream.h"
+#include "render/soft_lights.h"
 #include "render/trace.h"
 #include "render/visibility_finder.h"
 
 namespace render {
 namespace {
 
-// For each light: which pixels it shines on (in both their normals); and its irradiance there,
-// added to `open`.
-void find_lit(Receivers& r, std::span<const DirectionalLight> lights, std::span<CellMask> lit) {
+// For each light: which pixels it shines on, in both their normals.
+void find_lit(const Receivers& r,
+              std::span<const DirectionalLight> lights,
+              std::span<CellMask> lit) {
   std::fill(lit.begin(), lit.end(), CellMask{});
   for (std::size_t k = 0; k < cell_pixels; k += lanes) {
     const auto active = static_cast<unsigned>(r.active[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
     if (!active) continue;
-    const Lanes here = mask_of(active);
     const Lanes nx = load(&r.nx[k]), ny = load(&r.ny[k]), nz = load(&r.nz[k]);
     const Lanes gx = load(&r.gx[k]), gy = load(&r.gy[k]), gz = load(&r.gz[k]);
-    Lanes red = load(&r.open_r[k]), green = load(&r.open_g[k]), blue = load(&r.open_b[k]);
     for (std::size_t i = 0; i < lights.size(); ++i) {
-      const Lanes cosine = dot(nx, ny, nz, lights[i].direction);
-      const Lanes shines =
-          both(both(positive(cosine), positive(dot(gx, gy, gz, lights[i].direction))), here);
-      const Lanes weight = both(cosine, shines);
-      const Vec3f e = lights[i].irradiance;
-      red = add(red, multiply(weight, all(e.x)));
-      green = add(green, multiply(weight, all(e.y)));
-      blue = add(blue, multiply(weight, all(e.z)));
-      lit[i][k / 64] |= static_cast<std::uint64_t>(bits_of(shines)) << (k % 64);
+      const Vec3f l = lights[i].direction;
+      const Lanes shines = both(positive(dot(nx, ny, nz, l)), positive(dot(gx, gy, gz, l)));
+      lit[i][k / 64] |= static_cast<std::uint64_t>(bits_of(shines) & active) << (k % 64);
     }
-    store(&r.open_r[k], red), store(&r.open_g[k], green), store(&r.open_b[k], blue);
-  }
-}
-
-// Irradiance of the lights that shine on a pixel but are not seen from it, added to `lost`.
-void add_hidden(Receivers& r,
-                std::span<const DirectionalLight> lights,
-                std::span<const CellMask> lit,
-                std::span<const CellMask> seen) {
-  for (std::size_t k = 0; k < cell_pixels; k += lanes) {
-    const auto active = static_cast<unsigned>(r.active[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
-    if (!active) continue;
-    const Lanes nx = load(&r.nx[k]), ny = load(&r.ny[k]), nz = load(&r.nz[k]);
-    Lanes red = load(&r.lost_r[k]), green = load(&r.lost_g[k]), blue = load(&r.lost_b[k]);
-    for (std::size_t i = 0; i < lights.size(); ++i) {
-      const auto hidden = static_cast<unsigned>((lit[i][k / 64] & ~seen[i][k / 64]) >> (k % 64)) &
-                          ((1U << lanes) - 1);
-      if (!hidden) continue;
-      const Lanes weight = both(dot(nx, ny, nz, lights[i].direction), mask_of(hidden));
-      const Vec3f e = lights[i].irradiance;
-      red = add(red, multiply(weight, all(e.x)));
-      green = add(green, multiply(weight, all(e.y)));
-      blue = add(blue, multiply(weight, all(e.z)));
-    }
-    store(&r.lost_r[k], red), store(&r.lost_g[k], green), store(&r.lost_b[k], blue);
   }
 }
 
@@ -68,47 +38,12 @@ float cosine_at(const Receivers& r, std::size_t k, Vec3f l) {
   return r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
 }
 
-void add_lost(Receivers& r, std::size_t k, const DirectionalLight& light, Vec3f share) {
-  const float cosine = cosine_at(r, k, light.direction);
-  r.lost_r[k] += cosine * light.irradiance.x * share.x;
-  r.lost_g[k] += cosine * light.irradiance.y * share.y;
-  r.lost_b[k] += cosine * light.irradiance.z * share.z;
-}
-
-void subtract_open(Receivers& r, std::size_t k, const DirectionalLight& light) {
-  const float cosine = cosine_at(r, k, light.direction);
-  r.open_r[k] -= cosine * light.irradiance.x;
-  r.open_g[k] -= cosine * light.irradiance.y;
-  r.open_b[k] -= cosine * light.irradiance.z;
-}
-
 // That a tested light may stand for: where a point faces few of those that it tests, they are too
 // few to tell how much light there is.
 constexpr float most_stood_for = 16;
 constexpr float rough_accuracy = 0.5F;  // from here on, points that count little test half as many
 
-struct Box {
-  Vec3f centre, half;
-};
-
-// Whether anything in `bounds` can lie between a point of `box` and a light in direction l.
-bool may_block(const Scene::Bounds& bounds, const Box& box, Vec3f l) {
-  float near_t = 0, far_t = ray_far;
-  const auto slab = [&](float lower, float upper, float centre, float half, float d) {
-    lower -= centre + half;
-    upper -= centre - half;
-    if (std::abs(d) < 1e-12F) return lower <= 0 && upper >= 0;
-    const float a = lower / d, b = upper / d;
-    near_t = std::max(near_t, std::min(a, b));
-    far_t = std::min(far_t, std::max(a, b));
-    return near_t <= far_t;
-  };
-  return slab(bounds.lower.x, bounds.upper.x, box.centre.x, box.half.x, l.x) &&
-         slab(bounds.lower.y, bounds.upper.y, box.centre.y, box.half.y, l.y) &&
-         slab(bounds.lower.z, bounds.upper.z, box.centre.z, box.half.z, l.z);
-}
-
-Box box_of(const Receivers& r) {
+Scene::Bounds box_of(const Receivers& r) {
   Vec3f lower{ray_far, ray_far, ray_far}, upper = -lower;
   for (std::size_t word = 0; word < 4; ++word) {
     for (std::uint64_t bits = r.active[word]; bits != 0; bits &= bits - 1) {
@@ -117,15 +52,18 @@ Box box_of(const Receivers& r) {
       upper = {std::max(upper.x, r.px[k]), std::max(upper.y, r.py[k]), std::max(upper.z, r.pz[k])};
     }
   }
-  return {(lower + upper) * 0.5F, (upper - lower) * 0.5F};
+  return {lower, upper};
 }
 
-bool can_be_blocked(const LightContext& context, const Box& box, Vec3f l) {
+bool can_be_blocked(const LightContext& context, const Scene::Bounds& box, std::size_t light) {
   if (!context.effort->cull_lights) return true;
+  const Vec3f middle = context.table->lights[light].direction;
+  const DirectionRange to =
+      context.has_parts(light) ? context.parts->range(light) : DirectionRange{middle, middle};
   const auto& boxes = context.scene->blocker_boxes();
-  return may_block(context.scene->blocker_bounds(), box, l) &&
+  return may_be_met(context.scene->blocker_bounds(), box, to) &&
          std::any_of(boxes.begin(), boxes.end(),
-                     [&](const Scene::Bounds& b) { return may_block(b, box, l); });
+                     [&](const Scene::Bounds& b) { return may_be_met(b, box, to); });
 }
 
 // A point that counts little tests every second, fourth ... light only; compact ones are few and
@@ -143,11 +81,6 @@ bool shines_on(const Receivers& r, std::size_t k, Vec3f l) {
 }
 
 float sum(Vec3f v) { return v.x + v.y + v.z; }
-
-void clear_sums(Receivers& r) {
-  r.open_r.fill(0), r.open_g.fill(0), r.open_b.fill(0);
-  r.lost_r.fill(0), r.lost_g.fill(0), r.lost_b.fill(0);
-}
 
 // What a cell's centres get of a light's caustics, its colour as tints.
 void add_cell_caustic(const LightContext& context,
@@ -174,6 +107,76 @@ void add_cell_caustic(const LightContext& context,
   cell.factors.push_back(factors);
 }
 
+// How far things cast sharp shadows, by how far neighbouring pixels' points lie apart: penumbrae as
+// wide as two pixels.
+void find_sharp(const Receivers& r, GatherWorkspace& w) {
+  const auto step = [&r](std::size_t a, std::size_t b) {
+    if (!in(r.active, b) || r.surface[a] != r.surface[b]) return 0.0F;
+    return length(Vec3f{r.px[b] - r.px[a], r.py[b] - r.py[a], r.pz[b] - r.pz[a]});
+  };
+  w.sharp_m.fill(0);
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (!in(r.active, k)) continue;
+    const float across = step(k, k % cell_size + 1 < cell_size ? k + 1 : k - 1);
+    const float down = step(k, k + cell_size < cell_pixels ? k + cell_size : k - cell_size);
+    w.sharp_m[k] = across + down;
+  }
+}
+
+// Marks pixels that see a light that has parts otherwise than the next one does, or tinted.
+void find_soft(const LightContext& context,
+               const GatherWorkspace& w,
+               std::size_t first,
+               std::size_t count,
+               CellMask& soft_shadow) {
+  constexpr std::uint64_t last_column = 0x8000800080008000ULL;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!context.has_parts(first + i)) continue;
+    std::array<std::uint64_t, 5> soft{}, hidden{};
+    for (std::size_t word = 0; word < 4; ++word) {
+      soft[word] = w.lit[i][word] & ~w.near[i][word];
+      hidden[word] = soft[word] & ~w.seen[i][word];
+    }
+    for (std::size_t word = 0; word < 4; ++word) {
+      const auto next_row = [word](const auto& of) { return of[word] >> 16 | of[word + 1] << 48; };
+      const std::uint64_t right = (hidden[word] ^ hidden[word] >> 1) & soft[word] >> 1;
+      const std::uint64_t below = (hidden[word] ^ next_row(hidden)) & next_row(soft);
+      soft_shadow[word] |= soft[word] & ((right & ~last_column) | below);
+    }
+  }
+  for (const GatherWorkspace::Tint& tint : w.tints) {
+    const std::size_t k = tint.point;
+    if (!context.has_parts(tint.light) || in(w.near[tint.light - first], k)) continue;
+    soft_shadow[k / 64] |= std::uint64_t{1} << (k % 64);
+  }
+}
+
+void find_windows(const Receivers& r,
+                  const CellMask& soft_shadow,
+                  std::vector<ShadowWindow>& windows) {
+  constexpr int side = SoftLights::side;
+  for (int y = 0; y < cell_size; ++y) {
+    for (int x = 0; x < cell_size; ++x) {
+      const auto centre = static_cast<std::size_t>(y * cell_size + x);
+      if (!in(r.active, centre)) continue;
+      const int x0 = std::clamp(x - 1, 0, cell_size - side);
+      const int y0 = std::clamp(y - 1, 0, cell_size - side);
+      unsigned members = 0;
+      bool soft = false;
+      for (int i = 0; i < side * side; ++i) {
+        const auto k = static_cast<std::size_t>((y0 + i / side) * cell_size + x0 + i % side);
+        if (!in(r.active, k) || !is_one_surface(r, centre, k)) continue;
+        members |= 1U << i;
+        soft = soft || in(soft_shadow, k);
+      }
+      if (!soft) continue;
+      windows.push_back({static_cast<std::uint8_t>(centre),
+                         static_cast<std::uint8_t>(y0 * cell_size + x0),
+                         static_cast<std::uint16_t>(members)});
+    }
+  }
+}
+
 }  // namespace
 
 unsigned LightContext::mask_to(std::uint32_t light) const {
@@ -185,13 +188,16 @@ void gather_cell(const LightContext& context,
                  GatherWorkspace& w,
                  CellVisibility& visibility,
                  RenderStatistics& statistics) {
-  clear_sums(r);
   find_smooth_blocks(r, w);
   const auto& lights = context.table->lights;
   visibility.lit.resize(lights.size());
   visibility.seen.resize(lights.size());
   visibility.tints.clear();
-  const Box box = box_of(r);
+  visibility.windows.clear();
+  if (context.parts != nullptr) find_sharp(r, w);
+  visibility.near.resize(lights.size());
+  CellMask soft_shadow{};
+  const Scene::Bounds box = box_of(r);
   CellMask real_first{};
   if (context.scene->has_real_blockers()) {
     for (std::size_t k = 0; k < cell_pixels; ++k) {
@@ -215,7 +221,7 @@ void gather_cell(const LightContext& context,
       if (group[i].compact == 0) {
         for (std::size_t word = 0; word < 4; ++word) w.lit[i][word] &= answering[word];
       }
-      skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, group[i].direction);
+      skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, first + i);
     }
     if (real_first != CellMask{}) {
       // Light that real things block is not there to be lost.
@@ -226,10 +232,6 @@ void gather_cell(const LightContext& context,
       for (std::size_t i = 0; i < count; ++i) {
         for (std::size_t word = 0; word < 4; ++word) {
           const std::uint64_t hidden = w.lit[i][word] & ~w.seen[i][word] & real_first[word];
-          for (std::uint64_t bits = hidden; bits != 0; bits &= bits - 1) {
-            const auto k = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-            subtract_open(r, k, lights[first + i]);
-          }
           w.lit[i][word] &= ~hidden;
         }
       }
@@ -237,16 +239,21 @@ void gather_cell(const LightContext& context,
     VisibilityFinder finder(context, r, w, statistics, 0);
     finder.skip_ = skip;
     finder.find(first32, count);
-    add_hidden(r, group, std::span(w.lit).first(count), std::span(w.seen).first(count));
     for (const auto& tint : w.tints) {
-      add_lost(r, tint.point, lights[tint.light], tint.lost_share);
       visibility.tints.push_back({static_cast<std::uint16_t>(tint.light),
                                   static_cast<std::uint16_t>(tint.point), tint.lost_share});
     }
     std::copy_n(w.lit.begin(), count, visibility.lit.begin() + static_cast<std::ptrdiff_t>(first));
     std::copy_n(w.seen.begin(), count,
                 visibility.seen.begin() + static_cast<std::ptrdiff_t>(first));
+    if (context.parts == nullptr) continue;
+    std::copy_n(w.near.begin(), count,
+                visibility.near.begin() + static_cast<std::ptrdiff_t>(first));
+    find_soft(context, w, first, count, soft_shadow);
   }
+  if (soft_shadow != CellMask{}) find_windows(r, soft_shadow, visibility.windows);
+  if (visibility.windows.empty()) visibility.near.clear();
+  add_up_light({r.active, r.nx, r.ny, r.nz}, lights, visibility, r.light, w.soft);
 }
 
 void gather_points(const LightContext& context,
@@ -254,7 +261,7 @@ void gather_points(const LightContext& context,
                    GatherWorkspace& w,
                    std::vector<PointLight>& tested,
                    RenderStatistics& statistics) {
-  clear_sums(r);
+  r.light = {};
   const auto& lights = context.table->lights;
   const bool real = context.scene->has_real_blockers();
   const auto is_tested = [&](std::size_t k, std::uint32_t i) {
@@ -280,8 +287,8 @@ void gather_points(const LightContext& context,
         cosine_at(r, k, lights[i].direction) * (lights[i].compact != 0 ? 1.0F : stands_for[k]);
     const Vec3f open = lights[i].irradiance * weight;
     const Vec3f lost = open * (Vec3f{1, 1, 1} - passed);
-    r.open_r[k] += open.x, r.open_g[k] += open.y, r.open_b[k] += open.z;
-    r.lost_r[k] += lost.x, r.lost_g[k] += lost.y, r.lost_b[k] += lost.z;
+    r.light.add_open(k, open);
+    r.light.add_lost(k, lost);
     tested.push_back(
         {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), weight, passed});
   };
@@ -297,7 +304,8 @@ void gather_points(const LightContext& context,
           continue;
         }
       }
-      add_ray(w, r, k, i, l, r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
+      add_ray(w, r, k, i, context.direction(r, k, i),
+              r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
       if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }
   }

@@ -6,14 +6,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/cell_visibility.h"
 #include "render/frame_job.h"
 #include "render/ray_log.h"
 #include "render/scene.h"
 
 namespace render {
 
-inline constexpr int cell_size = 16;
-inline constexpr int cell_pixels = cell_size * cell_size;
 inline constexpr int stream_rays = 256;  // rays that go to Embree at once
 
 // Up to 256 points that receive light, as structure of arrays. In a grid, entry y * 16 + x is the
@@ -22,14 +21,13 @@ struct Receivers {
   alignas(64) std::array<float, cell_pixels> px, py, pz;  // shadow ray origins, off the surface
   alignas(64) std::array<float, cell_pixels> nx, ny, nz;  // shading normal
   alignas(64) std::array<float, cell_pixels> gx, gy, gz;  // geometric normal
-  alignas(64) std::array<float, cell_pixels> open_r, open_g,
-      open_b;  // out: if nothing virtual blocked
-  alignas(64) std::array<float, cell_pixels> lost_r, lost_g,
-      lost_b;                                      // out: what virtual objects block
-  std::array<std::uint32_t, cell_pixels> surface;  // same number = same object and material
-  std::array<std::uint32_t, cell_pixels> mask;     // what blocks: mask_virtual, mask_real_blocker
+  LightSums light;                                        // out
+  std::array<std::uint32_t, cell_pixels> surface;         // same number = same object and material
+  std::array<std::uint32_t, cell_pixels> mask;  // what blocks: mask_virtual, mask_real_blocker
   std::array<std::uint8_t, cell_pixels>
       real_first;  // light that real things block does not count as open
+  // Part of wide lights that it looks for; in a grid, that of its pixel.
+  std::array<std::uint8_t, cell_pixels> part;
   // Of the pixel: weak points test fewer lights, those of 0 only the compact ones.
   std::array<float, cell_pixels> share;
   std::array<std::uint64_t, 4> active;    // bit y % 4 * 16 + x of word y / 4
@@ -38,11 +36,6 @@ struct Receivers {
   std::array<std::uint64_t, 4> by_caustics;
   int count = 0;  // of entries, if not a grid
 };
-
-// 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.
-using CellMask = std::array<std::uint64_t, 4>;
-
-inline bool in(const CellMask& mask, std::size_t k) { return (mask[k / 64] >> (k % 64) & 1) != 0; }
 
 // Structure of arrays of one stream of shadow rays, and scratch of one gather.
 struct GatherWorkspace {
@@ -55,13 +48,17 @@ struct GatherWorkspace {
   std::uint32_t* counts = nullptr;  // adds up shadow rays by receiver, if set
 
   static constexpr int group = 64;  // lights at a time
-  std::array<CellMask, group> lit, seen, tested;
+  std::array<CellMask, group> lit, seen, tested, near;
   struct Tint {
     std::uint32_t light, point;
     Vec3f lost_share;
   };
   std::vector<Tint> tints;  // light that glass weakened, capacity reserved
-  CellMask same4, same2;    // pixels whose 4x4, 2x2 block is one smooth surface
+  LightSums soft;
+  // What is so near to a centre, times the radius of a light, casts penumbrae narrower than pixels
+  // can share.
+  std::array<float, cell_pixels> sharp_m;
+  CellMask same4, same2;  // pixels whose 4x4, 2x2 block is one smooth surface
 };
 
 class Caustics;
@@ -73,29 +70,26 @@ struct LightContext {
   const Effort* effort = nullptr;
   const Caustics* caustics = nullptr;  // whose lights follow the table's own lamps, or null
   std::size_t first_caustic = 0;       // of the lamps
+  const SoftLights* parts = nullptr;   // null: all lights are looked for in their middle
 
   bool is_caustic(std::size_t lamp) const { return caustics != nullptr && lamp >= first_caustic; }
   // What shadow rays to a light of the table carry in their mask beside what blocks them.
   unsigned mask_to(std::uint32_t light) const;
+  bool has_parts(std::size_t light) const { return parts != nullptr && parts->has(light); }
+  // Towards a light from a receiver: to the part that it looks for, or to the middle, if that part
+  // has set there.
+  Vec3f direction(const Receivers& r, std::size_t point, std::uint32_t light) const {
+    const Vec3f middle = table->lights[light].direction;
+    if (!has_parts(light) || r.part[point] == SoftLights::middle) return middle;
+    const Vec3f to = parts->direction(light, r.part[point]);
+    return r.gx[point] * to.x + r.gy[point] * to.y + r.gz[point] * to.z > 0 ? to : middle;
+  }
 };
 
-// Light that glass weakens on its way to a pixel's centre.
-struct TintedLight {
-  std::uint16_t light, centre;
-  Vec3f lost_share;
-};
-
-// What a cell's centres see of each light of the table: pixels that it shines on where no real
-// thing is in the way; of these, those that no virtual object hides from it.
-struct CellVisibility {
-  std::vector<CellMask> lit, seen;
-  std::vector<TintedLight> tints;
-};
-
-// Finds that for the pixels of a cell, and adds up their light: open and lost. Shadow rays go to
+// Finds what the pixels of a cell see, and adds up their light. Shadow rays go to
 // one pixel of every 4x4 block of a smooth surface first, another for each light, but an outermost
 // one at the cell's border; where blocks disagree with their neighbours, to their 2x2 blocks or
-// pixels, as the effort's interleave asks.
+// pixels, as the effort's interleave asks; for lights that have parts, all over the cell.
 void gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,

@@ -16,7 +16,7 @@ namespace render {
 namespace {
 
 constexpr std::array<float, 3> dark_metal{0.06F, 0.065F, 0.07F};
-constexpr int segments = 64;
+constexpr int lamp_segments = 64;
 constexpr float below_m = 0.002F;  // of the lights under the disc, so that it does not hide them
 
 Vec3f turned(const Placement& m, Vec3f v) {
@@ -32,16 +32,16 @@ SceneDescription made_lamp(float emission_gain) {
   const float top = disc.z + 0.12F;
   const std::array<std::array<float, 2>, 5> pole{
       {{0.06F, 0}, {0.06F, 0.05F}, {0.025F, 0.07F}, {0.025F, top}, {0, top}}};
-  Mesh post = make_lathe(pole, segments, 1);
+  Mesh post = make_lathe(pole, lamp_segments, 1);
   append(post, make_box({0, -0.012F, top - 0.03F}, {disc.x, 0.012F, top - 0.006F}, 0.004F, 1));
   const float rim = lamp_disc_radius_m + 0.012F;
   const std::array<std::array<float, 2>, 4> shade{
       {{lamp_disc_radius_m, disc.z}, {rim, disc.z}, {0.04F, top}, {0, top}}};
-  append(post, make_lathe(shade, segments, 1), {disc.x, disc.y, 0});
+  append(post, make_lathe(shade, lamp_segments, 1), {disc.x, disc.y, 0});
   lamp.add("lamp post", std::move(post), dark_metal, 0.5F, -1, 1, 0);
   Mesh glow;
   const std::array<std::array<float, 2>, 2> flat{{{0, disc.z}, {lamp_disc_radius_m, disc.z}}};
-  append(glow, make_lathe(flat, segments, 1), {disc.x, disc.y, 0});
+  append(glow, make_lathe(flat, lamp_segments, 1), {disc.x, disc.y, 0});
   lamp.add(std::string(lamp_glow), std::move(glow), {0, 0, 0}, 1, -1, 0);
   SceneDescription scene = lamp.take();
   StandardParameters parameters = standard_parameters(scene.materials.back(), 0);

@@ -18,6 +18,8 @@ Effort effort_of_stage(const Effort& effort, int stage) {
   Effort coarse = effort;
   if (stage >= finished_stage) return coarse;
   coarse.chance_cuts = false;  // of few rays it is noise
+  // Takes shadow rays, and of blocks too few pixels would look for parts.
+  if (stage < few_rays_stage) coarse.soft_lights = false;
   const bool blocks = stage < one_ray_stage;
   coarse.accuracy =
       std::min(effort.accuracy, stage < few_rays_stage ? coarsest_accuracy : coarse_accuracy);

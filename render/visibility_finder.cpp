@@ -3,11 +3,13 @@
 
 namespace render {
 
+bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b) {
+  return r.surface[a] == r.surface[b] &&
+         r.nx[a] * r.nx[b] + r.ny[a] * r.ny[b] + r.nz[a] * r.nz[b] > 0.93F;
+}
+
 void find_smooth_blocks(const Receivers& r, GatherWorkspace& w) {
-  const auto alike = [&r](std::size_t a, std::size_t b) {
-    return r.surface[a] == r.surface[b] &&
-           r.nx[a] * r.nx[b] + r.ny[a] * r.ny[b] + r.nz[a] * r.nz[b] > 0.93F;
-  };
+  const auto alike = [&r](std::size_t a, std::size_t b) { return is_one_surface(r, a, b); };
   w.same4 = w.same2 = {};
   for (int by = 0; by < cell_size; by += 2) {
     for (int bx = 0; bx < cell_size; bx += 2) {

@@ -16,6 +16,9 @@ inline constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 o
 inline int bit_of(int x, int y) { return (y & 3) * 16 + x; }
 inline int point_of(int word, int bit) { return word * 64 + bit; }
 
+// Whether two pixels show the same surface, and it is nearly flat between them.
+bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b);
+
 // Marks the blocks of a cell that are one smooth surface.
 void find_smooth_blocks(const Receivers& r, GatherWorkspace& w);
 
@@ -35,7 +38,8 @@ class VisibilityFinder {
         ray_mask_(ray_mask),
         lamps_(lamps) {}
 
-  // Fills w.seen for lights first .. first + count - 1 from w.lit; tints what glass weakens.
+  // Fills w.seen for lights first .. first + count - 1 from w.lit, and w.near; tints what glass
+  // weakens.
   void find(std::uint32_t first, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) {
       w_.seen[i] = w_.lit[i];
@@ -49,6 +53,11 @@ class VisibilityFinder {
     }
     shoot_rest(first);
     for (std::size_t i = 0; i < count; ++i) {
+      w_.near[i] = {};
+      if (!skip_[i] && ray_mask_ == 0 && has_parts(first, i)) test_near(first, i);
+    }
+    shoot_near(first);
+    for (std::size_t i = 0; i < count; ++i) {
       if (!skip_[i]) spread(i);
     }
   }
@@ -57,6 +66,9 @@ class VisibilityFinder {
 
  private:
   static std::uint64_t bit(int k) { return std::uint64_t{1} << k; }
+  bool has_parts(std::uint32_t first, std::size_t i) const {
+    return !lamps_ && context_.has_parts(first + i);
+  }
 
   void test(std::uint32_t first, std::size_t i, int word, int k) {
     const auto wi = static_cast<std::size_t>(word);
@@ -69,7 +81,7 @@ class VisibilityFinder {
       const auto ray = ray_to_lamp(lamp_receiver(r_, point), context_.table->lamps[light]);
       add_ray(w_, r_, point, light, ray->direction, mask, ray->far_m);
     } else {
-      add_ray(w_, r_, point, light, context_.table->lights[light].direction,
+      add_ray(w_, r_, point, light, context_.direction(r_, point, light),
               mask | (ray_mask_ == 0 && in(r_.by_caustics, point) ? context_.mask_to(light) : 0U));
     }
     if (w_.rays == stream_rays) shoot_rest(first);
@@ -92,7 +104,12 @@ class VisibilityFinder {
   // closely, it is an outermost one at the border of the cell, so that no shadow comes in unseen
   // from the cell beside, and the two cells agree where they meet.
   int first_of_block(std::uint32_t light, int word, int bx) const {
-    const auto any = static_cast<int>((light * 7 + light / 16) & 15);
+    auto any = static_cast<int>((light * 7 + light / 16) & 15);
+    // Of lights that have parts, another one for each block: blocks side by side, of different
+    // quarters.
+    if (!lamps_ && context_.has_parts(light)) {
+      any ^= (bx / 4 & 1) * 2 + (word & 1) * 8 + bx / 8 + (word & 2) * 2;
+    }
     if (block_ == 4) return bit_of(bx + (any & 3), any >> 2);
     return bit_of(bx + outermost(bx / 4, any & 3), outermost(word, any >> 2));
   }
@@ -168,7 +185,10 @@ class VisibilityFinder {
       const unsigned rows = f | (f << 4) | (f >> 4);
       return (rows | ((rows & 0x7777U) << 1) | ((rows & 0xEEEEU) >> 1)) & 0xFFFFU;
     };
-    const unsigned differ = (grown(hidden) & sees) | (grown(sees) & hidden) | grown(tinted);
+    unsigned differ = (grown(hidden) & sees) | (grown(sees) & hidden) | grown(tinted);
+    // Penumbrae of a light that has parts are broad, and what little of them a block's one pixel
+    // misses would show beside a block that is looked at more closely.
+    if (has_parts(first, i) && hidden != 0 && sees != 0) differ = 0xFFFF;
     for (int by = 0; by < 4; ++by) {
       const auto wi = static_cast<std::size_t>(by);
       for (int bx = 0; bx < 4; ++bx) {
@@ -184,6 +204,37 @@ class VisibilityFinder {
     }
   }
 
+  // Tells what is hidden, or tinted, by something near, where not all of the cell agrees.
+  void test_near(std::uint32_t first, std::size_t i) {
+    CellMask dimmed{};
+    std::uint64_t any_dimmed = 0, any_seen = 0, any_tinted = 0;
+    for (std::size_t wi = 0; wi < 4; ++wi) {
+      dimmed[wi] = w_.tested[i][wi] & (~w_.seen[i][wi] | tinted_[i][wi]);
+      any_dimmed |= dimmed[wi];
+      any_seen |= w_.tested[i][wi] & w_.seen[i][wi];
+      any_tinted |= tinted_[i][wi];
+    }
+    if (any_dimmed == 0 || (any_seen | any_tinted) == 0) return;
+    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    const float radius = context_.table->lights[light].spread;
+    for (std::size_t wi = 0; wi < 4; ++wi) {
+      for (std::uint64_t left = dimmed[wi]; left != 0; left &= left - 1) {
+        const auto point = wi * 64 + static_cast<std::size_t>(std::countr_zero(left));
+        add_ray(w_, r_, point, light, context_.direction(r_, point, light), r_.mask[point],
+                w_.sharp_m[point] / radius);
+        if (w_.rays == stream_rays) shoot_near(first);
+      }
+    }
+  }
+
+  void shoot_near(std::uint32_t first) {
+    flush(*context_.scene, w_, statistics_,
+          [&](std::uint32_t point, std::uint32_t light, bool blocked, Vec3f share) {
+            if (!blocked && share == Vec3f{1, 1, 1}) return;
+            w_.near[light - first][point / 64] |= bit(static_cast<int>(point % 64));
+          });
+  }
+
   // Gives a 2x2 block's answer to its four pixels.
   void spread(std::size_t i) {
     if (block_ < 2) return;
@@ -193,7 +244,10 @@ class VisibilityFinder {
       for (; left != 0; left &= left - 1) {
         const int k = std::countr_zero(left);
         const std::uint64_t bits = block2 << ((k / 32) * 32 + (k % 16) / 2 * 2);
-        if ((smooth & bits) == bits) w_.seen[i][wi] &= ~(bits & ~(w_.tested[i][wi]));
+        if ((smooth & bits) != bits) continue;
+        const std::uint64_t others = bits & ~w_.tested[i][wi];
+        w_.seen[i][wi] &= ~others;
+        if (w_.near[i][wi] & bit(k)) w_.near[i][wi] |= others;
       }
     }
   }

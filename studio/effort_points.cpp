@@ -43,6 +43,7 @@ EffortPoint point_of(const Json& point, render::Effort effort) {
   effort.light_samples = whole(settings, "light_samples", 1, 4096);
   effort.interleave = whole(settings, "interleave", 1, 4);
   effort.adaptive_visibility = settings.at("adaptive_visibility").get<bool>();
+  effort.soft_lights = settings.value("soft_lights", effort.soft_lights);
   effort.accuracy = settings.at("accuracy").get<float>();
   effort.chance_cuts = settings.value("chance_cuts", effort.chance_cuts);
   const EffortPoint result{effort, point.at("time_ms").get<double>(),
@@ -63,6 +64,7 @@ std::vector<std::pair<std::string, ChartValue>> settings_of(const render::Effort
           {"light_samples", static_cast<double>(effort.light_samples)},
           {"interleave", static_cast<double>(effort.interleave)},
           {"adaptive_visibility", effort.adaptive_visibility},
+          {"soft_lights", effort.soft_lights},
           {"accuracy", as_written(effort.accuracy)},
           {"chance_cuts", effort.chance_cuts}};
 }

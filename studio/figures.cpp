@@ -19,6 +19,7 @@ Json effort_json(const render::Effort& effort) {
           {"bounce_lamps", effort.bounce_lamps},
           {"caustic_photons", effort.caustic_photons},
           {"adaptive_visibility", effort.adaptive_visibility},
+          {"soft_lights", effort.soft_lights},
           {"cull_lights", effort.cull_lights},
           {"accuracy", effort.accuracy},
           {"chance_cuts", effort.chance_cuts},

@@ -134,6 +134,7 @@ render::Effort read_effort_section(Section section) {
   section.integer("bounce_lamps", effort.bounce_lamps, 0, 1024);
   section.integer("caustic_photons", effort.caustic_photons, 0, render::most_caustic_photons);
   section.boolean("adaptive_visibility", effort.adaptive_visibility);
+  section.boolean("soft_lights", effort.soft_lights);
   section.boolean("cull_lights", effort.cull_lights);
   section.number("accuracy", effort.accuracy, {0, 1});
   section.boolean("chance_cuts", effort.chance_cuts);

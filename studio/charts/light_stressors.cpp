@@ -175,7 +175,7 @@ Stressor LightStressors::whole_picture() {
     render::FrameJob job = shot.job;
     job.effort = {};
     job.effort.light_samples = count;
-    job.effort.adaptive_visibility = visibility.adaptive;
+    visibility.set_in(job.effort);
     job.lights = light.table;
     render::FrameInputs inputs = shot.inputs();
     inputs.environment = &light.environment;

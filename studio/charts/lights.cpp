@@ -137,7 +137,8 @@ class LightsChart {
     p.settings = {{"lights", static_cast<double>(settings.count)},
                   {"visibility", std::string(visibility.name)},
                   {"adaptive_visibility", visibility.adaptive},
-                  {"interleave", static_cast<double>(visibility.interleave)}};
+                  {"interleave", static_cast<double>(visibility.interleave)},
+                  {"soft_lights", visibility.soft}};
     p.by_default =
         settings == LightTableSettings{default_lights} && p.variant == adaptive_grid.name;
     p.label = fmt::format("{}{}", settings.count, p.by_default ? ": default" : "");

@@ -55,8 +55,7 @@ MatteShot::MatteShot(int width, int height)
 capture::Image MatteShot::render(const BenchLight& light, const Visibility& visibility) {
   render::FrameJob job = shot_.job;
   job.effort.light_samples = static_cast<int>(light.table.lights.size());
-  job.effort.adaptive_visibility = visibility.adaptive;
-  job.effort.interleave = visibility.interleave;
+  visibility.set_in(job.effort);
   job.lights = light.table;
   render_frame(inputs(light.environment), job, shot_.half_plate, result_);
   return capture::to_float(result_.rgba);

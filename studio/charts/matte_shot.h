@@ -13,11 +13,21 @@ struct Visibility {
   const char* name;
   bool adaptive;
   int interleave;
+  bool soft = true;  // lights are looked for all over their regions
+
+  void set_in(render::Effort& effort) const {
+    effort.adaptive_visibility = adaptive;
+    effort.interleave = interleave;
+    effort.soft_lights = soft;
+  }
 };
 inline constexpr Visibility every_pixel{"every pixel", false, 1};
 inline constexpr Visibility adaptive_grid{"adaptive grid", true, 1};
-inline constexpr Visibility visibilities[] = {
-    every_pixel, adaptive_grid, {"interleaved 2x2", true, 2}, {"interleaved 4x4", true, 4}};
+inline constexpr Visibility visibilities[] = {every_pixel,
+                                              adaptive_grid,
+                                              {"adaptive grid, hard", true, 1, false},
+                                              {"interleaved 2x2", true, 2},
+                                              {"interleaved 4x4", true, 4}};
 
 // What a show does if it is told nothing else.
 inline constexpr int default_lights = render::Effort{}.light_samples;

@@ -36,6 +36,7 @@ std::vector<EffortSetting> settings_to_measure(std::string_view scene, bool quic
   Effort papers = base;  // while anything moved
   papers.aa_samples = 1;
   papers.accuracy = 0.95F;
+  papers.soft_lights = false;
   all.push_back({"as the papers: one ray a pixel", "1 ray", papers});
   vary_effort(all, "accuracy", base, &Effort::accuracy, {0.9F, 0.99F});
   if (scene == "headlight") return all;
@@ -43,6 +44,8 @@ std::vector<EffortSetting> settings_to_measure(std::string_view scene, bool quic
   vary_effort(all, "tolerance of uncertain pixels", base, &Effort::aa_tolerance, {0.0F, 0.03F});
   vary_effort(all, "lights", base, &Effort::light_samples, {16, 256});
   vary_effort(all, "shadow rays", base, &Effort::interleave, {2, 4});
+  all.push_back({"shadow rays", "hard", base});
+  all.back().effort.soft_lights = false;
   return all;
 }
 

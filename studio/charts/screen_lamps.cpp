@@ -114,8 +114,7 @@ Timed render(const BenchScene& shot, const Visibility& visibility, int runs) {
   render::FrameJob job = shot.job;
   job.effort.aa_samples = 1;
   job.effort.aa_tolerance = job.effort.glint_contrast = 0;
-  job.effort.adaptive_visibility = visibility.adaptive;
-  job.effort.interleave = visibility.interleave;
+  visibility.set_in(job.effort);
   render::FrameInputs inputs = shot.inputs();
   render::FrameResult result;
   const auto frame_ms = [&] {

@@ -60,6 +60,10 @@ std::vector<EffortSetting> settings_to_measure(const render::Effort& base, bool 
     all.push_back({"shadow rays", "every pixel", base});
     all.back().effort.adaptive_visibility = false;
   }
+  if (base.soft_lights) {
+    all.push_back({"shadow rays", "hard", base});
+    all.back().effort.soft_lights = false;
+  }
   vary_effort(all, "accuracy", base, &Effort::accuracy, {0.8F, 0.9F, 0.98F, 0.99F});
   return all;
 }

@@ -30,6 +30,7 @@ render::Effort papers_effort() {
   render::Effort effort;
   effort.aa_samples = 1;
   effort.accuracy = 0.95F;
+  effort.soft_lights = false;
   return effort;
 }
 

@@ -312,7 +312,7 @@ TEST(Billboard, IsWhenLitAsAMatteBoardOfItsAlbedo) {
   // Each pixel tests each light: what is shared between neighbours depends on where edges are.
   const auto seen_of = [](const render::Material& material, render::Scene::Pictures pictures) {
     MadeShot shot = shot_of(shaded(material), std::move(pictures));
-    shot.job.effort.adaptive_visibility = false;
+    shot.job.effort.adaptive_visibility = shot.job.effort.soft_lights = false;
     return picture_of(shot);
   };
   const capture::Image board_seen = seen_of(render::make_standard_material("board", paint), {});

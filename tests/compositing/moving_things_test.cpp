@@ -79,7 +79,9 @@ TEST(MovedThings, MissNoPointThatTheyShade) {
     if (i % 4 == 1) table.lamps[0].position = from + (inside - from) * dice(1, 3);
     render::CellReach reach;
     reach.add_receiver(grid, from);
-    const render::MovedThings things({{middle - half, middle + half}}, grid, table, reach.lit);
+    const render::SoftLights soft(table.lights);
+    const render::MovedThings things({{middle - half, middle + half}}, grid, table, soft,
+                                     reach.lit);
     told += things.may_change(reach);
     const auto lies_between = [&](Vec3f along, float far) {
       for (int step = 0; step <= 2000; ++step) {
@@ -91,7 +93,12 @@ TEST(MovedThings, MissNoPointThatTheyShade) {
       return false;
     };
     bool between = lies_between(table.lamps[0].position - from, 1);
-    for (const auto& light : table.lights) between = between || lies_between(light.direction, 10);
+    for (std::size_t light = 0; light < table.lights.size() && !between; ++light) {
+      between = lies_between(table.lights[light].direction, 10);
+      for (std::uint8_t part = 0; part < render::SoftLights::count && !between; ++part) {
+        between = lies_between(soft.direction(light, part), 10);
+      }
+    }
     if (!between) continue;
     ++shaded;
     EXPECT_TRUE(things.may_change(reach)) << i;

@@ -21,6 +21,7 @@ FrameJob made_job() {
   job.effort.bounce_lamps = 12;
   job.effort.caustic_photons = 4096;
   job.effort.adaptive_visibility = false;
+  job.effort.soft_lights = false;
   job.effort.aa_tolerance = 0.25F;
   job.effort.glint_contrast = 0.75F;
   job.textures = {{0, capture::Time(1)}, {1, capture::Time(2)}};

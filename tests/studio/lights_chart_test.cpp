@@ -54,7 +54,7 @@ TEST(LightsChart, HasEveryMethodErringLessWithMoreLightsAndCalmWhereLightIsFollo
   }
   EXPECT_EQ(variants.size(), 3U);
   for (const char* method : {"split", "median cut"}) {
-    EXPECT_EQ(variants[method].size(), 4U) << method;
+    EXPECT_EQ(variants[method].size(), 5U) << method;
   }
   EXPECT_EQ(std::ranges::count(points, true, &ChartPoint::by_default), 1);
 

@@ -110,6 +110,7 @@ glint_contrast = 0.3
 light_samples = 16
 interleave = 2
 adaptive_visibility = false
+soft_lights = false
 cull_lights = false
 accuracy = 0.9
 max_depth = 4

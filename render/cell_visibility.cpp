@@ -1,0 +1,144 @@
+// The light that a cell's centres get.
+#include "render/cell_visibility.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "render/lanes.h"
+
+namespace render {
+namespace {
+
+constexpr std::uint16_t whole_window = 0xFFFF;
+
+using Plane = std::array<float, cell_pixels>;
+
+// Of some centres beside each other.
+struct LaneSums {
+  Lanes open_r = all(0), open_g = all(0), open_b = all(0);
+  Lanes lost_r = all(0), lost_g = all(0), lost_b = all(0);
+
+  // A light; hidden from those centres.
+  void add_light(Lanes r, Lanes g, Lanes b, unsigned hidden) {
+    open_r = add(open_r, r), open_g = add(open_g, g), open_b = add(open_b, b);
+    if (!hidden) return;
+    const Lanes mask = mask_of(hidden);
+    lost_r = add(lost_r, both(r, mask));
+    lost_g = add(lost_g, both(g, mask));
+    lost_b = add(lost_b, both(b, mask));
+  }
+  void add_sums(const LaneSums& o) {
+    open_r = add(open_r, o.open_r), open_g = add(open_g, o.open_g), open_b = add(open_b, o.open_b);
+    lost_r = add(lost_r, o.lost_r), lost_g = add(lost_g, o.lost_g), lost_b = add(lost_b, o.lost_b);
+  }
+  void store_at(std::size_t k, LightSums& to) const {
+    store(&to.open_r[k], open_r), store(&to.open_g[k], open_g), store(&to.open_b[k], open_b);
+    store(&to.lost_r[k], lost_r), store(&to.lost_g[k], lost_g), store(&to.lost_b[k], lost_b);
+  }
+};
+
+// Of every 4x4 that lies in the cell, at its top left.
+void add_up_windows(const Plane& of, Plane& sums) {
+  constexpr std::size_t last = SoftLights::side - 1;
+  Plane rows;
+  for (std::size_t k = 0; k + last < cell_pixels; ++k) {
+    rows[k] = (of[k] + of[k + 1]) + (of[k + 2] + of[k + 3]);
+  }
+  for (std::size_t k = 0; k + last * (cell_size + 1) < cell_pixels; ++k) {
+    sums[k] = (rows[k] + rows[k + cell_size]) + (rows[k + 2 * cell_size] + rows[k + 3 * cell_size]);
+  }
+}
+
+float sum_of_members(const ShadowWindow& window, const Plane& of) {
+  constexpr std::size_t side = SoftLights::side;
+  float sum = 0;
+  for (unsigned left = window.members; left != 0; left &= left - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(left));
+    sum += of[window.first + i / side * cell_size + i % side];
+  }
+  return sum;
+}
+
+// In one colour.
+void share_lost(std::span<const ShadowWindow> windows,
+                const Plane& open,
+                const Plane& own_lost,
+                Plane& lost) {
+  alignas(64) Plane open_sums, lost_sums;
+  add_up_windows(open, open_sums);
+  add_up_windows(own_lost, lost_sums);
+  for (const ShadowWindow& window : windows) {
+    const bool whole = window.members == whole_window;
+    const float all_open = whole ? open_sums[window.first] : sum_of_members(window, open);
+    const float all_lost = whole ? lost_sums[window.first] : sum_of_members(window, own_lost);
+    const std::size_t k = window.centre;
+    if (all_open > 0) lost[k] += open[k] * (all_lost / all_open) - own_lost[k];
+  }
+}
+
+}  // namespace
+
+void CellVisibility::clear() {
+  lit.clear(), seen.clear(), near.clear();
+  tints.clear(), windows.clear();
+}
+
+void add_up_light(const LitCentres& centres,
+                  std::span<const DirectionalLight> lights,
+                  const CellVisibility& visibility,
+                  LightSums& sums,
+                  LightSums& soft) {
+  const std::size_t count = std::min(lights.size(), visibility.lit.size());
+  const bool shares = !visibility.windows.empty();
+  for (std::size_t k = 0; k < cell_pixels; k += lanes) {
+    const auto bits_at = [k](const CellMask& mask) {
+      return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
+    };
+    LaneSums own, shared;
+    if (bits_at(centres.receiving)) {
+      const Lanes nx = load(&centres.nx[k]), ny = load(&centres.ny[k]), nz = load(&centres.nz[k]);
+      for (std::size_t i = 0; i < count; ++i) {
+        const unsigned lit = bits_at(visibility.lit[i]);
+        if (!lit) continue;
+        const DirectionalLight& l = lights[i];
+        const Lanes cosine = both(dot(nx, ny, nz, l.direction), mask_of(lit));
+        const Lanes r = multiply(cosine, all(l.irradiance.x));
+        const Lanes g = multiply(cosine, all(l.irradiance.y));
+        const Lanes b = multiply(cosine, all(l.irradiance.z));
+        const unsigned hidden = lit & ~bits_at(visibility.seen[i]);
+        if (!shares || !SoftLights::has_parts(l)) {
+          own.add_light(r, g, b, hidden);
+          continue;
+        }
+        const unsigned near = bits_at(visibility.near[i]);
+        if (!near) {
+          shared.add_light(r, g, b, hidden);
+          continue;
+        }
+        const Lanes hides = mask_of(near), shows = mask_of(~near);
+        own.add_light(both(r, hides), both(g, hides), both(b, hides), hidden & near);
+        shared.add_light(both(r, shows), both(g, shows), both(b, shows), hidden & ~near);
+      }
+    }
+    if (shares) {
+      shared.store_at(k, soft);
+      own.add_sums(shared);
+    }
+    own.store_at(k, sums);
+  }
+  for (const TintedLight& tint : visibility.tints) {
+    const std::size_t k = tint.centre;
+    const Vec3f normal{centres.nx[k], centres.ny[k], centres.nz[k]};
+    const DirectionalLight& l = lights[tint.light];
+    const Vec3f lost = l.irradiance * tint.lost_share * dot(normal, l.direction);
+    sums.add_lost(k, lost);
+    const bool soft_one = shares && SoftLights::has_parts(l) && !in(visibility.near[tint.light], k);
+    if (soft_one) soft.add_lost(k, lost);
+  }
+  if (!shares) return;
+  share_lost(visibility.windows, soft.open_r, soft.lost_r, sums.lost_r);
+  share_lost(visibility.windows, soft.open_g, soft.lost_g, sums.lost_g);
+  share_lost(visibility.windows, soft.open_b, soft.lost_b, sums.lost_b);
+}
+
+}  // namespace render

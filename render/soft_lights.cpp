@@ -1,0 +1,66 @@
+// Directions all over the regions that lights stand for.
+#include "render/soft_lights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace render {
+namespace {
+
+constexpr float golden_angle = 2.3999632F;
+constexpr float widest_rad = 1;  // wider regions are no disc
+// The parts are the middles of sixteen pieces of a disc: so much further out they spread as much as
+// the disc itself does.
+constexpr float further_out = 1.069F;
+
+// A place in the square -1 to 1, on the unit disc; equal areas stay equal. Shirley and Chiu, "A Low
+// Distortion Map between Disk and Square", JGT 1997.
+std::array<float, 2> on_disc(float u, float v) {
+  constexpr float eighth = std::numbers::pi_v<float> / 4;
+  const bool steep = std::abs(v) > std::abs(u);
+  const float radius = steep ? v : u;
+  const float angle = steep ? 2 * eighth - eighth * (u / v) : eighth * (v / u);
+  return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+
+}  // namespace
+
+SoftLights::SoftLights(std::span<const DirectionalLight> lights, bool in_parts)
+    : regions_(lights.size()) {
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const DirectionalLight& light = lights[i];
+    const Vec3f d = light.direction;
+    Region& region = regions_[i];
+    region.range = {d, d};
+    if (!in_parts || !has_parts(light)) continue;
+    region.has = true;
+    const Vec3f aside = std::abs(d.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0};
+    const Vec3f a = normalize(cross(aside, d)), b = cross(d, a);
+    // Turned from light to light, so that what their parts miss does not add up.
+    const float turn = golden_angle * static_cast<float>(i);
+    const Vec3f right = a * std::cos(turn) + b * std::sin(turn), up = cross(d, right);
+    const float radius = further_out * std::tan(std::min(light.spread, widest_rad));
+    for (std::size_t part = 0; part < count; ++part) {
+      const auto place = [](std::size_t k) {
+        return (static_cast<float>(k) + 0.5F) * (2.0F / side) - 1;
+      };
+      const auto [u, v] = on_disc(place(part % side), place(part / side));
+      const Vec3f to = normalize(d + (right * u + up * v) * radius);
+      region.directions[part] = to;
+      DirectionRange& range = region.range;
+      range.lower = {std::min(range.lower.x, to.x), std::min(range.lower.y, to.y),
+                     std::min(range.lower.z, to.z)};
+      range.upper = {std::max(range.upper.x, to.x), std::max(range.upper.y, to.y),
+                     std::max(range.upper.z, to.z)};
+    }
+  }
+}
+
+std::uint8_t SoftLights::part_of_sample(std::uint32_t sample) {
+  const std::uint32_t x = (sample & 1) * 2 + (sample >> 2 & 1);
+  const std::uint32_t y = (sample >> 1 & 1) * 2 + (sample >> 3 & 1);
+  return static_cast<std::uint8_t>(y * side + x);
+}
+
+}  // namespace render

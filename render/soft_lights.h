@@ -1,0 +1,65 @@
+// Directions all over the regions that lights of the table stand for. Private to the kernel.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/light_table.h"
+
+namespace render {
+
+// Directions, coordinate by coordinate.
+struct DirectionRange {
+  Vec3f lower, upper;
+};
+
+// A light stands for a region of the sky. Looked for in its middle alone it is hidden as a whole or
+// not at all, and shadows end in steps; looked for all over the region, in another part from pixel
+// to pixel, neighbours together see how much of it is hidden (shadow_windows.h).
+//
+// After Keller and Heidrich, "Interleaved Sampling", EGWR 2001.
+class SoftLights {
+ public:
+  static constexpr std::size_t side = 4;
+  static constexpr std::size_t count = side * side;
+  static constexpr std::uint8_t middle = count;  // no part, but the middle of the region
+
+  // Lights of compact sources have no parts: sources have lights enough of their own, and the
+  // shadows that they cast end sharply.
+  static bool has_parts(const DirectionalLight& light) {
+    return light.compact == 0 && light.spread > 0;
+  }
+
+  SoftLights() = default;
+  // If `in_parts` is not set, no light has parts.
+  explicit SoftLights(std::span<const DirectionalLight> lights, bool in_parts = true);
+
+  bool has(std::size_t light) const { return light < regions_.size() && regions_[light].has; }
+  // The part that a pixel looks for: those of any 4x4 pixels are all of them, and pixels that are
+  // two apart look into different quarters of the region.
+  static std::uint8_t part_of_pixel(std::size_t x, std::size_t y) {
+    return static_cast<std::uint8_t>(y % side * side + x % side);
+  }
+  // The part for one of many samples of the same pixel: the first four, and all sixteen, are spread
+  // evenly.
+  static std::uint8_t part_of_sample(std::uint32_t sample);
+  // Unit. Only of a light that has parts.
+  Vec3f direction(std::size_t light, std::uint8_t part) const {
+    return regions_[light].directions[part];
+  }
+
+  // Within which all directions of a light lie in which it is looked for, in parts or not.
+  DirectionRange range(std::size_t light) const { return regions_[light].range; }
+
+ private:
+  struct Region {
+    bool has = false;
+    std::array<Vec3f, count> directions;
+    DirectionRange range;
+  };
+  std::vector<Region> regions_;
+};
+
+}  // namespace render

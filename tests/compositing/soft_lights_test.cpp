@@ -1,0 +1,242 @@
+// Lights that stand for regions of the sky, looked for all over them: soft shadows against the area
+// of a disc that an edge leaves, sharp ones where things touch, and how few lights they need.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "made_shot.h"
+#include "render/soft_lights.h"
+
+namespace compositing {
+namespace {
+
+using capture::float_from_half;
+using render::SoftLights;
+using render::Vec3f;
+
+using std::numbers::pi;
+
+constexpr int side = 64;
+constexpr double metres_a_pixel = 0.01;
+
+// A floor seen from straight above, under one light, and a board `height` above it that covers what
+// is below row `row` of the picture.
+MadeShot under_board(double row, float height, const render::DirectionalLight& light) {
+  render::SceneDescription scene = made_scene(false);
+  auto board = std::make_shared<render::Mesh>();
+  const auto edge = static_cast<float>((31.5 - row) * metres_a_pixel);
+  board->positions = {{-5, -5, height}, {5, -5, height}, {5, edge, height}, {-5, edge, height}};
+  board->triangles = {{0, 1, 2}, {0, 2, 3}};
+  board->materials = {1};
+  scene.meshes.push_back(std::move(board));
+  scene.instances.emplace_back().mesh = 1;
+  MadeShot shot = made_shot(side, side, std::move(scene));
+  shot.directions =
+      calibrate::make_direction_table({"pinhole", side, side, {1000, 1000, 31.5, 31.5}});
+  shot.job.cam_from_set = calibrate::look_at({0, 0, 10}, {0, 0, 0}, 0);
+  shot.job.lights.lights = {light};
+  return shot;
+}
+
+render::FrameResult frame_of(const MadeShot& shot) {
+  render::FrameResult result;
+  render_frame(shot.inputs(), shot.job, shot.plate, result);
+  return result;
+}
+
+double matte_at(const render::FrameResult& frame, int x, int y) {
+  return static_cast<double>(float_from_half(frame.matte.pixels[frame.matte.index(y, x)]));
+}
+
+// Of a disc of radius 1, the area beyond a straight line at `offset` from its middle, as a share.
+double disc_beyond(double offset) {
+  const double x = std::clamp(offset, -1.0, 1.0);
+  return (std::acos(x) - x * std::sqrt(1 - x * x)) / pi;
+}
+
+TEST(SoftLights, LookAllOverTheirRegions) {
+  const std::array<render::DirectionalLight, 4> lights{{{{0, 0, 1}, {1, 1, 1}, 0.2F},
+                                                        {{1, 0, 0}, {1, 1, 1}, 0.02F},
+                                                        {{0.6F, 0, 0.8F}, {9, 9, 9}, 0.01F, 1},
+                                                        {{0, 1, 0}, {1, 1, 1}, 0}}};
+  const SoftLights soft(lights);
+  EXPECT_FALSE(soft.has(2)) << "a compact light has no parts";
+  EXPECT_FALSE(soft.has(3)) << "nor has one that is no region";
+  EXPECT_FALSE(soft.has(4));
+  for (std::size_t i = 0; i < 2; ++i) {
+    ASSERT_TRUE(soft.has(i));
+    const render::DirectionRange range = soft.range(i);
+    Vec3f sum{};
+    double squares = 0;
+    for (std::uint8_t part = 0; part < SoftLights::count; ++part) {
+      const Vec3f to = soft.direction(i, part);
+      EXPECT_NEAR(length(to), 1, 1e-5);
+      const double angle = std::acos(std::min(1.0F, dot(to, lights[i].direction)));
+      EXPECT_LE(angle, lights[i].spread * 1.001);
+      squares += angle * angle;
+      sum += to;
+      EXPECT_TRUE(range.lower.x <= to.x && to.x <= range.upper.x);
+      EXPECT_TRUE(range.lower.y <= to.y && to.y <= range.upper.y);
+      EXPECT_TRUE(range.lower.z <= to.z && to.z <= range.upper.z);
+    }
+    EXPECT_NEAR(length(normalize(sum) - lights[i].direction), 0, 1e-3) << "about its middle";
+    // A disc's points lie half its squared radius from the middle, in the mean of their squares.
+    EXPECT_NEAR(squares / SoftLights::count / (lights[i].spread * lights[i].spread), 0.5, 0.05);
+  }
+  for (std::size_t y = 0; y < 5; ++y) {
+    for (std::size_t x = 0; x < 5; ++x) {
+      std::set<int> parts;
+      for (std::size_t k = 0; k < 16; ++k) {
+        parts.insert(SoftLights::part_of_pixel(x + k % 4, y + k / 4));
+      }
+      EXPECT_EQ(parts.size(), SoftLights::count) << "of any 4x4 pixels";
+    }
+  }
+  std::set<int> parts, quarters;
+  for (std::uint32_t sample = 0; sample < 16; ++sample) {
+    const int part = SoftLights::part_of_sample(sample);
+    parts.insert(part);
+    if (sample < 4) quarters.insert(part % 4 / 2 + part / 8 * 2);
+  }
+  EXPECT_EQ(parts.size(), 16U);
+  EXPECT_EQ(quarters.size(), 4U) << "the first four samples look into different quarters";
+}
+
+TEST(SoftLights, CastThePenumbraOfADisc) {
+  // 20 m above, .4 m of penumbra: 40 of the picture's rows.
+  constexpr float height = 20, radius = 0.01F;
+  for (const double row : {30.0, 33.4}) {
+    MadeShot shot = under_board(row, height, {{0, 0, 1}, {3, 3, 3}, radius});
+    const render::FrameResult soft = frame_of(shot);
+    shot.job.effort.soft_lights = false;
+    const render::FrameResult hard = frame_of(shot);
+    double most = 0, squares = 0, most_hard = 0;
+    for (int y = 0; y < side; ++y) {
+      const double truth =
+          disc_beyond(-(y - row) * metres_a_pixel / (double{height} * std::tan(double{radius})));
+      for (int x = 0; x < side; ++x) {
+        const double off = matte_at(soft, x, y) - truth;
+        most = std::max(most, std::abs(off));
+        squares += off * off / (side * side);
+        most_hard = std::max(most_hard, std::abs(matte_at(hard, x, y) - truth));
+      }
+    }
+    EXPECT_LT(std::sqrt(squares), 0.045) << row;
+    EXPECT_LT(most, 0.13) << row;
+    EXPECT_GT(most_hard, 0.45) << "in its middle alone the light ends in a step";
+  }
+}
+
+TEST(SoftLights, CastSharpShadowsOfWhatIsNear) {
+  // The light comes over the board's edge: its shadow ends .15 m, 15 rows, above it, with .8 cm of
+  // penumbra.
+  const render::DirectionalLight light{{0, -0.6F, 0.8F}, {3, 3, 3}, 0.015F};
+  MadeShot shot = under_board(40, 0.2F, light);
+  const render::FrameResult soft = frame_of(shot);
+  shot.job.effort.soft_lights = false;
+  const render::FrameResult hard = frame_of(shot);
+  int dark = 0, differ = 0;
+  for (int y = 0; y < 40; ++y) {
+    for (int x = 0; x < side; ++x) {
+      dark += matte_at(hard, x, y) > 0.9;
+      if (std::abs(matte_at(soft, x, y) - matte_at(hard, x, y)) < 0.02) continue;
+      ++differ;
+      EXPECT_NEAR(y, 25, 1.1) << "far from the shadow's edge, in column " << x;
+    }
+  }
+  EXPECT_GT(dark, 12 * side);
+}
+
+// The sky as so many lights of the regions that they stand for.
+render::LightTable even_sky(int count) {
+  render::LightTable table = even_lights(count);
+  for (render::DirectionalLight& light : table.lights) {
+    light.spread = std::sqrt(2 / static_cast<float>(count));
+  }
+  return table;
+}
+
+// Of the shadows on the floor, where nothing stands before it.
+double rms_of_shadows(const render::FrameResult& a, const render::FrameResult& b) {
+  double squares = 0;
+  std::size_t count = 0;
+  for (int y = 0; y < a.rgba.height; ++y) {
+    for (int x = 0; x < a.rgba.width; ++x) {
+      const std::size_t alpha = a.rgba.index(y, x, 3);
+      if (a.rgba.pixels[alpha] != 0 || b.rgba.pixels[alpha] != 0) continue;
+      const double off = matte_at(a, x, y) - matte_at(b, x, y);
+      squares += off * off;
+      ++count;
+    }
+  }
+  return std::sqrt(squares / static_cast<double>(count));
+}
+
+TEST(SoftLights, ComeNearerToAnEvenSkyThanAsManyHardOnes) {
+  MadeShot shot = made_shot(320, 240, made_scene());
+  const render::Environment sky = made_sky(64, 0.2F, 1);
+  shot.job.effort.aa_samples = 1;
+  const auto frame_under = [&](int count, bool soft) {
+    shot.job.lights = make_light_table(sky, {.count = count});
+    shot.job.effort.soft_lights = soft;
+    return frame_of(shot);
+  };
+  const render::FrameResult truth = frame_under(2048, false);
+  const auto gain = [&](int count) {
+    return rms_of_shadows(truth, frame_under(count, true)) /
+           rms_of_shadows(truth, frame_under(count, false));
+  };
+  EXPECT_LT(gain(4), 0.5);
+  EXPECT_LT(gain(16), 0.55);
+  EXPECT_LT(gain(64), 0.7);
+}
+
+TEST(SoftLights, AreCulledOnlyWhereNoPartOfThemIsHidden) {
+  for (const int count : {1, 3, 12, 64}) {
+    MadeShot shot = made_shot(160, 96, made_scene());
+    shot.job.lights = even_sky(count);
+    shot.job.effort.aa_samples = 1;
+    const render::FrameResult culled = frame_of(shot);
+    shot.job.effort.cull_lights = false;
+    const render::FrameResult all = frame_of(shot);
+    EXPECT_EQ(culled.rgba.pixels, all.rgba.pixels) << count << " lights";
+    EXPECT_EQ(culled.matte.pixels, all.matte.pixels) << count << " lights";
+    EXPECT_LT(culled.statistics.shadow_rays, all.statistics.shadow_rays);
+  }
+}
+
+TEST(SoftLights, LeaveThePlateItsBitsWhereNothingIsHidden) {
+  MadeShot shot = made_shot(96, 64, made_scene(false));
+  shot.job.lights = even_sky(16);
+  const render::FrameResult frame = frame_of(shot);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_EQ(frame.rgba.pixels[frame.rgba.index(y, x, c)],
+                  shot.plate.pixels[shot.plate.index(y, x, c)]);
+      }
+    }
+  }
+}
+
+// Where the method ends: regions as wide as the sky, or wider, and lights below the ground.
+TEST(SoftLights, StayFiniteHoweverWideTheyAre) {
+  for (const float spread : {1e-30F, 1e-6F, 0.5F, 1.0F, 1.6F, 3.0F, 100.0F}) {
+    MadeShot shot = made_shot(96, 64, made_scene());
+    shot.job.lights = even_lights(8);
+    shot.job.lights.lights.push_back({{0, 0, -1}, {1, 1, 1}, spread});
+    for (render::DirectionalLight& light : shot.job.lights.lights) light.spread = spread;
+    const render::FrameResult frame = frame_of(shot);
+    for (const capture::Half pixel : frame.rgba.pixels) {
+      ASSERT_TRUE(std::isfinite(float_from_half(pixel))) << spread;
+    }
+    for (const capture::Half pixel : frame.matte.pixels) {
+      ASSERT_TRUE(float_from_half(pixel) >= 0 && float_from_half(pixel) <= 1) << spread;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace compositing
