@@ -13,15 +13,56 @@ constexpr std::uint16_t whole_window = 0xFFFF;
 
 using Plane = std::array<float, cell_pixels>;
 
+unsigned bits_at(const CellMask& mask, std::size_t k) {
+  return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
+}
+
+// The lights that shine on any of a cell's centres: those that no window shares, those that are
+// shared, and those that are hidden near some centres and shared by the others.
+class LightsOfCell {
+ public:
+  LightsOfCell(std::span<const DirectionalLight> lights, const CellVisibility& visibility) {
+    const bool shares = !visibility.windows.empty();
+    const std::size_t count =
+        std::min({lights.size(), visibility.lit.size(), std::size_t{most_lights}});
+    for (std::size_t i = 0; i < count; ++i) {
+      if (visibility.lit[i] == CellMask{}) continue;
+      const bool soft = shares && SoftLights::has_parts(lights[i]);
+      List& list = !soft ? own_ : visibility.near[i] == CellMask{} ? shared_ : both_;
+      list.lights[list.count++] = static_cast<std::uint16_t>(i);
+    }
+  }
+  std::span<const std::uint16_t> own() const { return own_.span(); }
+  std::span<const std::uint16_t> shared() const { return shared_.span(); }
+  std::span<const std::uint16_t> both() const { return both_.span(); }
+
+ private:
+  struct List {
+    std::array<std::uint16_t, most_lights> lights;
+    std::size_t count = 0;
+    std::span<const std::uint16_t> span() const { return std::span(lights).first(count); }
+  };
+  List own_, shared_, both_;
+};
+
+struct LaneNormals {
+  Lanes x, y, z;
+};
+
 // Of some centres beside each other.
 struct LaneSums {
   Lanes open_r = all(0), open_g = all(0), open_b = all(0);
   Lanes lost_r = all(0), lost_g = all(0), lost_b = all(0);
 
-  // A light; hidden from those centres.
-  void add_light(Lanes r, Lanes g, Lanes b, unsigned hidden) {
+  // A light that shines on these centres, and from which of them it is hidden.
+  void add_light(const LaneNormals& n, const DirectionalLight& l, unsigned lit, unsigned hidden) {
+    if (!lit) return;
+    const Lanes cosine = both(dot(n.x, n.y, n.z, l.direction), mask_of(lit));
+    const Lanes r = multiply(cosine, all(l.irradiance.x));
+    const Lanes g = multiply(cosine, all(l.irradiance.y));
+    const Lanes b = multiply(cosine, all(l.irradiance.z));
     open_r = add(open_r, r), open_g = add(open_g, g), open_b = add(open_b, b);
-    if (!hidden) return;
+    if (!(lit & hidden)) return;
     const Lanes mask = mask_of(hidden);
     lost_r = add(lost_r, both(r, mask));
     lost_g = add(lost_g, both(g, mask));
@@ -88,36 +129,25 @@ void add_up_light(const LitCentres& centres,
                   const CellVisibility& visibility,
                   LightSums& sums,
                   LightSums& soft) {
-  const std::size_t count = std::min(lights.size(), visibility.lit.size());
   const bool shares = !visibility.windows.empty();
+  const LightsOfCell of_cell(lights, visibility);
   for (std::size_t k = 0; k < cell_pixels; k += lanes) {
-    const auto bits_at = [k](const CellMask& mask) {
-      return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
-    };
     LaneSums own, shared;
-    if (bits_at(centres.receiving)) {
-      const Lanes nx = load(&centres.nx[k]), ny = load(&centres.ny[k]), nz = load(&centres.nz[k]);
-      for (std::size_t i = 0; i < count; ++i) {
-        const unsigned lit = bits_at(visibility.lit[i]);
-        if (!lit) continue;
-        const DirectionalLight& l = lights[i];
-        const Lanes cosine = both(dot(nx, ny, nz, l.direction), mask_of(lit));
-        const Lanes r = multiply(cosine, all(l.irradiance.x));
-        const Lanes g = multiply(cosine, all(l.irradiance.y));
-        const Lanes b = multiply(cosine, all(l.irradiance.z));
-        const unsigned hidden = lit & ~bits_at(visibility.seen[i]);
-        if (!shares || !SoftLights::has_parts(l)) {
-          own.add_light(r, g, b, hidden);
-          continue;
-        }
-        const unsigned near = bits_at(visibility.near[i]);
-        if (!near) {
-          shared.add_light(r, g, b, hidden);
-          continue;
-        }
-        const Lanes hides = mask_of(near), shows = mask_of(~near);
-        own.add_light(both(r, hides), both(g, hides), both(b, hides), hidden & near);
-        shared.add_light(both(r, shows), both(g, shows), both(b, shows), hidden & ~near);
+    if (bits_at(centres.receiving, k)) {
+      const LaneNormals normals{load(&centres.nx[k]), load(&centres.ny[k]), load(&centres.nz[k])};
+      for (const std::uint16_t i : of_cell.own()) {
+        own.add_light(normals, lights[i], bits_at(visibility.lit[i], k),
+                      ~bits_at(visibility.seen[i], k));
+      }
+      for (const std::uint16_t i : of_cell.shared()) {
+        shared.add_light(normals, lights[i], bits_at(visibility.lit[i], k),
+                         ~bits_at(visibility.seen[i], k));
+      }
+      for (const std::uint16_t i : of_cell.both()) {
+        const unsigned lit = bits_at(visibility.lit[i], k), near = bits_at(visibility.near[i], k);
+        const unsigned hidden = ~bits_at(visibility.seen[i], k);
+        own.add_light(normals, lights[i], lit & near, hidden);
+        shared.add_light(normals, lights[i], lit & ~near, hidden);
       }
     }
     if (shares) {

@@ -265,6 +265,9 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   const auto finite = [](Vec3f v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
   };
+  if (job.lights.lights.size() > most_lights) {
+    throw std::invalid_argument("a table holds at most " + std::to_string(most_lights) + " lights");
+  }
   for (const DirectionalLight& light : job.lights.lights) {
     if (!finite(light.direction) || !finite(light.irradiance) || !finite(light.planned)) {
       throw std::invalid_argument("a light of the table is not finite");

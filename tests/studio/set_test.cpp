@@ -167,6 +167,7 @@ timecode = "10:00:00:00"
   EXPECT_FLOAT_EQ(set.effort.aa_tolerance, 0.02F);
   EXPECT_FLOAT_EQ(set.effort.glint_contrast, 0.3F);
   EXPECT_FALSE(set.effort.adaptive_visibility);
+  EXPECT_FALSE(set.effort.soft_lights);
   EXPECT_EQ(set.display.display, "sRGB");
   ASSERT_TRUE(set.display.tone);
   EXPECT_EQ(set.display.tone->key, 0.2F);
