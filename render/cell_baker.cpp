@@ -44,12 +44,16 @@ void CellBaker::bake(const FrameContext& frame,
   effort_ = frame.efforts[static_cast<std::size_t>(stage)];
   const bool may_move = frame.inputs.kept && frame.inputs.scene->has_moving();
   grid_ = may_move ? &frame.inputs.kept->grid() : nullptr;
-  shadow_rays_ = {frame.inputs.scene, frame.planned_table.get(), &effort_, frame.caustics.get(),
-                  frame.job->lights.lamps.size()};
+  shadow_rays_ = {frame.inputs.scene,
+                  frame.planned_table.get(),
+                  &effort_,
+                  frame.caustics.get(),
+                  frame.job->lights.lamps.size(),
+                  effort_.soft_lights ? &frame.soft_lights : nullptr,
+                  frame.light_order};
   x0_ = x0;
   y0_ = y0;
   block_ = block_of_stage(stage);
-  if (effort_.soft_lights) shadow_rays_.parts = &frame.soft_lights;
   transport_ = &transport;
   statistics_ = &statistics;
   const std::uint64_t rays_before =

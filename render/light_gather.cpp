@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "render/blocker_boxes.h"
 #include "render/caustics.h"
@@ -38,9 +40,7 @@ float cosine_at(const Receivers& r, std::size_t k, Vec3f l) {
   return r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
 }
 
-// That a tested light may stand for: where a point faces few of those that it tests, they are too
-// few to tell how much light there is.
-constexpr float most_stood_for = 16;
+constexpr std::size_t most_stood_for = 16;  // lights, by one
 constexpr float rough_accuracy = 0.5F;  // from here on, points that count little test half as many
 
 Scene::Bounds box_of(const Receivers& r) {
@@ -256,6 +256,68 @@ void gather_cell(const LightContext& context,
   add_up_light({r.active, r.nx, r.ny, r.nz}, lights, visibility, r.light, w.soft);
 }
 
+namespace {
+
+// What a light gives a point if nothing is in the way; 0 or less where it does not shine.
+float given(const Receivers& r, std::size_t k, const DirectionalLight& light) {
+  return shines_on(r, k, light.direction) ? cosine_at(r, k, light.direction) * sum(light.irradiance)
+                                          : 0.0F;
+}
+
+// Which light of a few a point tests, and what of its irradiance it then stands for; nothing if
+// none of them shines there.
+std::optional<GatherWorkspace::Asked> one_of(const LightContext& context,
+                                             const Receivers& r,
+                                             std::size_t k,
+                                             std::span<const std::uint16_t> few) {
+  std::array<float, most_stood_for> gives{};
+  float all = 0, most = 0;
+  for (std::size_t i = 0; i < few.size(); ++i) {
+    gives[i] = given(r, k, context.table->lights[few[i]]);
+    all += gives[i];
+    most = std::max(most, gives[i]);
+  }
+  if (!(most > 0)) return std::nullopt;
+  // Of many samples, each another one, but none so dim that it would stand for too much.
+  const bool many = r.part[k] != SoftLights::middle;
+  const float least = many ? most / 8 : most;
+  std::size_t chosen = many ? r.part[k] % few.size() : 0;
+  while (!(gives[chosen] >= least)) chosen = (chosen + 1) % few.size();
+  const Vec3f e = context.table->lights[few[chosen]].irradiance;
+  return GatherWorkspace::Asked{static_cast<std::uint16_t>(k), few[chosen], all / sum(e)};
+}
+
+void ask_lights(const LightContext& context, const Receivers& r, GatherWorkspace& w) {
+  const auto& lights = context.table->lights;
+  w.asked.clear();
+  for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
+    const auto ask = [&](std::size_t i) {
+      if (!shines_on(r, k, lights[i].direction)) return;
+      w.asked.push_back({static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i),
+                         cosine_at(r, k, lights[i].direction)});
+    };
+    const std::uint32_t stride = stride_of(*context.effort, r.share[k], {});
+    for (std::size_t i = 0; i < lights.size(); ++i) {
+      if (stride == 1 || lights[i].compact != 0) ask(i);
+    }
+    for (std::size_t i = 0; stride > 1 && i < context.order.size(); i += stride) {
+      const auto few =
+          context.order.subspan(i, std::min<std::size_t>(stride, context.order.size() - i));
+      if (const auto asked = one_of(context, r, k, few)) w.asked.push_back(*asked);
+    }
+  }
+  // Light by light: rays of a stream then go the same way.
+  w.first_of_light.assign(lights.size() + 1, 0);
+  for (const GatherWorkspace::Asked& a : w.asked) ++w.first_of_light[a.light + 1U];
+  std::partial_sum(w.first_of_light.begin(), w.first_of_light.end(), w.first_of_light.begin());
+  w.asked_by_light.resize(w.asked.size());
+  for (const GatherWorkspace::Asked& a : w.asked) {
+    w.asked_by_light[w.first_of_light[a.light]++] = a;
+  }
+}
+
+}  // namespace
+
 void gather_points(const LightContext& context,
                    Receivers& r,
                    GatherWorkspace& w,
@@ -264,27 +326,12 @@ void gather_points(const LightContext& context,
   r.light = {};
   const auto& lights = context.table->lights;
   const bool real = context.scene->has_real_blockers();
-  const auto is_tested = [&](std::size_t k, std::uint32_t i) {
-    const std::uint32_t stride = stride_of(*context.effort, r.share[k], lights[i]);
-    return stride != 0 && (i + k) % stride == 0;
-  };
-  std::array<float, cell_pixels> stands_for;  // lights, of each that the point tests
-  stands_for.fill(1);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-    if (stride_of(*context.effort, r.share[k], {}) <= 1) continue;
-    float of_tested = 0, of_all = 0;
-    for (std::uint32_t i = 0; i < lights.size(); ++i) {
-      if (lights[i].compact != 0 || !shines_on(r, k, lights[i].direction)) continue;
-      const float e = cosine_at(r, k, lights[i].direction) * sum(lights[i].irradiance);
-      of_all += e;
-      if (is_tested(k, i)) of_tested += e;
-    }
-    if (of_tested > 0) stands_for[k] = std::min(of_all / of_tested, most_stood_for);
-  }
+  ask_lights(context, r, w);
+  std::array<float, stream_rays> weights;
+  std::size_t rays = 0;
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
     const Vec3f passed = blocked ? Vec3f{} : share;
-    const float weight =
-        cosine_at(r, k, lights[i].direction) * (lights[i].compact != 0 ? 1.0F : stands_for[k]);
+    const float weight = weights[rays++];
     const Vec3f open = lights[i].irradiance * weight;
     const Vec3f lost = open * (Vec3f{1, 1, 1} - passed);
     r.light.add_open(k, open);
@@ -292,24 +339,26 @@ void gather_points(const LightContext& context,
     tested.push_back(
         {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), weight, passed});
   };
-  for (std::uint32_t i = 0; i < lights.size(); ++i) {
-    const Vec3f l = lights[i].direction;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-      if (!is_tested(k, i) || !shines_on(r, k, l)) continue;
-      if (real && r.real_first[k]) {
-        const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
-        ++statistics.shadow_rays;
-        if (w.counts) ++w.counts[k];
-        if (transmittance(*context.scene, origin, l, 0, ray_far, mask_real_blocker) == Vec3f{}) {
-          continue;
-        }
+  const auto shoot_all = [&] {
+    rays = 0;
+    flush(*context.scene, w, statistics, visit);
+  };
+  for (const auto& [k, i, weight] : w.asked_by_light) {
+    if (real && r.real_first[k]) {
+      const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
+      ++statistics.shadow_rays;
+      if (w.counts) ++w.counts[k];
+      if (transmittance(*context.scene, origin, lights[i].direction, 0, ray_far,
+                        mask_real_blocker) == Vec3f{}) {
+        continue;
       }
-      add_ray(w, r, k, i, context.direction(r, k, i),
-              r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
-      if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }
+    weights[static_cast<std::size_t>(w.rays)] = weight;
+    add_ray(w, r, k, i, context.direction(r, k, i),
+            r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
+    if (w.rays == stream_rays) shoot_all();
   }
-  flush(*context.scene, w, statistics, visit);
+  shoot_all();
 }
 
 void gather_cell_lamps(const LightContext& context,

@@ -53,6 +53,13 @@ struct GatherWorkspace {
     std::uint32_t light, point;
     Vec3f lost_share;
   };
+  // Lights that points are to test.
+  struct Asked {
+    std::uint16_t point, light;
+    float weight;  // see PointLight
+  };
+  std::vector<Asked> asked, asked_by_light;
+  std::vector<std::size_t> first_of_light;
   std::vector<Tint> tints;  // light that glass weakened, capacity reserved
   LightSums soft;
   // What is so near to a centre, times the radius of a light, casts penumbrae narrower than pixels
@@ -68,9 +75,10 @@ struct LightContext {
   const Scene* scene = nullptr;
   const LightTable* table = nullptr;
   const Effort* effort = nullptr;
-  const Caustics* caustics = nullptr;  // whose lights follow the table's own lamps, or null
-  std::size_t first_caustic = 0;       // of the lamps
-  const SoftLights* parts = nullptr;   // null: all lights are looked for in their middle
+  const Caustics* caustics = nullptr;    // whose lights follow the table's own lamps, or null
+  std::size_t first_caustic = 0;         // of the lamps
+  const SoftLights* parts = nullptr;     // null: all lights are looked for in their middle
+  std::span<const std::uint16_t> order;  // order_by_place(): of the lights that are not compact
 
   bool is_caustic(std::size_t lamp) const { return caustics != nullptr && lamp >= first_caustic; }
   // What shadow rays to a light of the table carry in their mask beside what blocks them.
@@ -104,9 +112,9 @@ struct PointLight {
 };
 
 // The same for any points, tested lights appended to `tested`: every point tests every light, or,
-// where its share of the picture is small and the effort allows it, every second, fourth ... of
-// them, begun at another one from point to point. Those stand for the rest so that a point from
-// which nothing is hidden gets all of the light.
+// where its share of the picture is small and the effort allows it, one of every two, four ... that
+// lie side by side in the sky. That one stands for the others as if it were as bright as all of
+// them: the brightest at the point; of many samples of a pixel, another one for each.
 void gather_points(const LightContext& context,
                    Receivers& receivers,
                    GatherWorkspace& workspace,

@@ -62,4 +62,8 @@ class SoftLights {
   std::vector<Region> regions_;
 };
 
+// The lights that are not compact, in an order in which neighbours in the sky follow each other:
+// any few in a row stand for one piece of it.
+std::vector<std::uint16_t> order_by_place(std::span<const DirectionalLight> lights);
+
 }  // namespace render

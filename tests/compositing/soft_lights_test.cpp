@@ -193,6 +193,63 @@ TEST(SoftLights, ComeNearerToAnEvenSkyThanAsManyHardOnes) {
   EXPECT_LT(gain(64), 0.7);
 }
 
+// What counts little tests one of a few lights: neighbours in the sky, that one can stand for.
+TEST(SoftLights, StandSideBySideInTheOrderOfTheirPlaces) {
+  render::LightTable table = even_lights(256);
+  table.lights[7].compact = 1;
+  const std::vector<std::uint16_t> order = render::order_by_place(table.lights);
+  const std::set<std::uint16_t> each(order.begin(), order.end());
+  EXPECT_EQ(order.size(), 255U);
+  EXPECT_EQ(each.size(), 255U);
+  EXPECT_FALSE(each.contains(7)) << "a compact light is tested by all";
+  double apart = 0;
+  for (std::size_t i = 0; i + 4 <= order.size(); i += 4) {
+    for (std::size_t k = 1; k < 4; ++k) {
+      apart += std::acos(std::min(1.0F, dot(table.lights[order[i]].direction,
+                                            table.lights[order[i + k]].direction))) /
+               191;
+    }
+  }
+  // Neighbours are .16 rad apart, lights at random 1.2.
+  EXPECT_LT(apart, 0.35);
+}
+
+// A dim mirror of a matte wall: what one light of eight tells is no grain from pixel to pixel.
+TEST(SoftLights, ShowNoGrainInMirrorsThatTestAFewOfThem) {
+  render::SceneDescription scene = made_scene(false);
+  scene.instances.clear();
+  render::StandardParameters mirror, wall;
+  mirror.roughness = 0;
+  std::fill_n(mirror.base_color, 3, 0.01F);
+  wall.roughness = 1;
+  wall.specular = 0;
+  scene.materials = {render::make_standard_material("mirror", mirror),
+                     render::make_standard_material("wall", wall)};
+  auto upright = std::make_shared<render::Mesh>();
+  upright->positions = {{-20, 4, 0}, {20, 4, 0}, {20, 4, 9}, {-20, 4, 9}};
+  upright->triangles = {{0, 1, 2}, {0, 2, 3}};
+  upright->materials = {1};
+  scene.meshes = {made_floor(20, 0), upright};
+  for (std::uint32_t mesh = 0; mesh < 2; ++mesh) scene.instances.emplace_back().mesh = mesh;
+  MadeShot shot = made_shot(64, 48, std::move(scene), 64);
+  shot.job.cam_from_set = calibrate::look_at({0, -3, 1.5}, {0, 2, 0}, 0);
+  shot.job.effort.aa_samples = 1;
+  const render::FrameResult frame = frame_of(shot);
+  double grain = 0, light = 0;
+  for (int y = 24; y < 40; ++y) {
+    for (int x = 8; x < 56; ++x) {
+      const auto at = [&](int column) {
+        return static_cast<double>(
+            float_from_half(frame.rgba.pixels[frame.rgba.index(y, column, 1)]));
+      };
+      grain = std::max(grain, std::abs(at(x) - 0.5 * (at(x - 1) + at(x + 1))));
+      light = std::max(light, at(x));
+    }
+  }
+  EXPECT_GT(light, 0.01);
+  EXPECT_LT(grain, 0.02 * light);
+}
+
 TEST(SoftLights, AreCulledOnlyWhereNoPartOfThemIsHidden) {
   for (const int count : {1, 3, 12, 64}) {
     MadeShot shot = made_shot(160, 96, made_scene());
