@@ -344,18 +344,17 @@ void gather_points(const LightContext& context,
     flush(*context.scene, w, statistics, visit);
   };
   for (const auto& [k, i, weight] : w.asked_by_light) {
+    const Vec3f to = context.direction(r, k, i);
     if (real && r.real_first[k]) {
       const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
       ++statistics.shadow_rays;
       if (w.counts) ++w.counts[k];
-      if (transmittance(*context.scene, origin, lights[i].direction, 0, ray_far,
-                        mask_real_blocker) == Vec3f{}) {
+      if (transmittance(*context.scene, origin, to, 0, ray_far, mask_real_blocker) == Vec3f{}) {
         continue;
       }
     }
     weights[static_cast<std::size_t>(w.rays)] = weight;
-    add_ray(w, r, k, i, context.direction(r, k, i),
-            r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
+    add_ray(w, r, k, i, to, r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
     if (w.rays == stream_rays) shoot_all();
   }
   shoot_all();
