@@ -41,6 +41,7 @@ float cosine_at(const Receivers& r, std::size_t k, Vec3f l) {
 }
 
 constexpr std::size_t most_stood_for = 16;  // lights, by one
+constexpr float golden_ratio = 0.6180340F;
 constexpr float rough_accuracy = 0.5F;  // from here on, points that count little test half as many
 
 Scene::Bounds box_of(const Receivers& r) {
@@ -265,24 +266,34 @@ float given(const Receivers& r, std::size_t k, const DirectionalLight& light) {
 }
 
 // Which light of a few a point tests, and what of its irradiance it then stands for; nothing if
-// none of them shines there.
+// none of them shines there. One sample of a pixel takes the brightest; of many, each takes one by
+// what it gives there, at another place of their sum.
 std::optional<GatherWorkspace::Asked> one_of(const LightContext& context,
                                              const Receivers& r,
                                              std::size_t k,
-                                             std::span<const std::uint16_t> few) {
+                                             std::size_t first,
+                                             std::size_t count) {
+  const std::span<const std::uint16_t> few =
+      context.order.subspan(first, std::min(count, context.order.size() - first));
   std::array<float, most_stood_for> gives{};
-  float all = 0, most = 0;
+  float all = 0;
   for (std::size_t i = 0; i < few.size(); ++i) {
     gives[i] = given(r, k, context.table->lights[few[i]]);
-    all += gives[i];
-    most = std::max(most, gives[i]);
+    all += std::max(gives[i], 0.0F);
   }
-  if (!(most > 0)) return std::nullopt;
-  // Of many samples, each another one, but none so dim that it would stand for too much.
-  const bool many = r.part[k] != SoftLights::middle;
-  const float least = many ? most / 8 : most;
-  std::size_t chosen = many ? r.part[k] % few.size() : 0;
-  while (!(gives[chosen] >= least)) chosen = (chosen + 1) % few.size();
+  if (!(all > 0)) return std::nullopt;
+  auto chosen = static_cast<std::size_t>(std::ranges::max_element(gives) - gives.begin());
+  if (r.part[k] != SoftLights::middle) {
+    const float place = (static_cast<float>(r.part[k]) + 0.5F) / SoftLights::count +
+                        golden_ratio * static_cast<float>(first / count);
+    float left = (place - std::floor(place)) * all;
+    for (std::size_t i = 0; i < few.size(); ++i) {
+      if (!(gives[i] > 0)) continue;
+      chosen = i;
+      left -= gives[i];
+      if (left < 0) break;
+    }
+  }
   const Vec3f e = context.table->lights[few[chosen]].irradiance;
   return GatherWorkspace::Asked{static_cast<std::uint16_t>(k), few[chosen], all / sum(e)};
 }
@@ -301,9 +312,7 @@ void ask_lights(const LightContext& context, const Receivers& r, GatherWorkspace
       if (stride == 1 || lights[i].compact != 0) ask(i);
     }
     for (std::size_t i = 0; stride > 1 && i < context.order.size(); i += stride) {
-      const auto few =
-          context.order.subspan(i, std::min<std::size_t>(stride, context.order.size() - i));
-      if (const auto asked = one_of(context, r, k, few)) w.asked.push_back(*asked);
+      if (const auto asked = one_of(context, r, k, i, stride)) w.asked.push_back(*asked);
     }
   }
   // Light by light: rays of a stream then go the same way.

@@ -114,7 +114,8 @@ struct PointLight {
 // The same for any points, tested lights appended to `tested`: every point tests every light, or,
 // where its share of the picture is small and the effort allows it, one of every two, four ... that
 // lie side by side in the sky. That one stands for the others as if it were as bright as all of
-// them: the brightest at the point; of many samples of a pixel, another one for each.
+// them: the brightest at the point; of many samples of a pixel, each takes one by what it gives
+// there.
 void gather_points(const LightContext& context,
                    Receivers& receivers,
                    GatherWorkspace& workspace,
