@@ -74,8 +74,8 @@ std::uint64_t transport_key(const FrameContext& context) {
   const Effort& e = job.effort;
   key.mix(e.aa_samples), key.mix(e.aa_tolerance), key.mix(e.glint_contrast);
   key.mix(e.interleave), key.mix(std::uint64_t{e.adaptive_visibility});
-  key.mix(std::uint64_t{e.soft_lights}), key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy),
-      key.mix(e.max_depth);
+  key.mix(std::uint64_t{e.soft_lights});
+  key.mix(std::uint64_t{e.cull_lights}), key.mix(e.accuracy), key.mix(e.max_depth);
   key.mix(e.max_rays);
   key.mix(std::uint64_t{e.chance_cuts}), key.mix(std::uint64_t{e.dark_cuts});
   key.mix(e.caustic_photons);

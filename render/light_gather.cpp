@@ -109,7 +109,7 @@ void add_cell_caustic(const LightContext& context,
 }
 
 // How far things cast sharp shadows, by how far neighbouring pixels' points lie apart: penumbrae as
-// wide as two pixels.
+// wide as four pixels, which a window is.
 void find_sharp(const Receivers& r, GatherWorkspace& w) {
   const auto step = [&r](std::size_t a, std::size_t b) {
     if (!in(r.active, b) || r.surface[a] != r.surface[b]) return 0.0F;

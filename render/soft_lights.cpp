@@ -24,6 +24,26 @@ std::array<float, 2> on_disc(float u, float v) {
   return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
+// Of a direction on a Z curve over the octahedron that the sphere unfolds to, its corners at the
+// ground.
+std::uint32_t place_on_curve(Vec3f d) {
+  const float reach = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
+  if (!(reach > 0)) return 0;
+  float u = d.x / reach, v = d.y / reach;
+  if (d.z < 0) {
+    const float folded = std::copysign(1 - std::abs(v), u);
+    v = std::copysign(1 - std::abs(u), v);
+    u = folded;
+  }
+  const auto column = static_cast<std::uint32_t>((u + 1) * 32767);
+  const auto row = static_cast<std::uint32_t>((v + 1) * 32767);
+  std::uint32_t place = 0;
+  for (std::uint32_t bit = 0; bit < 16; ++bit) {
+    place |= (column >> bit & 1) << (2 * bit) | (row >> bit & 1) << (2 * bit + 1);
+  }
+  return place;
+}
+
 }  // namespace
 
 SoftLights::SoftLights(std::span<const DirectionalLight> lights, bool in_parts)
@@ -58,30 +78,13 @@ SoftLights::SoftLights(std::span<const DirectionalLight> lights, bool in_parts)
 }
 
 std::vector<std::uint16_t> order_by_place(std::span<const DirectionalLight> lights) {
-  // Along a Z curve over the octahedron that the sphere unfolds to, its corners at the ground.
-  const auto place = [&lights](std::uint16_t i) {
-    const Vec3f d = lights[i].direction;
-    const float reach = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
-    if (!(reach > 0)) return 0U;
-    float u = d.x / reach, v = d.y / reach;
-    if (d.z < 0) {
-      const float folded = std::copysign(1 - std::abs(v), u);
-      v = std::copysign(1 - std::abs(u), v);
-      u = folded;
-    }
-    std::uint32_t curve = 0;
-    const auto column = static_cast<std::uint32_t>((u + 1) * 32767);
-    const auto row = static_cast<std::uint32_t>((v + 1) * 32767);
-    for (std::uint32_t bit = 0; bit < 16; ++bit) {
-      curve |= (column >> bit & 1) << (2 * bit) | (row >> bit & 1) << (2 * bit + 1);
-    }
-    return curve;
-  };
+  std::vector<std::uint32_t> places;
   std::vector<std::uint16_t> order;
   for (std::size_t i = 0; i < lights.size(); ++i) {
+    places.push_back(place_on_curve(lights[i].direction));
     if (lights[i].compact == 0) order.push_back(static_cast<std::uint16_t>(i));
   }
-  std::ranges::stable_sort(order, {}, place);
+  std::ranges::stable_sort(order, {}, [&places](std::uint16_t i) { return places[i]; });
   return order;
 }
 

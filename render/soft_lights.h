@@ -17,7 +17,7 @@ struct DirectionRange {
 
 // A light stands for a region of the sky. Looked for in its middle alone it is hidden as a whole or
 // not at all, and shadows end in steps; looked for all over the region, in another part from pixel
-// to pixel, neighbours together see how much of it is hidden (shadow_windows.h).
+// to pixel, neighbours together see how much of it is hidden (cell_visibility.h).
 //
 // After Keller and Heidrich, "Interleaved Sampling", EGWR 2001.
 class SoftLights {

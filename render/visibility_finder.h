@@ -70,19 +70,23 @@ class VisibilityFinder {
     return !lamps_ && context_.has_parts(first + i);
   }
 
+  unsigned mask_of_ray(std::size_t point, std::uint32_t light) const {
+    if (ray_mask_ != 0) return ray_mask_;
+    return r_.mask[point] | (in(r_.by_caustics, point) ? context_.mask_to(light) : 0U);
+  }
+
   void test(std::uint32_t first, std::size_t i, int word, int k) {
     const auto wi = static_cast<std::size_t>(word);
     if (w_.tested[i][wi] & bit(k)) return;
     w_.tested[i][wi] |= bit(k);
     const auto point = static_cast<std::size_t>(point_of(word, k));
     const auto light = first + static_cast<std::uint32_t>(i);
-    const unsigned mask = ray_mask_ ? ray_mask_ : r_.mask[point];
+    const unsigned mask = mask_of_ray(point, light);
     if (lamps_) {
       const auto ray = ray_to_lamp(lamp_receiver(r_, point), context_.table->lamps[light]);
       add_ray(w_, r_, point, light, ray->direction, mask, ray->far_m);
     } else {
-      add_ray(w_, r_, point, light, context_.direction(r_, point, light),
-              mask | (ray_mask_ == 0 && in(r_.by_caustics, point) ? context_.mask_to(light) : 0U));
+      add_ray(w_, r_, point, light, context_.direction(r_, point, light), mask);
     }
     if (w_.rays == stream_rays) shoot_rest(first);
   }
@@ -220,8 +224,8 @@ class VisibilityFinder {
     for (std::size_t wi = 0; wi < 4; ++wi) {
       for (std::uint64_t left = dimmed[wi]; left != 0; left &= left - 1) {
         const auto point = wi * 64 + static_cast<std::size_t>(std::countr_zero(left));
-        add_ray(w_, r_, point, light, context_.direction(r_, point, light), r_.mask[point],
-                w_.sharp_m[point] / radius);
+        add_ray(w_, r_, point, light, context_.direction(r_, point, light),
+                mask_of_ray(point, light), w_.sharp_m[point] / radius);
         if (w_.rays == stream_rays) shoot_near(first);
       }
     }
