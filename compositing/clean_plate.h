@@ -13,6 +13,7 @@
 #include "compositing/gap_filler.h"
 #include "compositing/key_lanes.h"
 #include "compositing/screen_colour.h"
+#include "compositing/screen_near.h"
 
 namespace compositing {
 
@@ -64,6 +65,7 @@ struct LitPlate {
   ScreenColour colour = ScreenColour::green;
   PlateUse use = PlateUse::screen;
   float sigma = 0;  // noise of the screen's share at a pixel of bare screen
+  ScreenNear near;  // in that frame
 
   const float* cell(int row, int column) const {
     return &cells[4 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
@@ -117,7 +119,7 @@ class PlateLight {
   std::array<F8, 3> ratios_at(int y, int x) const;
   void prepare();
   void light_up();
-  void renew();
+  std::shared_ptr<LitPlate> renew();
 
   // Two cells of the gain that a column of the plate lies between.
   struct Between {
@@ -139,8 +141,9 @@ class PlateLight {
   std::vector<float> gains_;                    // filled and smoothed
   std::vector<float> blurred_;
   GapFiller filler_;
-  float tolerance_ = 0;  // of colour, against the primary
-  float spread_ = 0;     // of the gain within a cell
+  std::vector<float> shown_;  // of the gain's cells: 1 = shows the screen
+  float tolerance_ = 0;       // of colour, against the primary
+  float spread_ = 0;          // of the gain within a cell
 };
 
 }  // namespace compositing

@@ -87,6 +87,8 @@ inline bool any_of(I8 lanes) {
 #endif
 }
 
+inline bool any_of(bool value) { return value; }
+
 // How many of the lanes are -1, of lanes that are 0 or -1.
 inline int count_of(I8 lanes) {
 #if defined(__AVX__)

@@ -236,16 +236,21 @@ class KeyPass {
     const std::size_t row = static_cast<std::size_t>(y) % 8;
     const std::span<const int> places = std::span(scratch_.places[row]).first(count_[row]);
     const PlateRow plate_here = plate_row(y);
+    const NearRow near_here(in_.plate.near, y);
     forget_change(y);
     waiting_[static_cast<std::size_t>(y) % 2] = 0;
     for (std::size_t first = 0; first < places.size(); first += together)
-      see_blocks(y, plate_here, places.subspan(first, std::min(together, places.size() - first)));
+      see_blocks(y, plate_here, near_here,
+                 places.subspan(first, std::min(together, places.size() - first)));
     float* const change_here = change(y);
     change_here[-1] = change_here[0];
     change_here[in_.plate.width] = change_here[in_.plate.width - 1];
   }
 
-  void see_blocks(int y, const PlateRow& plate_here, std::span<const int> places) {
+  void see_blocks(int y,
+                  const PlateRow& plate_here,
+                  const NearRow& near_here,
+                  std::span<const int> places) {
     std::array<KeyBlock, together> blocks;
     std::array<F8, together> plate_last;
     std::array<TexelShare<F8>, together> share;
@@ -262,8 +267,20 @@ class KeyPass {
     }
     for (std::size_t i = 0; i < row.size(); ++i)
       share[i] = formula_.share(row[i].light, row[i].plate, plate_last[i]);
+    if constexpr (Formula::knows_near) {
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        if (near_here.is_deep(row[i].x)) share[i].square = KeyTable::deep(share[i].square);
+      }
+    }
     for (std::size_t i = 0; i < row.size(); ++i)
       row[i].matte = formula_.matte(row[i].light, row[i].plate, plate_last[i], share[i]);
+    if constexpr (Formula::knows_near) {
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        if (near_here.is_even(row[i].x)) continue;
+        const F8 near = near_here.at(row[i].x);
+        row[i].matte = formula_.matte_between(plate_last[i], near, share[i]);
+      }
+    }
     if (!in_.garbage.empty() || !in_.core.empty()) {
       for (KeyBlock& block : row) apply_masks(y, block);
     }

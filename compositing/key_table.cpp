@@ -13,7 +13,11 @@ constexpr TableCodes shipped{
 const TableCodes& shipped_key_table() { return shipped; }
 
 KeyTable::KeyTable(const TableCodes& codes) {
-  words_.reserve(static_cast<std::size_t>(squares * table_hues));
+  words_.reserve(static_cast<std::size_t>(2 * squares * table_hues));
+  for (const PlaceCodes* places : {&codes.near, &codes.deep}) pack(*places);
+}
+
+void KeyTable::pack(const PlaceCodes& codes) {
   for (int hue = 0; hue < table_hues; ++hue) {
     for (int share = 0; share + 1 < table_shares; ++share) {
       for (int light = 0; light + 1 < table_lights; ++light) {

@@ -47,10 +47,17 @@ struct TableEntry {
 };
 
 // Codes 0..255 of alpha and plate at each place.
-using TableCodes = std::array<std::uint8_t, 2 * table_shares * table_lights * table_hues>;
+using PlaceCodes = std::array<std::uint8_t, 2 * table_shares * table_lights * table_hues>;
 constexpr std::size_t code_at(int share, int light, int hue) {
   return 2 * static_cast<std::size_t>((hue * table_shares + share) * table_lights + light);
 }
+
+// What a colour means depends on where it is seen: what is a thin thing near the screen is mostly
+// spill deep within a person.
+struct TableCodes {
+  PlaceCodes near;
+  PlaceCodes deep;
+};
 
 // The table that ships: made by train_key_table() (key_training.h), written by make_key_table.
 const TableCodes& shipped_key_table();
@@ -77,14 +84,22 @@ class KeyTable {
     return {hue * squares + share * squares_across + light, place.share - to_float_lanes(share),
             place.light - to_float_lanes(light)};
   }
+  // Near the screen, or, by deep(), deep within what stands before it.
   template <class V>
   [[gnu::always_inline]] TableEntry<V> at(const Square<V>& square) const {
     const auto both = words(square.index);
     return {blended<V>(both.alpha, square.across_shares, square.across_lights),
             blended<V>(both.plate, square.across_shares, square.across_lights)};
   }
+  template <class V>
+  [[gnu::always_inline]] static Square<V> deep(Square<V> square) {
+    square.index = square.index + squares * table_hues;
+    return square;
+  }
 
  private:
+  void pack(const PlaceCodes& codes);
+
   static constexpr int squares_across = table_lights - 1;
   static constexpr int squares = (table_shares - 1) * squares_across;
 
@@ -130,7 +145,7 @@ class KeyTable {
     return between(between(a, b, v), between(c, d, v), u) * (1.0F / 255);
   }
 
-  std::vector<std::uint64_t> words_;
+  std::vector<std::uint64_t> words_;  // near, then deep
 };
 
 }  // namespace compositing

@@ -37,7 +37,7 @@ struct TexelMatte {
 template <class V>
 struct TexelShare {
   V share;                     // of the plate's excess
-  KeyTable::Square<V> square;  // where the table says what it means; unset without a table
+  KeyTable::Square<V> square;  // where the table says what it means; 0 without a table
 };
 
 // `c` and `p` are light of texel and plate, scene-linear, in the keyer's order; `over_excess` is
@@ -47,7 +47,7 @@ template <bool two_primaries, class V>
                                                      const std::array<V, 3>& p,
                                                      V over_excess,
                                                      const KeyDials& dials) {
-  TexelShare<V> texel;
+  TexelShare<V> texel{};
   texel.share = screen_excess<two_primaries>(c[0], c[1], c[2]) * over_excess;
   if (dials.table == nullptr) return texel;
   // Of two primaries, the greater rest stands for the second channel.
@@ -59,6 +59,20 @@ template <bool two_primaries, class V>
   return texel;
 }
 
+// Alpha and share of the plate through the dials.
+template <class V>
+[[gnu::always_inline]] inline TexelMatte<V> dialled(V alpha, V plate, const KeyDials& dials) {
+  const V zero = lanes_like(alpha, 0), one = lanes_like(alpha, 1);
+  V spill = most(plate - (one - alpha), zero);
+  alpha = least(most((alpha - dials.black) * dials.scale, zero), one);
+  if (dials.edge != 0) alpha = alpha + dials.edge * alpha * (one - alpha);
+  // What the dials have made more of the person than it is keeps no more of the screen for that.
+  const V mixed = least(most((plate - 0.3F) * (1 / 0.3F), zero), one);
+  spill = most(spill, times_plus(mixed, plate, alpha - one));
+  return {alpha, spill};
+}
+
+// By the one part of the table in which the square lies: near the screen, or KeyTable::deep().
 // Alpha is 1 where the plate shows no screen.
 template <class V>
 [[gnu::always_inline]] inline TexelMatte<V> matte_of(const TexelShare<V>& texel,
@@ -72,21 +86,31 @@ template <class V>
     alpha = over_excess > 0.0F ? entry.alpha : one;
     plate = over_excess > 0.0F ? entry.plate : zero;
   }
-  V spill = most(plate - (one - alpha), zero);
-  alpha = least(most((alpha - dials.black) * dials.scale, zero), one);
-  if (dials.edge != 0) alpha = alpha + dials.edge * alpha * (one - alpha);
-  // What the dials have made more of the person than it is keeps no more of the screen for that.
-  const V mixed = least(most((plate - 0.3F) * (1 / 0.3F), zero), one);
-  spill = most(spill, times_plus(mixed, plate, alpha - one));
-  return {alpha, spill};
+  return dialled(alpha, plate, dials);
+}
+
+// By both parts; `near` as in ScreenNear.
+template <class V>
+[[gnu::always_inline]] inline TexelMatte<V> matte_between(const TexelShare<V>& texel,
+                                                          V over_excess,
+                                                          V near,
+                                                          const KeyDials& dials) {
+  if (dials.table == nullptr) return matte_of(texel, over_excess, dials);
+  const V zero = lanes_like(over_excess, 0), one = lanes_like(over_excess, 1);
+  const auto deep = dials.table->at(KeyTable::deep(texel.square));
+  const auto close = dials.table->at(texel.square);
+  const V alpha = over_excess > 0.0F ? between(deep.alpha, close.alpha, near) : one;
+  const V plate = over_excess > 0.0F ? between(deep.plate, close.plate, near) : zero;
+  return dialled(alpha, plate, dials);
 }
 
 template <bool two_primaries, class V>
 [[gnu::always_inline]] inline TexelMatte<V> matte_of(const std::array<V, 3>& c,
                                                      const std::array<V, 3>& p,
                                                      V over_excess,
+                                                     V near,
                                                      const KeyDials& dials) {
-  return matte_of(share_of<two_primaries>(c, p, over_excess, dials), over_excess, dials);
+  return matte_between(share_of<two_primaries>(c, p, over_excess, dials), over_excess, near, dials);
 }
 
 // The foreground that goes with a matte: what is left of the texel without the plate behind it and

@@ -12,7 +12,9 @@ namespace compositing {
 namespace {
 
 constexpr std::array<int, 2> frames_of_a_clip{8, 25};
-constexpr float prior_pixels = 4;     // how many pixels the plain ratio counts for
+constexpr float prior_pixels = 4;  // how many pixels the plain ratio counts for
+// ... and what was learned of all pixels, for those near the screen or far from it.
+constexpr double prior_of_all = 8;
 constexpr double share_of_any = 0.3;  // of a pixel whose person wears any colours
 // For how many a pixel counts in which there is both person and screen: few are, and all that is
 // seen of edges. Composite and alpha over all scenes are best at 2 too (1 to 8 were tried).
@@ -39,9 +41,11 @@ class Learner {
     }
   }
 
+  using Values = std::vector<std::array<double, 2>>;  // alpha and plate
+
   // What no pixel has shown is as its neighbours are.
-  TableCodes codes() {
-    std::vector<std::array<double, 2>> values(places);
+  Values values() const {
+    Values values(places);
     std::vector<char> known(places);
     for (std::size_t i = 0; i < places; ++i) {
       const double* sum = &sums_[4 * i];
@@ -52,13 +56,21 @@ class Learner {
       known[i] = 1;
     }
     while (std::count(known.begin(), known.end(), 0) > 0) spread(values, known);
-    TableCodes codes{};
+    return values;
+  }
+
+  // What few pixels have shown is as all of them have it.
+  PlaceCodes codes(const Values& of_all) const {
+    PlaceCodes codes{};
     for (int h = 0; h < table_hues; ++h) {
       for (int k = 0; k < table_shares; ++k) {
         for (int l = 0; l < table_lights; ++l) {
           for (std::size_t of = 0; of < 2; ++of) {
-            const double value = std::clamp(values[index(k, l, h)][of], 0.0, 1.0);
-            codes[code_at(k, l, h) + of] = static_cast<std::uint8_t>(std::lround(255 * value));
+            const double* sum = &sums_[4 * index(k, l, h)];
+            const double value =
+                (sum[1 + of] + prior_of_all * of_all[index(k, l, h)][of]) / (sum[0] + prior_of_all);
+            codes[code_at(k, l, h) + of] =
+                static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
           }
         }
       }
@@ -71,7 +83,7 @@ class Learner {
       static_cast<std::size_t>(table_shares) * table_lights * table_hues;
   static std::size_t index(int k, int l, int h) { return code_at(k, l, h) / 2; }
 
-  static void spread(std::vector<std::array<double, 2>>& values, std::vector<char>& known) {
+  static void spread(Values& values, std::vector<char>& known) {
     const auto before = values;
     const auto knew = known;
     for (int h = 0; h < table_hues; ++h) {
@@ -102,7 +114,11 @@ class Learner {
   std::vector<double> sums_;  // weight, and weighted alpha, plate, share
 };
 
-void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learner& learner) {
+struct Learners {
+  Learner all, near, deep;
+};
+
+void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learners& learners) {
   const capture::Image seen = light_of(made.seen);
   light.update(seen, true);
   const LitPlate& lit = light.lit();
@@ -121,8 +137,14 @@ void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learne
       const auto rest = [&](std::size_t i) { return (c(i) - share * p[i]) * p[3]; };
       const float alpha = made.truth.at(y, x, 3);
       const bool mixed = alpha > 0.02F && alpha < 0.98F;
-      learner.add(place_in_table(share, rest(1), rest(2)), share, alpha,
-                  static_cast<float>(dot / square), mixed ? mixed_pixels * pixels : pixels);
+      const double weight = mixed ? mixed_pixels * pixels : pixels;
+      const float near = lit.near.at(y, x);
+      const auto learn = [&](Learner& learner, double part) {
+        if (part <= 0) return;
+        learner.add(place_in_table(share, rest(1), rest(2)), share, alpha,
+                    static_cast<float>(dot / square), part * weight);
+      };
+      learn(learners.all, 1), learn(learners.near, near), learn(learners.deep, 1 - near);
     }
   }
 }
@@ -130,7 +152,7 @@ void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learne
 }  // namespace
 
 TableCodes train_key_table(std::span<const std::uint32_t> seeds) {
-  Learner learner;
+  Learners learners;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     for (MadeScene scene : made_scenes()) {
       scene.actor.any_colours = i % 2 == 1;
@@ -140,10 +162,11 @@ TableCodes train_key_table(std::span<const std::uint32_t> seeds) {
       PlateLight light(average_plate(shots));
       const double pixels = scene.actor.any_colours ? share_of_any : 1;
       for (const int frame : frames_of_a_clip)
-        learn_frame(clip.frame(frame), pixels, light, learner);
+        learn_frame(clip.frame(frame), pixels, light, learners);
     }
   }
-  return learner.codes();
+  const Learner::Values of_all = learners.all.values();
+  return {learners.near.codes(of_all), learners.deep.codes(of_all)};
 }
 
 }  // namespace compositing

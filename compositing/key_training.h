@@ -8,10 +8,10 @@
 
 namespace compositing {
 
-// The mean true alpha, and the mean share of the plate in what is not the person, of all pixels of
-// made clips that lie at each place of the table: the least squares of both. Every other seed's
-// persons have colours of any hue, and count less. Where hardly any pixel lies, the plain ratio
-// pulls.
+// For places near the screen and deep within persons: the mean true alpha, and the mean share of
+// the plate in what is not the person, of all pixels of made clips that lie at each place of the
+// table: the least squares of both. Every other seed's persons have colours of any hue, and count
+// less. Where hardly any pixel lies, the plain ratio pulls.
 TableCodes train_key_table(std::span<const std::uint32_t> seeds);
 
 // The seeds of the table that ships; tests judge others.

@@ -22,11 +22,15 @@ using Three = std::array<F8, 3>;
 template <bool two_primaries>
 struct ScreenFormula {
   KeyDials dials;
+  static constexpr bool knows_near = true;  // how near the screen is matters
   TexelShare<F8> share(const Three& c, const Three& p, F8 over_excess) const {
     return share_of<two_primaries>(c, p, over_excess, dials);
   }
   TexelMatte<F8> matte(const Three&, const Three&, F8 over_excess, const TexelShare<F8>& s) const {
     return matte_of(s, over_excess, dials);
+  }
+  TexelMatte<F8> matte_between(F8 over_excess, F8 near, const TexelShare<F8>& s) const {
+    return compositing::matte_between(s, over_excess, near, dials);
   }
   KeyedTexel<F8> foreground(const Three& c, const Three& p, const TexelMatte<F8>& matte) const {
     return foreground_of<two_primaries>(c, p, matte, dials.despill);
@@ -35,6 +39,7 @@ struct ScreenFormula {
 
 struct DifferenceFormula {
   KeyDials dials;
+  static constexpr bool knows_near = false;
   TexelShare<F8> share(const Three&, const Three&, F8) const { return TexelShare<F8>(); }
   TexelMatte<F8> matte(const Three& c, const Three& p, F8 over_noise, const TexelShare<F8>&) const {
     return difference_matte(c, p, over_noise, dials);
@@ -243,9 +248,11 @@ std::array<float, 4> key_texel(
   if (plate.use == PlateUse::difference) {
     keyed = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials), 0);
   } else if (has_two_primaries(plate.colour)) {
-    keyed = foreground_of<true>(c, p, matte_of<true>(c, p, cell[3], dials), dials.despill);
+    const float near = plate.near.at(y, x);
+    keyed = foreground_of<true>(c, p, matte_of<true>(c, p, cell[3], near, dials), dials.despill);
   } else {
-    keyed = foreground_of<false>(c, p, matte_of<false>(c, p, cell[3], dials), dials.despill);
+    const float near = plate.near.at(y, x);
+    keyed = foreground_of<false>(c, p, matte_of<false>(c, p, cell[3], near, dials), dials.despill);
   }
   std::array<float, 4> rgba{0, 0, 0, keyed.alpha};
   rgba[at(order[0])] = keyed.first;

@@ -116,6 +116,11 @@ ActorColour any_colour(std::uint32_t seed) {
 }
 
 ActorColour hair_colour(const MadeActor& actor, std::uint32_t seed) {
+  if (actor.hair == MadeHair::white) {  // yellowish to bluish
+    Draws draws(seed * 13 + 2);
+    const float cold = draws.next(), light = 0.75F + 0.35F * draws.next();
+    return scaled({0.66F - 0.12F * cold, 0.62F - 0.02F * cold, 0.52F + 0.16F * cold}, light);
+  }
   if (actor.any_colours) return any_colour(seed * 11 + 2);
   switch (actor.hair) {
     case MadeHair::blond:

@@ -9,7 +9,7 @@
 namespace compositing {
 
 // Linear albedos are of things that keyers meet.
-enum class MadeHair : std::uint8_t { brown, blond, black };
+enum class MadeHair : std::uint8_t { brown, blond, black, white };
 
 struct MadeActor {
   MadeHair hair = MadeHair::brown;

@@ -35,6 +35,7 @@ std::vector<MadeScene> make_scenes() {
   add("shadow", [](MadeScene& s) { s.shadow = 0.6F; });
   add("spill", [](MadeScene& s) { s.actor.spill = 0.16F; });
   add("blond", [](MadeScene& s) { s.actor.hair = MadeHair::blond; });
+  add("white hair", [](MadeScene& s) { s.actor.hair = MadeHair::white; });
   add("black hair", [](MadeScene& s) { s.actor.hair = MadeHair::black; });
   add("black hair, shadow",
       [](MadeScene& s) { s.actor.hair = MadeHair::black, s.shadow = 0.5F, s.uneven = 0.3F; });

@@ -4,10 +4,10 @@
 
 #include "compositing/key_training.h"
 
-int main() {
-  const compositing::TableCodes codes = compositing::train_key_table(compositing::training_seeds);
-  std::cout << "// Alpha and plate codes by hue, share and light: written by make-key-table.\n"
-            << "// clang-format off\n";
+namespace {
+
+void print(const compositing::PlaceCodes& codes) {
+  std::cout << '{';
   std::string line;
   for (const std::uint8_t code : codes) {
     const std::string number = std::to_string(code) + ",";
@@ -17,5 +17,18 @@ int main() {
     }
     line += number;
   }
-  std::cout << line << '\n';
+  std::cout << line << '}';
+}
+
+}  // namespace
+
+int main() {
+  const compositing::TableCodes codes = compositing::train_key_table(compositing::training_seeds);
+  std::cout
+      << "// Alpha and plate codes by hue, share and light, near the screen, then deep within\n"
+      << "// what stands before it: written by make-key-table.\n"
+      << "// clang-format off\n";
+  print(codes.near);
+  std::cout << ",\n";
+  print(codes.deep);
 }

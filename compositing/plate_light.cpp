@@ -4,6 +4,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "compositing/clean_plate.h"
 #include "compositing/key_lanes.h"
@@ -17,6 +18,10 @@ constexpr float clipped_from = 0.985F;
 // Of a cell's gain in its neighbourhood's light: deep shadow, and what is too dark to have a
 // colour.
 constexpr float deep = 0.25F, black = 0.03F;
+// How far from screen in sight a place is near it, and from where on deep within what stands before
+// it: in cells of a picture as high as those that the table is learned from. Hair is the wider the
+// higher a picture is.
+constexpr float near_cells = 2, deep_cells = 3, learned_height = 270;
 
 int cells_along(int side, int step) { return (side + step - 1) / step; }
 
@@ -134,11 +139,13 @@ PlateLight::PlateLight(CleanPlate plate, PlateUse use)
   const float share = static_cast<float>(deviation * std::max(count, 1.0) / std::max(light, 1e-3));
   tolerance_ = 0.035F + 3 * share;
   spread_ = 0.025F + 1.3F * share;
-  lit_ = plates_.lend();
-  *lit_ = bare_;
   gains_.assign(
       static_cast<std::size_t>(filler_.rows()) * static_cast<std::size_t>(filler_.columns()), 1.0F);
-  blurred_ = gains_;
+  blurred_ = shown_ = gains_;
+  bare_.near = {
+      filler_.rows(), filler_.columns(), gains_, std::vector<std::uint8_t>(gains_.size(), 1), {}};
+  lit_ = plates_.lend();
+  *lit_ = bare_;
   prepare();
 }
 
@@ -282,6 +289,7 @@ PlateSight PlateLight::measure(const Rows& source) {
       const F8 value = chosen(good, mean), weight = chosen(good, one);
       std::memcpy(filler_.value(row, first), &value, bytes);
       std::memcpy(&filler_.weight(row, first), &weight, bytes);
+      std::memcpy(&shown_[at], &weight, bytes);
       screen += chosen(known, one), all_known += most(pixels, zero), seen += weight;
       clipped += chosen(good, sums_of(bright) * over);
       off += chosen(good, sums_of(away) / most(gains, all_of(least_gain)));
@@ -327,6 +335,11 @@ PlateSight PlateLight::update(const CodedFrame& frame, bool follow) {
 template <class Rows>
 PlateSight PlateLight::update_from(const Rows& rows, bool follow) {
   PlateSight sight = measure(rows);
+  const std::shared_ptr<LitPlate> before = renew();
+  if (bare_.use == PlateUse::screen) {
+    const float scale = std::max(static_cast<float>(bare_.height) / learned_height, 1.0F);
+    find_near(shown_, near_cells * scale, deep_cells * scale, lit_->near);
+  }
   if (filler_.fill() > 0) {
     float sum = 0;
     for (int row = 0; row < filler_.rows(); ++row) {
@@ -336,25 +349,26 @@ PlateSight PlateLight::update_from(const Rows& rows, bool follow) {
     }
     sight.gain = sum / static_cast<float>(gains_.size());
     if (follow) light_up();
+  } else if (before) {
+    lit_->cells = before->cells;
   }
-  if (!follow && gained_) {
-    renew();
+  if (!follow && (gained_ || before)) {
     std::copy(bare_.cells.begin(), bare_.cells.end(), lit_->cells.begin());
     gained_ = false;
   }
   return sight;
 }
 
-// A plate that may be written, for the one at hand is somebody's.
-void PlateLight::renew() {
-  if (lit_.use_count() == 1) return;
-  lit_ = plates_.lend();
+// Takes a plate that may be written, if the one at hand is somebody's; then returns that.
+std::shared_ptr<LitPlate> PlateLight::renew() {
+  if (lit_.use_count() == 1) return nullptr;
+  std::shared_ptr<LitPlate> before = std::exchange(lit_, plates_.lend());
   if (lit_->cells.size() != bare_.cells.size()) *lit_ = bare_;
+  return before;
 }
 
 // Smooths the gain and puts it on the plate.
 void PlateLight::light_up() {
-  renew();
   gained_ = true;
   const int rows = filler_.rows(), columns = filler_.columns();
   const auto width = static_cast<std::size_t>(columns);

@@ -25,9 +25,8 @@ constexpr int rays_across = 4;
 
 // What becomes of rays that are cut.
 enum class Cuts { environment, nothing, chance };
-constexpr std::array<std::string_view, 3> methods{"cut rays see the environment",
-                                                  "cut rays see nothing",
-                                                  "some cut rays are followed, by chance"};
+constexpr std::array<std::string_view, 3> methods{
+    "cut rays see the environment", "cut rays see nothing", "some followed by chance"};
 
 constexpr std::string_view in_the_sun = "headlight in the sun";
 

@@ -145,13 +145,16 @@ TEST(KeyPass, IsTheFormulaOfEachPixelByItself) {
             const float light = frame.at(y, x, order[i]);
             c[i] = light > 0 && light < 1e9F ? light : 0;
           }
+          const float near = keyer.lit().near.at(y, x);
           KeyedTexel<float> one{};
           if (settings.method == KeyMethod::difference) {
             one = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials), 0);
           } else if (has_two_primaries(plate.colour)) {
-            one = foreground_of<true>(c, p, matte_of<true>(c, p, cell[3], dials), dials.despill);
+            const auto matte = matte_of<true>(c, p, cell[3], near, dials);
+            one = foreground_of<true>(c, p, matte, dials.despill);
           } else {
-            one = foreground_of<false>(c, p, matte_of<false>(c, p, cell[3], dials), dials.despill);
+            const auto matte = matte_of<false>(c, p, cell[3], near, dials);
+            one = foreground_of<false>(c, p, matte, dials.despill);
           }
           // Four roundings of the plate, and one to half.
           const auto at = [&](int channel) {
