@@ -20,9 +20,10 @@ float lobe_width(float roughness) { return 2 * 2 / 0.7F * roughness * roughness;
 // The space that the stream's rays passed, up to what they met.
 void CellBaker::mark_passed(std::size_t count) {
   const RayStream& s = stream_;
+  const unsigned sees_through = frame_->inputs.scene->has_standing_back() ? mask_stand_in : 0U;
   for (std::size_t i = 0; i < count; ++i) {
     // A real surface may let a ray see what is behind it.
-    const float far_m = s.mask[i] & mask_stand_in ? ray_far : s.far_m[i];
+    const float far_m = s.mask[i] & sees_through ? ray_far : s.far_m[i];
     grid_->mark_line({s.ox[i], s.oy[i], s.oz[i]}, {s.dx[i], s.dy[i], s.dz[i]}, far_m,
                      transport_->reach.passed);
   }

@@ -93,6 +93,20 @@ void SpaceGrid::mark_line(Vec3f from, Vec3f direction, float far_m, Mask& mask) 
   constexpr auto end = static_cast<float>(side);
   const Vec3f along = direction * per_size_;
   const Vec3f begin = (from - lower_) * per_size_;
+  // Within one box, as most rays in glass are: far from the walls, for these count to either side.
+  constexpr float clear = 1e-3F;
+  const Vec3f stop = begin + along * far_m;
+  const auto in_one = [](float a, float b) {
+    const float low = std::min(a, b), high = std::max(a, b), wall = std::floor(low);
+    return low >= wall + clear && high <= wall + 1 - clear && low >= 0 && high < end;
+  };
+  if (in_one(begin.x, stop.x) && in_one(begin.y, stop.y) && in_one(begin.z, stop.z)) {
+    const auto i = static_cast<std::size_t>(
+        (static_cast<int>(begin.z) * side + static_cast<int>(begin.y)) * side +
+        static_cast<int>(begin.x));
+    mask[i / 64] |= std::uint64_t{1} << (i % 64);
+    return;
+  }
   const auto [first, last] = inside({{0, 0, 0}, {end, end, end}}, begin, along, far_m);
   if (!(first <= last)) return;
   std::array<int, 3> box, step;

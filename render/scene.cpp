@@ -395,6 +395,7 @@ const Glass* Scene::glass_of(std::uint32_t material) const {
   return glass ? &*glass : nullptr;
 }
 bool Scene::has_glass() const { return impl_->compiled->has_glass; }
+bool Scene::has_standing_back() const { return impl_->compiled->stands_back; }
 bool Scene::has_moving() const { return impl_->compiled->two_level; }
 const BackgroundShader& Scene::background() const { return *impl_->compiled->background; }
 bool Scene::has_real_blockers() const { return impl_->compiled->real_blockers; }

@@ -134,6 +134,8 @@ class Scene {
   const Glass* glass_of(std::uint32_t material) const;
   bool has_glass() const;
   bool has_moving() const;  // whether any instance does
+  // Whether any stand-in hides nothing, so that rays which meet it may see what is behind.
+  bool has_standing_back() const;
   const BackgroundShader& background() const;
   // Whether any stand-in blocks light; whether any surface lets some through.
   bool has_real_blockers() const;

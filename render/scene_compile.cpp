@@ -66,6 +66,7 @@ void Scene::Compiled::build(const SceneDescription& description) {
     two_level = two_level || instance.moves;
     if (instance.kind == ObjectKind::stand_in && !instance.occludes) {
       may_stand_back[instance.mesh] = 1;
+      stands_back = true;
     }
   }
   trees.resize(meshes);

@@ -121,6 +121,7 @@ struct Scene::Compiled {
   std::vector<Bounds> blocker_boxes;                          // of it
   std::size_t skipped = 0;
   bool two_level = false;  // something moves
+  bool stands_back = false;
   bool real_blockers = false;
   bool filters = false;
   bool has_glass = false;

@@ -13,7 +13,7 @@ namespace {
 using render::finished_stage, render::one_ray_stage;
 
 constexpr double share_of_frame = 0.7;  // of its time, for rendering
-constexpr double share_at_rest = 0.85;  // ... where nothing is found anew, and cells can wait
+constexpr double share_at_rest = 0.88;  // ... where nothing is found anew, and cells can wait
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
 // What a cell takes at each stage, of the coarsest one's, as long as nothing better is known: as in
