@@ -207,13 +207,15 @@ bool MovedThings::may_shade(const Scene::Bounds& receivers) const {
   });
 }
 
+// No ray of the cone is further from its axis, at what moved, than the box is grown by.
 bool MovedThings::may_be_seen(const CellCone& cone, Vec3f camera) const {
+  constexpr float wide_rad = 1;  // from here on any may be
+  if (!(cone.half_rad < wide_rad)) return true;
+  const float per_metre = std::tan(cone.half_rad + 1e-3F);
   return std::ranges::any_of(where_, [&](const Scene::Bounds& bounds) {
-    const Vec3f to = middle(bounds) - camera;
-    const float distance = length(to), radius = length(half_size(bounds));
-    if (!(distance > radius)) return true;
-    const float away = std::acos(std::clamp(dot(to, cone.axis) / distance, -1.0F, 1.0F));
-    return away <= cone.half_rad + std::asin(radius / distance) + 1e-3F;
+    const float farthest = length(middle(bounds) - camera) + length(half_size(bounds));
+    const float aside = per_metre * farthest;
+    return meets(grown(bounds, {aside, aside, aside}), camera, cone.axis, infinite);
   });
 }
 
