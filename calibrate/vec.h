@@ -39,12 +39,12 @@ constexpr Vec3T<T> cross(Vec3T<T> a, Vec3T<T> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 template <class T>
-T length(Vec3T<T> a) {
+inline T length(Vec3T<T> a) {
   return std::sqrt(dot(a, a));
 }
 // Unit vector; the zero vector stays zero.
 template <class T>
-Vec3T<T> normalize(Vec3T<T> a) {
+inline Vec3T<T> normalize(Vec3T<T> a) {
   const T l = length(a);
   return l > T(0) ? a / l : a;
 }

@@ -36,10 +36,17 @@ Block block_of(const Material& material) {
   return block;
 }
 
-std::optional<LookUp> find(const Material& material, const Block& block, const HitPoint& hit) {
-  if (block.camera.columns == 0) return LookUp{{hit.u, hit.v}, hit.uv_per_metre};
-  return seen_by_camera(block.camera, std::span(material.parameters).subspan(sizeof block),
-                        in_camera(block.camera, hit.position));
+// Where its video shows the hit; false = nowhere.
+bool find(const Material& material, const Block& block, const HitPoint& hit, LookUp& at) {
+  if (block.camera.columns == 0) {
+    at = {{hit.u, hit.v}, hit.uv_per_metre};
+    return true;
+  }
+  const auto found =
+      seen_by_camera(block.camera, std::span(material.parameters).subspan(sizeof block),
+                     in_camera(block.camera, hit.position));
+  if (found) at = *found;
+  return found.has_value();
 }
 
 std::array<float, 4> seen(const ShadeContext& context,
@@ -47,10 +54,10 @@ std::array<float, 4> seen(const ShadeContext& context,
                           const Block& block,
                           const HitPoint& hit,
                           float footprint_m) {
-  const auto at = find(material, block, hit);
-  if (!at) return {};
-  return context.pictures[block.picture]->look_up(at->place.u, at->place.v,
-                                                  footprint_m * at->uv_per_metre);
+  LookUp at{};
+  if (!find(material, block, hit, at)) return {};
+  return context.pictures[block.picture]->look_up(at.place.u, at.place.v,
+                                                  footprint_m * at.uv_per_metre);
 }
 
 Vec3f foreground(const Block& block, const std::array<float, 4>& rgba) {
@@ -149,11 +156,11 @@ class BillboardShader final : public render::Shader {
                       RayKind kind,
                       float footprint_m) const override {
     const Block block = block_of(material);
-    const auto at = find(material, block, hit);
-    if (!at) return grey(1);
+    LookUp at{};
+    if (!find(material, block, hit, at)) return grey(1);
     const render::LivePicture& picture = *context.pictures[block.picture];
-    const auto [u, v] = at->place;
-    if (picture.is_clear(u, v, footprint_m * at->uv_per_metre)) return grey(1);
+    const auto [u, v] = at.place;
+    if (picture.is_clear(u, v, footprint_m * at.uv_per_metre)) return grey(1);
     return kind == RayKind::shadow ? passed(block, picture.look_up(u, v, 0)) : Vec3f{};
   }
 };

@@ -171,8 +171,8 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
   const RayStream& s = stream_;
   p.incoming = {s.dx[i], s.dy[i], s.dz[i]};
   if (s.geom[i] != RTC_INVALID_GEOMETRY_ID) {
-    p.hit = frame_->inputs.scene->hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i],
-                                            p.incoming);
+    frame_->inputs.scene->read_hit(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i], p.incoming,
+                                   p.hit);
   }
   p.footprint_m = p.blur_m = 0;
   p.throughput = {1, 1, 1};

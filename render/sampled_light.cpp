@@ -112,7 +112,7 @@ class SampledLight {
       ShadePoint& p = w.points[static_cast<std::size_t>(met++)];
       p = {};
       p.incoming = {s.dx[i], s.dy[i], s.dz[i]};
-      p.hit = scene_.hit_point(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i], p.incoming);
+      scene_.read_hit(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i], p.incoming, p.hit);
       p.throughput = {1, 1, 1};
       p.pixel = w.ray_pixel[i];
     }

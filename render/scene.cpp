@@ -67,11 +67,12 @@ namespace {
 
 // The linear change of the normal over a triangle, made symmetric. `d1` and `d2` are its changes
 // along the edges `e1` and `e2`.
-void find_turn(Vec3f e1, Vec3f e2, Vec3f d1, Vec3f d2, HitPoint& hit) {
+[[gnu::always_inline]] inline void find_turn(
+    Vec3f e1, Vec3f e2, Vec3f d1, Vec3f d2, Vec3f geometric_normal, HitPoint& hit) {
   const float x1 = length(e1);
   if (!(x1 > 0)) return;
   const Vec3f edge = e1 * (1 / x1);
-  const Vec3f across = cross(hit.geometric_normal, edge);
+  const Vec3f across = cross(geometric_normal, edge);
   const float x2 = dot(e2, edge), y2 = dot(e2, across);
   // Of a sliver nothing can be said across it.
   if (!(std::abs(y2) > 1e-3F * (x1 + std::abs(x2)))) return;
@@ -110,51 +111,68 @@ Facet facet_of(const Mesh& mesh,
   return facet;
 }
 
-HitPoint Scene::Impl::hit_point(
-    unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
-  HitPoint hit;
-  const Part& p = part(geom_id, inst_id, hit.instance);
+// Each value goes to its place once, from a register: what is read again soon after parts of it
+// were written waits until they have arrived.
+[[gnu::always_inline]] inline void Scene::Impl::read_hit(unsigned geom_id,
+                                                         unsigned prim_id,
+                                                         unsigned inst_id,
+                                                         float u,
+                                                         float v,
+                                                         const Vec3f& incoming,
+                                                         HitPoint& hit) const {
+  std::uint32_t instance = 0;
+  const Part& p = part(geom_id, inst_id, instance);
   const Mesh& mesh = *description.meshes[p.mesh];
   const std::uint32_t t = p.triangle_of_prim.empty() ? prim_id : p.triangle_of_prim[prim_id];
   const auto& [a, b, c] = mesh.triangles[t];
   const float w = 1 - u - v;
   const bool placed = p.instance != Part::none;
-  const auto& matrix = description.instances[hit.instance].set_from_object;
-  const std::vector<Facet>& known = facets[hit.instance];
-  const Facet facet =
-      known.empty() ? facet_of(mesh, p.positions, t, placed ? nullptr : &matrix) : known[t];
+  const auto& matrix = description.instances[instance].set_from_object;
+  const std::vector<Facet>& known = facets[instance];
+  Facet found;
+  if (known.empty()) found = facet_of(mesh, p.positions, t, placed ? nullptr : &matrix);
+  const Facet& facet = known.empty() ? found : known[t];
   const auto& [p0, p1, p2] = facet.corners;
+  hit.instance = instance;
+  hit.material = material_of(mesh, t);
   hit.position = p0 * w + p1 * u + p2 * v;
   hit.largest_coordinate = facet.largest_coordinate;
-  hit.geometric_normal = facet.normal != Vec3f{} ? facet.normal : -incoming;
-  hit.back = dot(hit.geometric_normal, incoming) > 0;
-  if (hit.back) hit.geometric_normal = -hit.geometric_normal;
-  if (mirrored[hit.instance] != 0) hit.back = !hit.back;
-  hit.normal = hit.geometric_normal;
+  Vec3f side = facet.normal != Vec3f{} ? facet.normal : -incoming;
+  const bool back = dot(side, incoming) > 0;
+  if (back) side = -side;
+  hit.back = back != (mirrored[instance] != 0);
+  hit.geometric_normal = side;
+  Vec3f normal = side;
+  hit.edge = {};
+  hit.turn_along = hit.turn_across = hit.turn_both = 0;
   if (!mesh.normals.empty()) {
     const auto& normals = placed ? p.normals : mesh.normals;
     Vec3f n = normals[a] * w + normals[b] * u + normals[c] * v;
-    n = placed ? normalize(n) : transform_normal(normal_matrices[hit.instance], n);
+    n = placed ? normalize(n) : transform_normal(normal_matrices[instance], n);
     if (dot(n, n) > 0.5F) {
+      const bool away = dot(n, side) < 0;
       const auto turned = [&](std::uint32_t corner) {
         const Vec3f turned_n =
-            placed ? normals[corner]
-                   : transform_normal(normal_matrices[hit.instance], normals[corner]);
-        return dot(n, hit.geometric_normal) < 0 ? -turned_n : turned_n;
+            placed ? normals[corner] : transform_normal(normal_matrices[instance], normals[corner]);
+        return away ? -turned_n : turned_n;
       };
-      find_turn(p1 - p0, p2 - p0, turned(b) - turned(a), turned(c) - turned(a), hit);
-      hit.normal = dot(n, hit.geometric_normal) < 0 ? -n : n;
+      find_turn(p1 - p0, p2 - p0, turned(b) - turned(a), turned(c) - turned(a), side, hit);
+      normal = away ? -n : n;
       // An interpolated normal may lean away from the viewer near silhouettes: bend it back.
-      const float away = dot(hit.normal, incoming);
-      if (away > -1e-3F) hit.normal = normalize(hit.normal - incoming * (away + 1e-3F));
+      const float lean = dot(normal, incoming);
+      if (lean > -1e-3F) normal = normalize(normal - incoming * (lean + 1e-3F));
     }
   }
+  hit.normal = normal;
+  hit.u = hit.v = hit.uv_per_metre = 0;
   if (!mesh.uvs.empty()) {
     const auto &t0 = mesh.uvs[a], &t1 = mesh.uvs[b], &t2 = mesh.uvs[c];
     hit.u = t0[0] * w + t1[0] * u + t2[0] * v;
     hit.v = t0[1] * w + t1[1] * u + t2[1] * v;
     hit.uv_per_metre = facet.uv_per_metre;
   }
+  hit.tangent = {};
+  hit.handedness = 1;
   if (!mesh.tangents.empty()) {
     const auto &t0 = mesh.tangents[a], &t1 = mesh.tangents[b], &t2 = mesh.tangents[c];
     const Vec3f tangent{t0[0] * w + t1[0] * u + t2[0] * v, t0[1] * w + t1[1] * u + t2[1] * v,
@@ -162,13 +180,11 @@ HitPoint Scene::Impl::hit_point(
     hit.tangent = normalize(transform_vector(matrix, tangent));
     hit.handedness = t0[3];
   }
-  hit.material = material_of(mesh, t);
-  return hit;
 }
 
 // A ray that is filtered, in the set: Embree gives it in the object's frame inside an instance.
-Scene::Impl::FilteredRay Scene::Impl::ray_of(const RTCFilterFunctionNArguments* args,
-                                             unsigned lane) const {
+[[gnu::always_inline]] inline Scene::Impl::FilteredRay Scene::Impl::ray_of(
+    const RTCFilterFunctionNArguments* args, unsigned lane) const {
   const unsigned n = args->N;
   FilteredRay ray{{RTCRayN_org_x(args->ray, n, lane), RTCRayN_org_y(args->ray, n, lane),
                    RTCRayN_org_z(args->ray, n, lane)},
@@ -183,16 +199,16 @@ Scene::Impl::FilteredRay Scene::Impl::ray_of(const RTCFilterFunctionNArguments* 
   return ray;
 }
 
-Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
-                          unsigned lane,
-                          RayKind kind,
-                          float cone_rad) const {
+[[gnu::always_inline]] inline Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
+                                                        unsigned lane,
+                                                        RayKind kind,
+                                                        float cone_rad) const {
   const unsigned n = args->N;
   const Vec3f incoming = ray_of(args, lane).direction;
-  const HitPoint hit =
-      hit_point(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
-                RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
-                RTCHitN_v(args->hit, n, lane), incoming);
+  HitPoint hit;
+  read_hit(RTCHitN_geomID(args->hit, n, lane), RTCHitN_primID(args->hit, n, lane),
+           RTCHitN_instID(args->hit, n, lane, 0), RTCHitN_u(args->hit, n, lane),
+           RTCHitN_v(args->hit, n, lane), incoming, hit);
   const ShadeContext context{&description, nullptr, pictures, prepared};
   const float slant = std::max(std::abs(dot(incoming, hit.geometric_normal)), 1e-6F);
   const float footprint_m = cone_rad * RTCRayN_tfar(args->ray, n, lane) / slant;
@@ -348,9 +364,14 @@ Scene::~Scene() = default;
 const SceneDescription& Scene::description() const { return impl_->description; }
 std::uint64_t Scene::id() const { return impl_->id; }
 RTCSceneTy* Scene::embree() const { return impl_->scene; }
-HitPoint Scene::hit_point(
-    unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const {
-  return impl_->hit_point(geom_id, prim_id, inst_id, u, v, incoming);
+void Scene::read_hit(unsigned geom_id,
+                     unsigned prim_id,
+                     unsigned inst_id,
+                     float u,
+                     float v,
+                     const Vec3f& incoming,
+                     HitPoint& hit) const {
+  impl_->read_hit(geom_id, prim_id, inst_id, u, v, incoming, hit);
 }
 void Scene::fetch_hits(const unsigned* geom_ids,
                        const unsigned* prim_ids,

@@ -115,9 +115,24 @@ class Scene {
   std::uint64_t id() const;
   RTCSceneTy* embree() const;
   // The point that Embree's ids and barycentric u, v name. `incoming` is the ray's direction.
-  HitPoint hit_point(
-      unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const;
-  // Begins to fetch from memory what hit_point() will read for `count` hits; those that are none
+  void read_hit(unsigned geom_id,
+                unsigned prim_id,
+                unsigned inst_id,
+                float u,
+                float v,
+                const Vec3f& incoming,
+                HitPoint& hit) const;
+  HitPoint hit_point(unsigned geom_id,
+                     unsigned prim_id,
+                     unsigned inst_id,
+                     float u,
+                     float v,
+                     Vec3f incoming) const {
+    HitPoint hit;
+    read_hit(geom_id, prim_id, inst_id, u, v, incoming, hit);
+    return hit;
+  }
+  // Begins to fetch from memory what read_hit() will read for `count` hits; those that are none
   // are left out.
   void fetch_hits(const unsigned* geom_ids,
                   const unsigned* prim_ids,

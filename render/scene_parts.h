@@ -227,8 +227,13 @@ struct Scene::Impl {
     instance = instance_of_geometry[inst_id];
     return *trees[description.instances[instance].mesh]->parts[geom_id];
   }
-  HitPoint hit_point(
-      unsigned geom_id, unsigned prim_id, unsigned inst_id, float u, float v, Vec3f incoming) const;
+  void read_hit(unsigned geom_id,
+                unsigned prim_id,
+                unsigned inst_id,
+                float u,
+                float v,
+                const Vec3f& incoming,
+                HitPoint& hit) const;
 
   static const Impl& of(const RTCFilterFunctionNArguments* args) {
     return *reinterpret_cast<const TraceContext*>(args->context)->scene->impl_;
