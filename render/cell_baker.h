@@ -58,6 +58,9 @@ class CellBaker final : public RaySink {
     bool beyond_cut;   // followed by chance: what is straight on is counted, for all that are not
     std::uint32_t path;
     Media media;
+    // Of a ray that is cut, and only asks whether anything is in its way: what that is taken for,
+    // as radiance per irradiance. Of others zero.
+    Vec3f surroundings;
   };
 
   // A lobe, whose compact light waits until it is known who sees which.
@@ -128,7 +131,8 @@ class CellBaker final : public RaySink {
     return {((i >> 4) & 3) * 4 + (i & 3), (i >> 6) * 4 + ((i >> 2) & 3)};
   }
   static bool continuous(const Met& a, const Met& b, float pixel_angle, Vec3f camera);
-  static std::size_t target_of(const ShadePoint& p) {
+  template <class Sample>  // a point, or a ray
+  static std::size_t target_of(const Sample& p) {
     return p.slot < cell_pixels ? p.pixel : cell_pixels + p.pixel;
   }
   bool is_inside(std::size_t k) const { return (inside_[k / 64] >> (k % 64) & 1) != 0; }
@@ -155,6 +159,7 @@ class CellBaker final : public RaySink {
   // cell_bounce.cpp
   void mark_passed(std::size_t count);
   void bounce();
+  void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
 
   // cell_lamps.cpp
   void add_centre_lamps(std::span<const std::uint16_t> receiver_of_point);

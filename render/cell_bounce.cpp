@@ -29,6 +29,27 @@ void CellBaker::mark_passed(std::size_t count) {
   }
 }
 
+// What a cut ray meets is not shaded: it is taken for a surface like that which mirrors it, in the
+// light of what the pixel shows. What lets light through does not count.
+void CellBaker::meet_surroundings(const QueuedRay& ray, std::size_t i) {
+  const Scene& scene = *frame_->inputs.scene;
+  const std::uint32_t material =
+      scene.surface_of(stream_.geom[i], stream_.prim[i], stream_.inst[i]).material;
+  const bool open =
+      scene.shader_of(material).lets_light_through(scene.description().materials[material]);
+  const std::size_t target = target_of(ray);
+  if (open || !(transport_->receiving[ray.pixel / 64] >> (ray.pixel % 64) & 1)) {
+    add_environment(ray.slot, target, ray.direction, ray.roughness, ray.spread, ray.one_of_many,
+                    ray.throughput);
+    return;
+  }
+  const Vec3f weight = ray.throughput * ray.surroundings;
+  transport_->shared.push_back(
+      {static_cast<std::uint16_t>(target), static_cast<std::uint16_t>(ray.pixel), false, weight});
+  const Light& light = light_[ray.pixel];
+  samples_[ray.slot].added += weight * (light.arriving + light.lamps);
+}
+
 void CellBaker::bounce() {
   while (!queue_.empty()) {
     const std::size_t n = std::min<std::size_t>(queue_.size(), stream_rays);
@@ -53,7 +74,7 @@ void CellBaker::bounce() {
     for (std::size_t i = 0; i < n; ++i) {
       const QueuedRay& q = queue_[from + i];
       const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
-      const std::size_t target = q.slot < cell_pixels ? q.pixel : cell_pixels + q.pixel;
+      const std::size_t target = target_of(q);
       if (!hit && q.beyond_cut) continue;
       if (!hit && q.kind != RayKind::camera) {
         if (q.kind == RayKind::bent) {
@@ -62,6 +83,10 @@ void CellBaker::bounce() {
           add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
                           q.throughput);
         }
+        continue;
+      }
+      if (hit && q.surroundings != Vec3f{}) {
+        meet_surroundings(q, i);
         continue;
       }
       if (hit && q.beyond_cut && q.kind == RayKind::bent) {

@@ -27,6 +27,9 @@ constexpr float inside_glass = 0.125F;
 // With cuts by chance: from so much of 1 - accuracy on a ray is always followed, below it by
 // chance.
 constexpr float surely_followed = 2.0F / 3;
+// A ray that is cut still asks whether anything is in its way, down to so much of what is followed:
+// indoors nearly everything is, and light from outside would lie on it like a haze.
+constexpr float least_asked = 0.25F;
 // What compact lights may add in a lobe at most, of what a ray that is not followed may show, for
 // nobody to ask whether they are in sight.
 constexpr float unseen_compact = 1.0F / 64;
@@ -130,7 +133,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
       if (lamps || compact_is_seen_in(lobe)) lobes_.push_back(lobe);
     }
   }
-  // A cut ray is not black: it sees the environment, or the plate. Bright light is never cut.
+  // A cut ray is not black: it sees the environment, or the plate, or else what is about here.
+  // Bright light is never cut.
   const bool deep = from.depth >= effort_.max_depth;
   const bool many = sent_[from.pixel] >= effort_.max_rays || queue_.size() == queue_.capacity();
   statistics_->depth_limit_hits += deep;
@@ -150,8 +154,10 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     return std::min(weight * std::max(brightest, 1.0F) / (surely_followed * least), 1.0F);
   };
   const float followed = chance();
-  if (followed < 1) {
-    if (effort_.dark_cuts) return;
+  const bool asks = !(followed > 0) && !deep && !many && ray.kind == RayKind::reflection &&
+                    from.diffuse != Vec3f{} && weight >= least_asked * least;
+  if (followed < 1 && effort_.dark_cuts) return;
+  if (followed < 1 && !asks) {
     if (straight) {
       CellTransport::Base& base = base_[target_of(from)];
       samples_[from.slot].plate += ray.throughput;
@@ -172,8 +178,9 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   ++sent_[from.pixel];
   queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.steps,
                     ray.roughness, from.pixel, from.slot, ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps, followed < 1,
-                    next_path(from.path, pushed_), ray.media});
+                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps,
+                    followed > 0 && followed < 1, next_path(from.path, pushed_), ray.media,
+                    asks ? from.diffuse : Vec3f{}});
 }
 
 // A number in 0..1: well spread over the samples of a pixel, those of centres over the picture.
