@@ -161,7 +161,9 @@ class BillboardShader final : public render::Shader {
     const render::LivePicture& picture = *context.pictures[block.picture];
     const auto [u, v] = at.place;
     if (picture.is_clear(u, v, footprint_m * at.uv_per_metre)) return grey(1);
-    return kind == RayKind::shadow ? passed(block, picture.look_up(u, v, 0)) : Vec3f{};
+    if (kind != RayKind::shadow) return {};
+    if (block.translucency == 0) return grey(1 - picture.quick_alpha(u, v, 0));
+    return passed(block, picture.look_up(u, v, 0));
   }
 };
 
