@@ -148,7 +148,7 @@ class BillboardShader final : public render::Shader {
   }
 
   // A hole is where the camera does not see, and where its picture is clear as far as the ray is
-  // wide: most of it, around a person. The rest is left to shade().
+  // wide, which is mostly told for many texels at once. The rest is left to shade().
   Vec3f transmittance(const ShadeContext& context,
                       const Material& material,
                       const HitPoint& hit,
@@ -160,8 +160,13 @@ class BillboardShader final : public render::Shader {
     if (!find(material, block, hit, at)) return grey(1);
     const render::LivePicture& picture = *context.pictures[block.picture];
     const auto [u, v] = at.place;
-    if (picture.is_clear(u, v, footprint_m * at.uv_per_metre)) return grey(1);
-    if (kind != RayKind::shadow) return {};
+    const float footprint_uv = footprint_m * at.uv_per_metre;
+    if (picture.is_clear(u, v, footprint_uv)) return grey(1);
+    if (kind != RayKind::shadow) {
+      const bool clear = std::isfinite(footprint_uv) &&
+                         picture.look_up(u, v, footprint_uv) == std::array<float, 4>{};
+      return clear ? grey(1) : Vec3f{};
+    }
     if (block.translucency == 0) return grey(1 - picture.quick_alpha(u, v, 0));
     return passed(block, picture.look_up(u, v, 0));
   }

@@ -303,14 +303,15 @@ void CellBaker::shade_centres() {
   bounce();
 }
 
-// Which part of wide lights a point looks for. Where one sample stands for all of a pixel,
-// neighbours that mirror something would tell noise apart from steps of light.
+// Which part of wide lights a point looks for. Neighbours share what the points that centres see
+// at once find; what they mirror, or see behind a clear layer, nobody shares: in parts, it would be
+// grain.
 std::uint8_t CellBaker::part_of(const ShadePoint& p) const {
   if (p.slot >= cell_pixels) {
     const std::uint32_t of_pixel = p.pixel * 7 + p.pixel / cell_size * 3;
     return SoftLights::part_of_sample(index_of_slot_[p.slot - cell_pixels] + of_pixel);
   }
-  if (p.kind != RayKind::camera) return SoftLights::middle;
+  if (p.kind != RayKind::camera || p.depth > 0) return SoftLights::middle;
   return SoftLights::part_of_pixel(p.pixel % cell_size, p.pixel / cell_size);
 }
 

@@ -140,12 +140,14 @@ TEST(Billboard, LeavesThePlateItsBitsWhereItIsClear) {
   }
 }
 
-// Says of nothing that it is clear.
+// Shows hardly anything where there is nothing, so that no ray passes at once.
 class Unsure final : public render::LivePicture {
  public:
   explicit Unsure(std::shared_ptr<const LivePicture> picture) : picture_(std::move(picture)) {}
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override {
-    return picture_->look_up(u, v, footprint_uv);
+    std::array<float, 4> rgba = picture_->look_up(u, v, footprint_uv);
+    rgba[0] = std::max(rgba[0], 1e-9F);
+    return rgba;
   }
 
  private:
@@ -185,6 +187,13 @@ TEST(Billboard, ShowsTheSameWhereItIsPassedAtOnce) {
     return see(std::move(picture), 0, false).statistics.secondary_rays;
   };
   EXPECT_LT(rays(small_figure()), rays(std::make_shared<Unsure>(small_figure())) / 2);
+  // Close to what is seen, too: a dot in every block of texels.
+  const auto dots = picture_from(64, 64, [](int x, int y) {
+    const float alpha = x % 8 == 3 && y % 8 == 3 ? 0.5F : 0.0F;
+    return std::array{0.0F, 0.0F, 0.0F, alpha};
+  });
+  EXPECT_GT(rays(dots), 0U);
+  EXPECT_LT(rays(dots), rays(std::make_shared<Unsure>(dots)) / 4);
 }
 
 // What the kernel is measured against are the rays that it shot, as far as they went.

@@ -7,6 +7,8 @@
 #include <limits>
 #include <set>
 
+#include "compositing/billboard.h"
+#include "compositing/keyed_picture.h"
 #include "made_shot.h"
 #include "render/soft_lights.h"
 
@@ -214,35 +216,34 @@ TEST(SoftLights, StandSideBySideInTheOrderOfTheirPlaces) {
   EXPECT_LT(apart, 0.35);
 }
 
-// A dim mirror of a matte wall under a roof that hides some of the lights: what one light of eight
-// tells is no grain from pixel to pixel.
-TEST(SoftLights, ShowNoGrainInMirrorsThatTestAFewOfThem) {
+// A matte wall under a roof that hides some of the lights, and how much the wall's light differs
+// from pixel to pixel in a part of the picture, as a share of its most.
+render::SceneDescription wall_under_roof() {
   render::SceneDescription scene = made_scene(false);
   scene.instances.clear();
-  render::StandardParameters mirror, wall;
-  mirror.roughness = 0;
-  std::fill_n(mirror.base_color, 3, 0.01F);
+  render::StandardParameters wall;
   wall.roughness = 1;
   wall.specular = 0;
-  scene.materials = {render::make_standard_material("mirror", mirror),
-                     render::make_standard_material("wall", wall)};
+  scene.materials = {render::make_standard_material("wall", wall)};
   auto upright = std::make_shared<render::Mesh>();
   upright->positions = {{-20, 4, 0}, {20, 4, 0}, {20, 4, 9}, {-20, 4, 9}};
   upright->triangles = {{0, 1, 2}, {0, 2, 3}};
-  upright->materials = {1};
+  upright->materials = {0};
   auto roof = std::make_shared<render::Mesh>();
   roof->positions = {{-20, 2.5F, 4}, {20, 2.5F, 4}, {20, 4, 4}, {-20, 4, 4}};
   roof->triangles = {{0, 1, 2}, {0, 2, 3}};
-  roof->materials = {1};
-  scene.meshes = {made_floor(20, 0), upright, roof};
-  for (std::uint32_t mesh = 0; mesh < 3; ++mesh) scene.instances.emplace_back().mesh = mesh;
-  MadeShot shot = made_shot(64, 48, std::move(scene), 64);
-  shot.job.cam_from_set = calibrate::look_at({0, -3, 1.5}, {0, 2, 0}, 0);
+  roof->materials = {0};
+  scene.meshes = {upright, roof};
+  for (std::uint32_t mesh = 0; mesh < 2; ++mesh) scene.instances.emplace_back().mesh = mesh;
+  return scene;
+}
+
+double grain_of(MadeShot shot, render::Rect part) {
   shot.job.effort.aa_samples = 1;
   const render::FrameResult frame = frame_of(shot);
   double grain = 0, light = 0;
-  for (int y = 24; y < 40; ++y) {
-    for (int x = 8; x < 56; ++x) {
+  for (int y = part.y; y < part.y + part.height; ++y) {
+    for (int x = part.x; x < part.x + part.width; ++x) {
       const auto at = [&](int column) {
         return static_cast<double>(
             float_from_half(frame.rgba.pixels[frame.rgba.index(y, column, 1)]));
@@ -252,7 +253,38 @@ TEST(SoftLights, ShowNoGrainInMirrorsThatTestAFewOfThem) {
     }
   }
   EXPECT_GT(light, 0.01);
-  EXPECT_LT(grain, 0.02 * light);
+  return grain / light;
+}
+
+// What one light of eight tells is no grain from pixel to pixel.
+TEST(SoftLights, ShowNoGrainInDimMirrors) {
+  render::SceneDescription scene = wall_under_roof();
+  render::StandardParameters mirror;
+  mirror.roughness = 0;
+  std::fill_n(mirror.base_color, 3, 0.01F);
+  scene.materials.push_back(render::make_standard_material("mirror", mirror));
+  scene.meshes.push_back(made_floor(20, 1));
+  scene.instances.emplace_back().mesh = 2;
+  MadeShot shot = made_shot(64, 48, std::move(scene), 64);
+  shot.job.cam_from_set = calibrate::look_at({0, -3, 1.5}, {0, 2, 0}, 0);
+  EXPECT_LT(grain_of(std::move(shot), {8, 24, 48, 16}), 0.02);
+}
+
+// What is seen through the haze about a person, whose neighbours share nothing.
+TEST(SoftLights, ShowNoGrainBehindHaze) {
+  MadeShot shot = made_shot(64, 48, wall_under_roof(), 64);
+  render::SceneDescription scene = wall_under_roof();
+  scene.materials.push_back(make_billboard_material("person", {}));
+  scene.meshes.push_back(std::make_shared<render::Mesh>(make_billboard_mesh(1)));
+  render::Instance& person = scene.instances.emplace_back();
+  person.mesh = 2, person.moves = true;
+  person.set_from_object = {8, 0, 0, 0, 0, 1, 0, 0, 0, 0, 4, 0};
+  capture::Image haze = capture::make_image(8, 8, 4);
+  for (int pixel = 0; pixel < 64; ++pixel) haze.at(pixel / 8, pixel % 8, 3) = 0.01F;
+  const auto picture = std::make_shared<KeyedPicture>(make_keyed_texture(haze));
+  shot.scene = std::make_unique<render::Scene>(std::move(scene), render::Scene::Pictures{picture});
+  shot.job.cam_from_set = calibrate::look_at({0, -3, 1.5}, {0, 2, 1.5}, 0);
+  EXPECT_LT(grain_of(std::move(shot), {8, 8, 48, 24}), 0.02);
 }
 
 TEST(SoftLights, AreCulledOnlyWhereNoPartOfThemIsHidden) {
