@@ -16,7 +16,24 @@ struct KeyDials {
   float scale = 1.02F;              // 1 / (alpha at which the person is whole - black)
   float edge = 0;                   // -1 thinner .. 1 fuller
   float despill = 1;                // share of the spill that is taken away
+  float skin = 0;  // its first channel over its second, over the plate's; 0 = not told apart
 };
+
+// Of two primaries, skin has much of the second one and less of the first, so that it has a third
+// or more of the colour of a yellow wall, and would be as clear as that. How much of the screen a
+// texel can be by these two channels, which is nothing of skin, dark or light, and 1 of the screen;
+// near that more, for the difference of two alike is noisy, and what is bare is told better by all
+// three.
+template <class V>
+[[gnu::always_inline]] inline V share_without_skin(const std::array<V, 3>& c,
+                                                   const std::array<V, 3>& p,
+                                                   float skin) {
+  constexpr float most_share = 4, more_near_screen = 0.4F;
+  const V scale = most(p[0] * p[1] * (1 - skin), lanes_like(p[0], 1e-12F));
+  V share = less_times(c[0] * p[1], c[1] * skin, p[0]) / scale;
+  share = share + more_near_screen * most(share - 0.5F, lanes_like(share, 0));
+  return least(most(share, lanes_like(share, -most_share)), lanes_like(share, most_share));
+}
 
 // Channels in the keyer's order.
 template <class V>
@@ -49,6 +66,9 @@ template <bool two_primaries, class V>
                                                      const KeyDials& dials) {
   TexelShare<V> texel{};
   texel.share = screen_excess<two_primaries>(c[0], c[1], c[2]) * over_excess;
+  if constexpr (two_primaries) {
+    if (dials.skin > 0) texel.share = least(texel.share, share_without_skin(c, p, dials.skin));
+  }
   if (dials.table == nullptr) return texel;
   // Of two primaries, the greater rest stands for the second channel.
   V second = less_times(c[1], texel.share, p[1]);
@@ -113,13 +133,17 @@ template <bool two_primaries, class V>
   return matte_between(share_of<two_primaries>(c, p, over_excess, dials), over_excess, near, dials);
 }
 
+// The most that skin is green over blue, as a share of red over green.
+inline constexpr float most_yellow_of_skin = 1.0F;
+
 // The foreground that goes with a matte: what is left of the texel without the plate behind it and
 // its spill. Never below 0, and 0 where alpha is.
 template <bool two_primaries, class V>
 [[gnu::always_inline]] inline KeyedTexel<V> foreground_of(const std::array<V, 3>& c,
                                                           const std::array<V, 3>& p,
                                                           const TexelMatte<V>& matte,
-                                                          float despill) {
+                                                          float despill,
+                                                          bool keeps_skin = false) {
   const V zero = lanes_like(matte.alpha, 0), one = lanes_like(matte.alpha, 1);
   const V taken =
       times_plus(lanes_like(zero, despill < 1 ? despill : 1.0F), matte.spill, one - matte.alpha);
@@ -132,6 +156,16 @@ template <bool two_primaries, class V>
     V limit = most(f1, f2);
     if (harder > 0) limit = limit + harder * (0.5F * (f1 + f2) - limit);
     f0 = least(f0, kept > 0 ? limit + kept * f0 : limit);
+  }
+  if constexpr (two_primaries) {
+    if (keeps_skin) {
+      // No more yellow than skin is, nor more green than anything else.
+      const float share = despill < 1 ? despill : 1.0F;
+      const V yellow = least(f0, f1) - f2 - most_yellow_of_skin * most(f1 - f0, zero);
+      const V over = share * most(yellow, zero);
+      f0 = f0 - over, f1 = f1 - over;
+      f0 = f0 - share * most(f0 - most(f1, f2), zero);
+    }
   }
   f0 = matte.alpha > 0.0F ? f0 : zero;
   f1 = matte.alpha > 0.0F ? f1 : zero;

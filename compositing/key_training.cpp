@@ -155,6 +155,7 @@ TableCodes train_key_table(std::span<const std::uint32_t> seeds) {
   Learners learners;
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     for (MadeScene scene : made_scenes()) {
+      if (has_two_primaries(screen_colour_of(scene.screen))) continue;  // uses what others teach
       scene.actor.any_colours = i % 2 == 1;
       const MadeClip clip(scene, seeds[i]);
       std::vector<capture::Image> shots;

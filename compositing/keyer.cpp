@@ -33,7 +33,7 @@ struct ScreenFormula {
     return compositing::matte_between(s, over_excess, near, dials);
   }
   KeyedTexel<F8> foreground(const Three& c, const Three& p, const TexelMatte<F8>& matte) const {
-    return foreground_of<two_primaries>(c, p, matte, dials.despill);
+    return foreground_of<two_primaries>(c, p, matte, dials.despill, dials.skin > 0);
   }
 };
 
@@ -73,6 +73,9 @@ void check(const KeySettings& s) {
   within(s.smoothing, 0, 4, "smoothing");
 }
 
+// Of skin of any tone, against a screen as red as it is green.
+constexpr float skin_before_yellow = 0.6F;
+
 // The camera is looked for in every so many frames; so far it may be off, in pixels.
 constexpr int frames_between_looks = 3;
 constexpr float shift_still_px = 1;
@@ -106,8 +109,12 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
                                 " pixels, the clean plate " + std::to_string(lit.width) + "x" +
                                 std::to_string(lit.height));
   }
-  dials_ = {settings.learned ? &shipped_table() : nullptr, settings.screen,
-            1 / (settings.core - settings.screen), settings.edge, settings.despill};
+  dials_ = {settings.learned ? &shipped_table() : nullptr,
+            settings.screen,
+            1 / (settings.core - settings.screen),
+            settings.edge,
+            settings.despill,
+            lit.colour == ScreenColour::yellow ? skin_before_yellow : 0};
 }
 
 Keyer::Target Keyer::target(KeyedFrame& keyed) const {
@@ -249,7 +256,8 @@ std::array<float, 4> key_texel(
     keyed = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials), 0);
   } else if (has_two_primaries(plate.colour)) {
     const float near = plate.near.at(y, x);
-    keyed = foreground_of<true>(c, p, matte_of<true>(c, p, cell[3], near, dials), dials.despill);
+    keyed = foreground_of<true>(c, p, matte_of<true>(c, p, cell[3], near, dials), dials.despill,
+                                dials.skin > 0);
   } else {
     const float near = plate.near.at(y, x);
     keyed = foreground_of<false>(c, p, matte_of<false>(c, p, cell[3], near, dials), dials.despill);

@@ -51,6 +51,7 @@ std::vector<MadeScene> make_scenes() {
   add("lamp flicker", [](MadeScene& s) { s.flicker = 0.08F, s.uneven = 0.3F; });
   add("stale plate", [](MadeScene& s) { s.stale = 0.12F, s.uneven = 0.5F, s.wrinkles = 0.2F; });
   add("blue screen", [](MadeScene& s) { s.screen = {0.03F, 0.06F, 0.36F}, s.uneven = 0.3F; });
+  add("yellow screen", [](MadeScene& s) { s.screen = {0.35F, 0.4F, 0.02F}, s.uneven = 0.3F; });
   add("studio", [](MadeScene& s) {
     s.uneven = 0.4F, s.wrinkles = 0.3F, s.shadow = 0.45F, s.arm = 0.2F, s.halved_chroma = true;
     s.actor.spill = 0.09F, s.actor.hair = MadeHair::blond;

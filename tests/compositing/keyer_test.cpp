@@ -99,6 +99,36 @@ TEST(KeyTexel, KeysAnyScreenAsGreenWithItsChannelsExchanged) {
   }
 }
 
+// A third of the wall's yellow is in skin of any tone. Scene-linear, of faces.
+TEST(KeyTexel, TellsSkinFromAYellowWall) {
+  constexpr std::array<float, 3> wall{0.35F, 0.4F, 0.02F};
+  capture::Image light = capture::make_image(32, 32);
+  for (std::size_t i = 0; i < light.pixels.size(); ++i) light.pixels[i] = wall[i % 3];
+  const std::vector<capture::Image> shots(2, light);
+  const Keyer keyer(average_plate(shots), {});
+  const auto key = [&](const std::array<float, 3>& tone, float share) {
+    std::array<float, 3> seen{};
+    for (std::size_t c = 0; c < 3; ++c) seen[c] = share * tone[c] + (1 - share) * wall[c];
+    return key_texel(keyer.lit(), keyer.dials(), 8, 8, seen);
+  };
+  constexpr std::array<std::array<float, 3>, 4> tones{{{0.88F, 0.54F, 0.38F},
+                                                       {0.56F, 0.24F, 0.11F},
+                                                       {0.34F, 0.19F, 0.07F},
+                                                       {0.1F, 0.045F, 0.026F}}};
+  for (const std::array<float, 3>& tone : tones) {
+    for (const float exposure : {0.5F, 1.0F}) {
+      const std::array<float, 3> lit{tone[0] * exposure, tone[1] * exposure, tone[2] * exposure};
+      const auto whole = key(lit, 1), half = key(lit, 0.5F);
+      EXPECT_GT(whole[3], 0.97F) << tone[0] << " at " << exposure;
+      for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(whole[c], lit[c], 0.1F * lit[0]) << c;
+      // Of what is half the wall nothing stays more yellow than skin is.
+      EXPECT_GT(half[3], 0.35F) << tone[0] << " at " << exposure;
+      EXPECT_LE(std::min(half[0], half[1]) - half[2], half[0] - half[1] + 1e-5F);
+    }
+  }
+  EXPECT_EQ(key(wall, 1)[3], 0);
+}
+
 TEST(KeyTexel, FilteredFirstOrLastIsTheSameAwayFromClamps) {
   const LitPlate plate = lit_plate(green);
   for (std::uint64_t i = 0; i < 300; ++i) {

@@ -164,8 +164,8 @@ TEST(RealScreens, AYellowWallsEdgesAreCleanAndThePersonWhole) {
   }
   const CleanPlate plate = plate_from_footage(bare, ScreenColour::yellow);
   KeySettings settings;
-  settings.core = 0.25F;   // skin has a third of the wall's colour
-  settings.screen = 0.1F;  // and the wall the blocks of a low rate
+  settings.core = 0.7F;
+  settings.screen = 0.1F;  // the wall shows the blocks of a low rate
   const EdgeAndCore found = measure_clip(frames, plate, settings);
   RecordProperty("excess", std::to_string(found.excess));
   RecordProperty("holes", std::to_string(found.holes));
