@@ -49,6 +49,32 @@ bool find(const Material& material, const Block& block, const HitPoint& hit, Loo
   return found.has_value();
 }
 
+// Points that are looked up together.
+constexpr std::size_t together = 32;
+
+// Of as many points at most, on one billboard. A rough lobe sees it as wide as the lobe is there.
+void see(const ShadeContext& context,
+         const Material& material,
+         const Block& block,
+         std::span<ShadePoint* const> points,
+         std::span<std::array<float, 4>> rgba) {
+  std::array<render::PicturePlace, together> places;
+  std::array<std::array<float, 4>, together> found;
+  std::array<std::size_t, together> point;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const ShadePoint& p = *points[i];
+    rgba[i] = {};
+    LookUp at{};
+    if (!find(material, block, p.hit, at)) continue;
+    point[count] = i;
+    places[count++] = {at.place.u, at.place.v, std::max(p.footprint_m, p.blur_m) * at.uv_per_metre};
+  }
+  context.pictures[block.picture]->look_up_all(std::span(places).first(count),
+                                               std::span(found).first(count));
+  for (std::size_t k = 0; k < count; ++k) rgba[point[k]] = found[k];
+}
+
 std::array<float, 4> seen(const ShadeContext& context,
                           const Material& material,
                           const Block& block,
@@ -85,6 +111,27 @@ const char* fault_of(const Block& block) {
 
 Vec3f grey(float value) { return {value, value, value}; }
 
+void show(const Block& block,
+          const std::array<float, 4>& rgba,
+          ShadePoint& p,
+          render::RaySink& rays) {
+  constexpr float per_pi = 0.318309886F;
+  if (block.lit != 0) {
+    p.diffuse = foreground(block, rgba) * per_pi;
+    p.light_normal = p.hit.normal;
+  } else {
+    p.radiance = foreground(block, rgba);
+  }
+  if (!(rgba[3] < 1)) return;
+  rays.push(p, {render::offset_origin(p.hit, p.incoming),
+                p.incoming,
+                p.throughput * (1 - rgba[3]),
+                {},
+                0,
+                {},
+                p.kind});
+}
+
 class BillboardShader final : public render::Shader {
  public:
   void check(const render::SceneDescription&, const Material& material) const override {
@@ -103,27 +150,18 @@ class BillboardShader final : public render::Shader {
   void shade(const ShadeContext& context,
              std::span<ShadePoint* const> points,
              render::RaySink& rays) const override {
-    constexpr float per_pi = 0.318309886F;
-    for (ShadePoint* p : points) {
-      const Material& material = context.scene->materials[p->hit.material];
+    std::array<std::array<float, 4>, together> rgba;
+    while (!points.empty()) {
+      const std::uint32_t number = points.front()->hit.material;
+      const auto most = points.first(std::min(points.size(), together));
+      const auto end = std::ranges::find_if(
+          most, [&](const ShadePoint* p) { return p->hit.material != number; });
+      const auto some = points.first(static_cast<std::size_t>(end - most.begin()));
+      const Material& material = context.scene->materials[number];
       const Block block = block_of(material);
-      // A rough lobe sees it as wide as the lobe is there.
-      const float width_m = std::max(p->footprint_m, p->blur_m);
-      const std::array<float, 4> rgba = seen(context, material, block, p->hit, width_m);
-      if (block.lit != 0) {
-        p->diffuse = foreground(block, rgba) * per_pi;
-        p->light_normal = p->hit.normal;
-      } else {
-        p->radiance = foreground(block, rgba);
-      }
-      if (!(rgba[3] < 1)) continue;
-      rays.push(*p, {render::offset_origin(p->hit, p->incoming),
-                     p->incoming,
-                     p->throughput * (1 - rgba[3]),
-                     {},
-                     0,
-                     {},
-                     p->kind});
+      see(context, material, block, some, rgba);
+      for (std::size_t i = 0; i < some.size(); ++i) show(block, rgba[i], *some[i], rays);
+      points = points.subspan(some.size());
     }
   }
 

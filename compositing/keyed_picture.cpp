@@ -149,17 +149,45 @@ TexelKeyedPicture::TexelKeyedPicture(std::shared_ptr<const KeyedTexture> texture
   aspect_ = aspect_of(*texture_);
 }
 
-std::array<float, 4> TexelKeyedPicture::look_up(float u, float v, float footprint_uv) const {
-  const float inside = inside_of(u, v, footprint_uv, aspect_);
-  if (!(inside > 0)) return {};
-  const std::array<float, 4> light = texture_->filtered(u, v, footprint_uv);
+KeyPlace TexelKeyedPicture::place_of(const render::PicturePlace& at) const {
   const auto texel = [](float place, int size) {
     return std::clamp(static_cast<int>(place * static_cast<float>(size)), 0, size - 1);
   };
-  std::array<float, 4> rgba = key_texel(*plate_, dials_, texel(v, plate_->height),
-                                        texel(u, plate_->width), {light[0], light[1], light[2]});
+  const std::array<float, 4> light = texture_->filtered(at.u, at.v, at.footprint_uv);
+  return {texel(at.v, plate_->height), texel(at.u, plate_->width), {light[0], light[1], light[2]}};
+}
+
+std::array<float, 4> TexelKeyedPicture::look_up(float u, float v, float footprint_uv) const {
+  const float inside = inside_of(u, v, footprint_uv, aspect_);
+  if (!(inside > 0)) return {};
+  const KeyPlace place = place_of({u, v, footprint_uv});
+  std::array<float, 4> rgba = key_texel(*plate_, dials_, place.y, place.x, place.light);
   for (float& value : rgba) value *= inside;
   return rgba;
+}
+
+void TexelKeyedPicture::look_up_all(std::span<const render::PicturePlace> places,
+                                    std::span<std::array<float, 4>> rgba) const {
+  std::array<KeyPlace, key_lanes> eight;
+  std::array<std::array<float, 4>, key_lanes> keyed;
+  std::array<std::size_t, key_lanes> from;
+  std::array<float, key_lanes> inside;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    rgba[i] = {};
+    const auto& [u, v, footprint_uv] = places[i];
+    inside[count] = inside_of(u, v, footprint_uv, aspect_);
+    if (inside[count] > 0) {
+      from[count] = i;
+      eight[count++] = place_of(places[i]);
+    }
+    if (count < eight.size() && i + 1 < places.size()) continue;
+    key_texels(*plate_, dials_, std::span(eight).first(count), keyed);
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t c = 0; c < 4; ++c) rgba[from[k]][c] = keyed[k][c] * inside[k];
+    }
+    count = 0;
+  }
 }
 
 }  // namespace compositing

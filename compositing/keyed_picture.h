@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "compositing/keyed_texture.h"
@@ -51,8 +52,13 @@ class TexelKeyedPicture final : public render::LivePicture {
                     const KeyDials& dials);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
+  // Keyed eight at a time.
+  void look_up_all(std::span<const render::PicturePlace> places,
+                   std::span<std::array<float, 4>> rgba) const override;
 
  private:
+  KeyPlace place_of(const render::PicturePlace& at) const;
+
   std::shared_ptr<const KeyedTexture> texture_;
   std::shared_ptr<const LitPlate> plate_;
   KeyDials dials_;

@@ -269,4 +269,47 @@ std::array<float, 4> key_texel(
   return rgba;
 }
 
+void key_texels(const LitPlate& plate,
+                const KeyDials& dials,
+                std::span<const KeyPlace> places,
+                std::span<std::array<float, 4>, key_lanes> rgba) {
+  const auto order = channels_of(plate.colour);
+  const auto at = [&](std::size_t i) { return static_cast<std::size_t>(order[i]); };
+  std::array<std::array<float, key_lanes>, 3> light{};
+  std::array<std::array<float, key_lanes>, 4> cells{};
+  std::array<float, key_lanes> nearness{};
+  const bool screen = plate.use == PlateUse::screen;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const auto& [y, x, seen] = places[k];
+    const float* cell = plate.cell(y / plate.step, x / plate.step);
+    for (std::size_t i = 0; i < 4; ++i) cells[i][k] = cell[i];
+    for (std::size_t i = 0; i < 3; ++i) light[i][k] = seen[at(i)];
+    if (screen) nearness[k] = plate.near.at(y, x);
+  }
+  Three c, p;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const F8 value = load_lanes(light[i].data());
+    c[i] = (value > 0.0F) & (value < 1e9F) ? value : F8{};
+    p[i] = load_lanes(cells[i].data());
+  }
+  const F8 last = load_lanes(cells[3].data()), near = load_lanes(nearness.data());
+  const auto key = [&](const auto& formula) {
+    TexelMatte<F8> matte;
+    const TexelShare<F8> share = formula.share(c, p, last);
+    if constexpr (std::decay_t<decltype(formula)>::knows_near) {
+      matte = formula.matte_between(last, near, share);
+    } else {
+      matte = formula.matte(c, p, last, share);
+    }
+    return formula.foreground(c, p, matte);
+  };
+  const KeyedTexel<F8> keyed = !screen                           ? key(DifferenceFormula{dials})
+                               : has_two_primaries(plate.colour) ? key(ScreenFormula<true>{dials})
+                                                                 : key(ScreenFormula<false>{dials});
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    rgba[k][at(0)] = keyed.first[k], rgba[k][at(1)] = keyed.second[k];
+    rgba[k][at(2)] = keyed.third[k], rgba[k][3] = keyed.alpha[k];
+  }
+}
+
 }  // namespace compositing

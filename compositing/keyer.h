@@ -123,4 +123,16 @@ class Keyer {
 std::array<float, 4> key_texel(
     const LitPlate& plate, const KeyDials& dials, int y, int x, const std::array<float, 3>& light);
 
+struct KeyPlace {
+  int y, x;  // pixel of the plate
+  std::array<float, 3> light;
+};
+
+// The same of up to eight at once, to the bit, in a fraction of the time. `rgba` has room for
+// eight.
+void key_texels(const LitPlate& plate,
+                const KeyDials& dials,
+                std::span<const KeyPlace> places,
+                std::span<std::array<float, 4>, key_lanes> rgba);
+
 }  // namespace compositing

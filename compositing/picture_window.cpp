@@ -1,6 +1,7 @@
 // Windows of live pictures.
 #include "compositing/picture_window.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -19,6 +20,17 @@ class PartOfPicture final : public render::LivePicture {
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override {
     return picture_->look_up(across(u), down(v), footprint_uv * side_);
+  }
+  void look_up_all(std::span<const render::PicturePlace> places,
+                   std::span<std::array<float, 4>> rgba) const override {
+    std::array<render::PicturePlace, 32> part;
+    for (std::size_t first = 0; first < places.size(); first += part.size()) {
+      const auto some = places.subspan(first, std::min(part.size(), places.size() - first));
+      std::ranges::transform(some, part.begin(), [&](const render::PicturePlace& p) {
+        return render::PicturePlace{across(p.u), down(p.v), p.footprint_uv * side_};
+      });
+      picture_->look_up_all(std::span(part).first(some.size()), rgba.subspan(first, some.size()));
+    }
   }
   float quick_alpha(float u, float v, float footprint_uv) const override {
     return picture_->quick_alpha(across(u), down(v), footprint_uv * side_);

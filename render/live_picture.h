@@ -2,8 +2,16 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <span>
 
 namespace render {
+
+// Where a picture is looked at, and how wide, as look_up() has it.
+struct PicturePlace {
+  float u, v;
+  float footprint_uv;
+};
 
 // One frame of it. Immutable while frames are rendered that see it; many threads look at once.
 class LivePicture {
@@ -13,6 +21,12 @@ class LivePicture {
   // from the picture's top left: the mean of a square that is footprint_uv squared of the picture's
   // area. Beyond the picture there is nothing; nor is there where numbers are not finite.
   virtual std::array<float, 4> look_up(float u, float v, float footprint_uv) const = 0;
+  // look_up() at many places, of which `rgba` is as long: for pictures that take long over one.
+  virtual void look_up_all(std::span<const PicturePlace> places,
+                           std::span<std::array<float, 4>> rgba) const {
+    for (std::size_t i = 0; i < places.size(); ++i)
+      rgba[i] = look_up(places[i].u, places[i].v, places[i].footprint_uv);
+  }
   // The alpha of look_up(), or of one about as wide where that is quicker to find.
   virtual float quick_alpha(float u, float v, float footprint_uv) const {
     return look_up(u, v, footprint_uv)[3];
