@@ -50,8 +50,7 @@ TEST_F(ShowModels, GoesOnWhenAModelCrashesItsReader) {
 #else
   const char* const reason = "damaged";
 #endif
-  EXPECT_THAT(show.status()->notes,
-              Contains(AllOf(HasSubstr("crashing.x3d"), HasSubstr(reason))));
+  EXPECT_THAT(show.status()->notes, Contains(AllOf(HasSubstr("crashing.x3d"), HasSubstr(reason))));
   EXPECT_THAT(show.status()->notes, Contains(AllOf(HasSubstr("lost.png"), HasSubstr("magenta"))));
 }
 
