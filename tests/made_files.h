@@ -13,6 +13,13 @@
 
 namespace made {
 
+// What is said of a file that crashes the helper which reads it. A sanitizer ends it in its way.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr const char* crashed_helper = "ended with status";
+#else
+inline constexpr const char* crashed_helper = "damaged";
+#endif
+
 inline std::filesystem::path bad_files() { return PLATELIGHT_SOURCE_DIR "/tests/data/bad"; }
 
 inline std::filesystem::path real_data() {
