@@ -16,21 +16,20 @@ struct KeyDials {
   float scale = 1.02F;              // 1 / (alpha at which the person is whole - black)
   float edge = 0;                   // -1 thinner .. 1 fuller
   float despill = 1;                // share of the spill that is taken away
-  float skin = 0;  // its first channel over its second, over the plate's; 0 = not told apart
+  bool tells_skin = false;          // of a yellow screen
 };
 
-// Of two primaries, skin has much of the second one and less of the first, so that it has a third
-// or more of the colour of a yellow wall, and would be as clear as that. How much of the screen a
-// texel can be by these two channels, which is nothing of skin, dark or light, and 1 of the screen;
-// near that more, for the difference of two alike is noisy, and what is bare is told better by all
-// three.
+// Skin is much more red than green, but has a third or more of the colour of a yellow wall, and
+// would be as clear as that. How much of such a wall a texel can be by red and green, which is
+// nothing of skin, dark or light, and 1 of the wall; near that more, for the difference of two
+// alike is noisy, and what is bare is told better by all three.
 template <class V>
 [[gnu::always_inline]] inline V share_without_skin(const std::array<V, 3>& c,
-                                                   const std::array<V, 3>& p,
-                                                   float skin) {
+                                                   const std::array<V, 3>& p) {
+  constexpr float green_of_skin = 0.6F;  // over its red, both over the plate's: of the palest
   constexpr float most_share = 4, more_near_screen = 0.4F;
-  const V scale = most(p[0] * p[1] * (1 - skin), lanes_like(p[0], 1e-12F));
-  V share = less_times(c[0] * p[1], c[1] * skin, p[0]) / scale;
+  const V scale = most(p[0] * p[1] * (1 - green_of_skin), lanes_like(p[0], 1e-12F));
+  V share = less_times(c[0] * p[1], c[1] * green_of_skin, p[0]) / scale;
   share = share + more_near_screen * most(share - 0.5F, lanes_like(share, 0));
   return least(most(share, lanes_like(share, -most_share)), lanes_like(share, most_share));
 }
@@ -67,7 +66,7 @@ template <bool two_primaries, class V>
   TexelShare<V> texel{};
   texel.share = screen_excess<two_primaries>(c[0], c[1], c[2]) * over_excess;
   if constexpr (two_primaries) {
-    if (dials.skin > 0) texel.share = least(texel.share, share_without_skin(c, p, dials.skin));
+    if (dials.tells_skin) texel.share = least(texel.share, share_without_skin(c, p));
   }
   if (dials.table == nullptr) return texel;
   // Of two primaries, the greater rest stands for the second channel.

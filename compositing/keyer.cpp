@@ -33,7 +33,7 @@ struct ScreenFormula {
     return compositing::matte_between(s, over_excess, near, dials);
   }
   KeyedTexel<F8> foreground(const Three& c, const Three& p, const TexelMatte<F8>& matte) const {
-    return foreground_of<two_primaries>(c, p, matte, dials.despill, dials.skin > 0);
+    return foreground_of<two_primaries>(c, p, matte, dials.despill, dials.tells_skin);
   }
 };
 
@@ -73,9 +73,6 @@ void check(const KeySettings& s) {
   within(s.smoothing, 0, 4, "smoothing");
 }
 
-// Of skin of any tone, against a screen as red as it is green.
-constexpr float skin_before_yellow = 0.6F;
-
 // The camera is looked for in every so many frames; so far it may be off, in pixels.
 constexpr int frames_between_looks = 3;
 constexpr float shift_still_px = 1;
@@ -114,7 +111,7 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
             1 / (settings.core - settings.screen),
             settings.edge,
             settings.despill,
-            lit.colour == ScreenColour::yellow ? skin_before_yellow : 0};
+            lit.colour == ScreenColour::yellow};
 }
 
 Keyer::Target Keyer::target(KeyedFrame& keyed) const {
@@ -240,32 +237,42 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   return report;
 }
 
+namespace {
+
+// What a texel shows of itself and of its cell of the plate, in the keyer's order.
+template <class V>
+KeyedTexel<V> key_before(const LitPlate& plate,
+                         const KeyDials& dials,
+                         const std::array<V, 3>& c,
+                         const std::array<V, 3>& p,
+                         V last,
+                         V near) {
+  if (plate.use == PlateUse::difference)
+    return foreground_of<true>(c, p, difference_matte(c, p, last, dials), 0.0F);
+  if (has_two_primaries(plate.colour)) {
+    return foreground_of<true>(c, p, matte_of<true>(c, p, last, near, dials), dials.despill,
+                               dials.tells_skin);
+  }
+  return foreground_of<false>(c, p, matte_of<false>(c, p, last, near, dials), dials.despill);
+}
+
+}  // namespace
+
 std::array<float, 4> key_texel(
     const LitPlate& plate, const KeyDials& dials, int y, int x, const std::array<float, 3>& light) {
   const float* cell = plate.cell(y / plate.step, x / plate.step);
   const auto order = channels_of(plate.colour);
-  const auto at = [](int channel) { return static_cast<std::size_t>(channel); };
+  const auto at = [&](std::size_t i) { return static_cast<std::size_t>(order[i]); };
   std::array<float, 3> c{};
   for (std::size_t i = 0; i < 3; ++i) {
-    const float value = light[at(order[i])];
+    const float value = light[at(i)];
     c[i] = value > 0 && value < 1e9F ? value : 0;
   }
-  const std::array<float, 3> p{cell[0], cell[1], cell[2]};
-  KeyedTexel<float> keyed{};
-  if (plate.use == PlateUse::difference) {
-    keyed = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials), 0);
-  } else if (has_two_primaries(plate.colour)) {
-    const float near = plate.near.at(y, x);
-    keyed = foreground_of<true>(c, p, matte_of<true>(c, p, cell[3], near, dials), dials.despill,
-                                dials.skin > 0);
-  } else {
-    const float near = plate.near.at(y, x);
-    keyed = foreground_of<false>(c, p, matte_of<false>(c, p, cell[3], near, dials), dials.despill);
-  }
+  const float near = plate.use == PlateUse::screen ? plate.near.at(y, x) : 0;
+  const KeyedTexel<float> keyed =
+      key_before<float>(plate, dials, c, {cell[0], cell[1], cell[2]}, cell[3], near);
   std::array<float, 4> rgba{0, 0, 0, keyed.alpha};
-  rgba[at(order[0])] = keyed.first;
-  rgba[at(order[1])] = keyed.second;
-  rgba[at(order[2])] = keyed.third;
+  rgba[at(0)] = keyed.first, rgba[at(1)] = keyed.second, rgba[at(2)] = keyed.third;
   return rgba;
 }
 
@@ -277,14 +284,13 @@ void key_texels(const LitPlate& plate,
   const auto at = [&](std::size_t i) { return static_cast<std::size_t>(order[i]); };
   std::array<std::array<float, key_lanes>, 3> light{};
   std::array<std::array<float, key_lanes>, 4> cells{};
-  std::array<float, key_lanes> nearness{};
-  const bool screen = plate.use == PlateUse::screen;
+  std::array<float, key_lanes> near{};
   for (std::size_t k = 0; k < places.size(); ++k) {
     const auto& [y, x, seen] = places[k];
     const float* cell = plate.cell(y / plate.step, x / plate.step);
     for (std::size_t i = 0; i < 4; ++i) cells[i][k] = cell[i];
     for (std::size_t i = 0; i < 3; ++i) light[i][k] = seen[at(i)];
-    if (screen) nearness[k] = plate.near.at(y, x);
+    if (plate.use == PlateUse::screen) near[k] = plate.near.at(y, x);
   }
   Three c, p;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -292,20 +298,8 @@ void key_texels(const LitPlate& plate,
     c[i] = (value > 0.0F) & (value < 1e9F) ? value : F8{};
     p[i] = load_lanes(cells[i].data());
   }
-  const F8 last = load_lanes(cells[3].data()), near = load_lanes(nearness.data());
-  const auto key = [&](const auto& formula) {
-    TexelMatte<F8> matte;
-    const TexelShare<F8> share = formula.share(c, p, last);
-    if constexpr (std::decay_t<decltype(formula)>::knows_near) {
-      matte = formula.matte_between(last, near, share);
-    } else {
-      matte = formula.matte(c, p, last, share);
-    }
-    return formula.foreground(c, p, matte);
-  };
-  const KeyedTexel<F8> keyed = !screen                           ? key(DifferenceFormula{dials})
-                               : has_two_primaries(plate.colour) ? key(ScreenFormula<true>{dials})
-                                                                 : key(ScreenFormula<false>{dials});
+  const KeyedTexel<F8> keyed =
+      key_before<F8>(plate, dials, c, p, load_lanes(cells[3].data()), load_lanes(near.data()));
   for (std::size_t k = 0; k < places.size(); ++k) {
     rgba[k][at(0)] = keyed.first[k], rgba[k][at(1)] = keyed.second[k];
     rgba[k][at(2)] = keyed.third[k], rgba[k][3] = keyed.alpha[k];

@@ -151,7 +151,7 @@ TEST(KeyPass, IsTheFormulaOfEachPixelByItself) {
             one = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials), 0);
           } else if (has_two_primaries(plate.colour)) {
             const auto matte = matte_of<true>(c, p, cell[3], near, dials);
-            one = foreground_of<true>(c, p, matte, dials.despill, dials.skin > 0);
+            one = foreground_of<true>(c, p, matte, dials.despill, dials.tells_skin);
           } else {
             const auto matte = matte_of<false>(c, p, cell[3], near, dials);
             one = foreground_of<false>(c, p, matte, dials.despill);
