@@ -116,9 +116,10 @@ class PointFinder {
     const SceneDescription& description = scene_.description();
     const Material& material = description.materials[point.hit.material];
     if (point.hit.instance != place.instance || material.shader != "standard") return std::nullopt;
+    const Vec3f along = unit_across(point.hit.geometric_normal) * std::sqrt(area_m2);
     const StandardSurface surface = standard_surface(
         standard_parameters(material, description.textures.size(), description.videos.size()),
-        description, point.hit, std::sqrt(area_m2));
+        description, point.hit, {along, cross(point.hit.geometric_normal, along)});
     const Vec3f aside = normalize(
         cross(std::abs(surface.normal.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}, surface.normal));
     const Vec3f view =

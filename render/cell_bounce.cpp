@@ -11,6 +11,9 @@ namespace {
 
 bool sees_stand_ins(RayKind kind) { return kind == RayKind::camera || kind == RayKind::bent; }
 
+// Of parts of a lobe, over their width.
+constexpr float overlap = 1.05F;
+
 // The full angle of a disc that holds half of its light as near its middle as a lobe does: half of
 // a lobe lies within 2 alpha of the mirrored direction.
 float lobe_width(float roughness) { return 2 * 2 / 0.7F * roughness * roughness; }
@@ -102,7 +105,7 @@ void CellBaker::bounce() {
       if (hit) arrive(p, q.steps, q.spread, stream_.far_m[i]);
       p.blur_m = hit ? stream_.far_m[i] * lobe_width(q.roughness) : 0;
       // It stands for a part of a lobe whose parts overlap.
-      if (q.one_of_many) p.blur_m = p.footprint_m;
+      if (q.one_of_many) p.blur_m = overlap * std::sqrt(length(cross(p.steps.a, p.steps.b)));
       p.throughput = q.throughput;
       if (hit && q.media.count > 0) {
         p.throughput =

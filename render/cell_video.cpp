@@ -10,7 +10,7 @@ void CellBaker::add_video(const ShadePoint& p) {
   samples_[p.slot].added += weight * planned_grey;
   std::array<VideoSample, most_video_samples> places;
   const std::size_t count = find_video_samples(video.width(), video.height(), p.video.u, p.video.v,
-                                               p.video.footprint_uv, p.video.blur_uv, places);
+                                               p.video.footprint, p.video.blur_uv, places);
   for (std::size_t i = 0; i < count; ++i) {
     const auto& [level, x, y, share] = places[i];
     transport_->video.push_back(

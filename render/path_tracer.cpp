@@ -200,7 +200,7 @@ PathTracer::PathTracer(const Scene& scene,
 
 StandardSurface PathTracer::surface_at(const HitPoint& hit) const {
   const StandardParameters& parameters = materials_[hit.material].parameters;
-  StandardSurface surface = standard_surface(parameters, scene_.description(), hit, 0);
+  StandardSurface surface = standard_surface(parameters, scene_.description(), hit);
   if (parameters.emission_video >= 0) {
     const auto video = static_cast<std::size_t>(parameters.emission_video);
     surface.emission = times(surface.emission, sample(*videos_[video], hit.u, hit.v, 0));

@@ -92,7 +92,7 @@ Facet facet_of(const Mesh& mesh,
                std::uint32_t triangle,
                const std::array<float, 12>* set_from_mesh) {
   const auto& [a, b, c] = mesh.triangles[triangle];
-  Facet facet{{positions[a], positions[b], positions[c]}, {}, 0, 0};
+  Facet facet{{positions[a], positions[b], positions[c]}, {}, 0, 0, {}, {}};
   for (Vec3f& corner : facet.corners) {
     if (set_from_mesh) corner = transform_point(*set_from_mesh, corner);
     facet.largest_coordinate = std::max(
@@ -105,9 +105,13 @@ Facet facet_of(const Mesh& mesh,
   facet.normal = area * (1 / double_area);
   if (mesh.uvs.empty()) return facet;
   const auto &t0 = mesh.uvs[a], &t1 = mesh.uvs[b], &t2 = mesh.uvs[c];
-  const float uv_area =
-      std::abs((t1[0] - t0[0]) * (t2[1] - t0[1]) - (t2[0] - t0[0]) * (t1[1] - t0[1]));
-  facet.uv_per_metre = std::sqrt(uv_area / double_area);
+  const float u1 = t1[0] - t0[0], v1 = t1[1] - t0[1], u2 = t2[0] - t0[0], v2 = t2[1] - t0[1];
+  facet.uv_per_metre = std::sqrt(std::abs(u1 * v2 - u2 * v1) / double_area);
+  // How the second and the third corner's shares of a point grow along the triangle.
+  const Vec3f second = cross(p2 - p0, facet.normal) * (1 / double_area);
+  const Vec3f third = cross(facet.normal, p1 - p0) * (1 / double_area);
+  facet.u_slope = second * u1 + third * u2;
+  facet.v_slope = second * v1 + third * v2;
   return facet;
 }
 
@@ -165,11 +169,14 @@ Facet facet_of(const Mesh& mesh,
   }
   hit.normal = normal;
   hit.u = hit.v = hit.uv_per_metre = 0;
+  hit.u_slope = hit.v_slope = {};
   if (!mesh.uvs.empty()) {
     const auto &t0 = mesh.uvs[a], &t1 = mesh.uvs[b], &t2 = mesh.uvs[c];
     hit.u = t0[0] * w + t1[0] * u + t2[0] * v;
     hit.v = t0[1] * w + t1[1] * u + t2[1] * v;
     hit.uv_per_metre = facet.uv_per_metre;
+    hit.u_slope = facet.u_slope;
+    hit.v_slope = facet.v_slope;
   }
   hit.tangent = {};
   hit.handedness = 1;

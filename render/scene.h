@@ -77,11 +77,17 @@ struct HitPoint {
   Vec3f edge;
   float turn_along = 0, turn_across = 0, turn_both = 0;
   bool back = false;  // the side that the triangle's corners run clockwise on: from inside a body
-  float uv_per_metre = 0;        // texture coordinate units per metre of surface, for mip levels
+  float uv_per_metre = 0;        // texture coordinate units per metre of surface, in the mean
+  Vec3f u_slope, v_slope;        // of texture coordinates on the triangle, per metre along it
   float largest_coordinate = 0;  // of the triangle's corners: its rounding is the hit's
   std::uint32_t material = 0;
   std::uint32_t instance = 0;
 };
+
+// By how much texture coordinates change over a small step on the surface, in metres.
+inline std::array<float, 2> uv_of_step(const HitPoint& hit, Vec3f step) {
+  return {dot(hit.u_slope, step), dot(hit.v_slope, step)};
+}
 
 // By how much the interpolated normal turns over a small step from the hit, in metres.
 inline Vec3f turn_of_normal(const HitPoint& hit, Vec3f step) {

@@ -181,6 +181,7 @@ struct Facet {
   Vec3f normal;  // unit; 0 where it has no area
   float largest_coordinate = 0;
   float uv_per_metre = 0;
+  Vec3f u_slope, v_slope;
 };
 // `set_from_mesh` is where its positions still stand in the mesh's frame.
 Facet facet_of(const Mesh& mesh,

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/area_footprint.h"
 #include "render/environment.h"
 #include "render/glass.h"
 #include "render/live_picture.h"
@@ -31,7 +32,8 @@ enum class RayKind : std::uint8_t {
 struct SeenVideo {
   std::int32_t index = -1;  // of SceneDescription::videos, or none
   float u = 0, v = 0;
-  float footprint_uv = 0, blur_uv = 0;  // see find_video_samples
+  UvFootprint footprint;  // see find_video_samples
+  float blur_uv = 0;
   Vec3f gain;
 };
 

@@ -60,15 +60,15 @@ float spread_of_normals(float l) {
 MappedNormal mapped_normal(const StandardParameters& parameters,
                            const SceneDescription& scene,
                            const HitPoint& hit,
-                           float footprint_uv) {
+                           const UvFootprint& footprint) {
   const Texture* map = texture_at(scene, parameters.normal_texture);
   if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return {hit.normal};
-  const auto in_tangents = [&](float width_uv) {
-    const auto texel = sample(*map, hit.u, hit.v, width_uv);
+  const auto in_tangents = [&](const UvFootprint& over) {
+    const auto texel = sample(*map, hit.u, hit.v, over);
     return Vec3f{(2 * texel[0] - 1) * parameters.normal_scale,
                  (2 * texel[1] - 1) * parameters.normal_scale, 2 * texel[2] - 1};
   };
-  const Vec3f mean = in_tangents(footprint_uv);
+  const Vec3f mean = in_tangents(footprint);
   const float l = length(mean);
   const Vec3f tangent = normalize(hit.tangent - hit.normal * dot(hit.normal, hit.tangent));
   const Vec3f bitangent = cross(hit.normal, tangent) * hit.handedness;
@@ -76,7 +76,8 @@ MappedNormal mapped_normal(const StandardParameters& parameters,
   if (!(l > 1e-6F) || !(dot(normal, hit.normal) > 0)) return {hit.normal};
   MappedNormal mapped{normal / l};
   // Beside the map's own texels, whose eight bits are no unit vectors either.
-  if (footprint_uv > 0) mapped.rougher = spread_of_normals(l / length(in_tangents(0)));
+  const bool is_point = footprint.a == UvFootprint{}.a && footprint.b == UvFootprint{}.b;
+  if (!is_point) mapped.rougher = spread_of_normals(l / length(in_tangents({})));
   return mapped;
 }
 
@@ -125,12 +126,12 @@ Material make_standard_material(std::string name, const StandardParameters& para
 StandardSurface standard_surface(const StandardParameters& parameters,
                                  const SceneDescription& scene,
                                  const HitPoint& hit,
-                                 float footprint_m) {
-  const float footprint_uv = footprint_m * hit.uv_per_metre;
+                                 const Spread& footprint) {
+  const UvFootprint area{uv_of_step(hit, footprint.a), uv_of_step(hit, footprint.b)};
   const auto look_up = [&](std::int32_t index) -> std::array<float, 4> {
     const Texture* texture = texture_at(scene, index);
     return texture == nullptr ? std::array<float, 4>{1, 1, 1, 1}
-                              : sample(*texture, hit.u, hit.v, footprint_uv);
+                              : sample(*texture, hit.u, hit.v, area);
   };
   StandardSurface surface;
   const auto base = look_up(parameters.base_color_texture);
@@ -157,7 +158,7 @@ StandardSurface standard_surface(const StandardParameters& parameters,
     surface.emission = {surface.emission.x * emission[0], surface.emission.y * emission[1],
                         surface.emission.z * emission[2]};
   }
-  const MappedNormal mapped = mapped_normal(parameters, scene, hit, footprint_uv);
+  const MappedNormal mapped = mapped_normal(parameters, scene, hit, area);
   surface.normal = mapped.normal;
   if (mapped.rougher > 0) {
     const float alpha = surface.roughness * surface.roughness;
@@ -169,12 +170,10 @@ StandardSurface standard_surface(const StandardParameters& parameters,
 
 float standard_alpha(const StandardParameters& parameters,
                      const SceneDescription& scene,
-                     const HitPoint& hit,
-                     float footprint_m) {
+                     const HitPoint& hit) {
   const Texture* texture = texture_at(scene, parameters.base_color_texture);
   if (texture == nullptr) return parameters.base_color_alpha;
-  return parameters.base_color_alpha *
-         sample(*texture, hit.u, hit.v, footprint_m * hit.uv_per_metre)[3];
+  return parameters.base_color_alpha * sample(*texture, hit.u, hit.v, {})[3];
 }
 
 Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random) {

@@ -72,17 +72,17 @@ struct StandardSurface {
 struct HitPoint;          // scene.h
 struct SceneDescription;  // scene.h
 
-// The surface at `hit`, textures filtered over `footprint_m` metres of it. The parameters' texture
-// indices must be those of `scene` (see standard_parameters). Safe from any thread; does not throw.
+// The surface at `hit`, textures filtered over the parallelogram on it that has `footprint` as its
+// sides, in metres. The parameters' texture indices must be those of `scene` (see
+// standard_parameters). Safe from any thread; does not throw.
 StandardSurface standard_surface(const StandardParameters& parameters,
                                  const SceneDescription& scene,
                                  const HitPoint& hit,
-                                 float footprint_m);
-// Its alpha alone, for rays that only ask whether there is a hole.
+                                 const Spread& footprint = {});
+// Its alpha alone, at one point, for rays that only ask whether there is a hole.
 float standard_alpha(const StandardParameters& parameters,
                      const SceneDescription& scene,
-                     const HitPoint& hit,
-                     float footprint_m);
+                     const HitPoint& hit);
 
 // Lobes smoother than this are mirrors: followed along the mirrored direction alone. At alpha =
 // roughness^2 = 4e-4 a lobe is narrower than any light that a table or a map resolves.

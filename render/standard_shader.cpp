@@ -28,16 +28,17 @@ class StandardShader final : public Shader {
              RaySink& rays) const override {
     for (ShadePoint* p : points) {
       const StandardParameters block = block_of(context.scene->materials[p->hit.material]);
-      const StandardSurface surface =
-          standard_surface(block, *context.scene, p->hit, p->footprint_m);
+      const StandardSurface surface = standard_surface(block, *context.scene, p->hit, p->steps);
       const Vec3f view = -p->incoming;
       const StandardWeights weights = standard_weights(surface, view);
       constexpr float per_pi = 0.318309886F;
       if (block.emission_video >= 0) {
-        const float uv_per_metre = p->hit.uv_per_metre;
-        p->video = {
-            block.emission_video,     p->hit.u,        p->hit.v, p->footprint_m * uv_per_metre,
-            p->blur_m * uv_per_metre, surface.emission};
+        p->video = {block.emission_video,
+                    p->hit.u,
+                    p->hit.v,
+                    {uv_of_step(p->hit, p->steps.a), uv_of_step(p->hit, p->steps.b)},
+                    p->blur_m * p->hit.uv_per_metre,
+                    surface.emission};
       } else {
         p->radiance = surface.emission;
       }
@@ -73,11 +74,11 @@ class StandardShader final : public Shader {
                       float) const override {
     const StandardParameters parameters = block_of(material);
     if (parameters.alpha_cutoff > 0 &&
-        standard_alpha(parameters, *context.scene, hit, 0) < parameters.alpha_cutoff) {
+        standard_alpha(parameters, *context.scene, hit) < parameters.alpha_cutoff) {
       return {1, 1, 1};
     }
     if (kind != RayKind::shadow || !(parameters.transmission > 0)) return {};
-    const StandardSurface surface = standard_surface(parameters, *context.scene, hit, 0);
+    const StandardSurface surface = standard_surface(parameters, *context.scene, hit);
     return standard_weights(surface, -incoming).transmission;
   }
 

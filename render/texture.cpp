@@ -144,41 +144,47 @@ std::array<float, channels> sample_level(
   return result;
 }
 
+float wrapped(float coordinate) {
+  return std::abs(coordinate) <= 1e6F ? coordinate - std::floor(coordinate) : 0;
+}
+
 template <int channels>
 std::array<float, channels> sample_levels(const Texture& texture,
                                           float u,
                                           float v,
-                                          float footprint_uv) {
+                                          const UvFootprint& footprint) {
   const LightTables& tables = light_tables();
   const float* alpha = tables.unit_of_code.data();
   const float* colour = texture.srgb ? tables.light_of_code.data() : alpha;
   Level level{texture.texels.data(), texture.width, texture.height};
   const int longer = std::max(texture.width, texture.height);
-  const float footprint_texels = footprint_uv * static_cast<float>(longer) * trilinear_texel;
-  if (!(footprint_texels > 1)) return sample_level<channels>(level, u, v, colour, alpha);
-
-  // log2 by exponent and mantissa, linear between powers of two: within .09 of a level.
   const int last = std::bit_width(static_cast<unsigned>(longer)) - 1;
-  const auto bits = std::bit_cast<std::uint32_t>(std::min(footprint_texels, 1e6F));
-  const int exponent = static_cast<int>(bits >> 23) - 127;
-  const float fraction = static_cast<float>(bits & 0x7FFFFFU) / static_cast<float>(0x800000U);
-  const int fine = std::min(exponent, last);
+  const FootprintGrid grid =
+      footprint_grid(footprint, texture.width, texture.height, last, most_along_texture);
   const auto coarser = [](const Level& from) {
     return Level{from.texels + static_cast<std::size_t>(from.width) *
                                    static_cast<std::size_t>(from.height) * channels,
                  std::max(1, from.width / 2), std::max(1, from.height / 2)};
   };
-  for (int k = 0; k < fine; ++k) level = coarser(level);
-  std::array<float, channels> result = sample_level<channels>(level, u, v, colour, alpha);
-  if (fine == last || fraction == 0) return result;
-  const std::array<float, channels> next =
-      sample_level<channels>(coarser(level), u, v, colour, alpha);
-  for (std::size_t c = 0; c < channels; ++c) result[c] += fraction * (next[c] - result[c]);
-  return result;
-}
-
-float wrapped(float coordinate) {
-  return std::abs(coordinate) <= 1e6F ? coordinate - std::floor(coordinate) : 0;
+  for (int k = 0; k < grid.fine; ++k) level = coarser(level);
+  const int count = grid.count();
+  if (count == 1 && grid.fraction == 0) {
+    return sample_level<channels>(level, wrapped(u), wrapped(v), colour, alpha);
+  }
+  const Level next = coarser(level);
+  const float share = 1 / static_cast<float>(count);
+  std::array<float, channels> sum{};
+  const auto add = [&](const Level& from, float at_u, float at_v, float weight) {
+    const auto one = sample_level<channels>(from, at_u, at_v, colour, alpha);
+    for (std::size_t c = 0; c < channels; ++c) sum[c] += weight * one[c];
+  };
+  for (int i = 0; i < count; ++i) {
+    const auto [du, dv] = grid.offset(i);
+    const float at_u = wrapped(u + du), at_v = wrapped(v + dv);
+    add(level, at_u, at_v, share * (1 - grid.fraction));
+    if (grid.fraction > 0) add(next, at_u, at_v, share * grid.fraction);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -225,24 +231,25 @@ Texture make_texture(
   return texture;
 }
 
-std::array<float, 4> sample(const Texture& texture, float u, float v, float footprint_uv) {
-  u = wrapped(u);
-  v = wrapped(v);
+std::array<float, 4> sample(const Texture& texture,
+                            float u,
+                            float v,
+                            const UvFootprint& footprint) {
   switch (texture.channels) {
     case 1: {
-      const auto [grey] = sample_levels<1>(texture, u, v, footprint_uv);
+      const auto [grey] = sample_levels<1>(texture, u, v, footprint);
       return {grey, grey, grey, 1};
     }
     case 2: {
-      const auto [grey, alpha] = sample_levels<2>(texture, u, v, footprint_uv);
+      const auto [grey, alpha] = sample_levels<2>(texture, u, v, footprint);
       return {grey, grey, grey, alpha};
     }
     case 3: {
-      const auto [red, green, blue] = sample_levels<3>(texture, u, v, footprint_uv);
+      const auto [red, green, blue] = sample_levels<3>(texture, u, v, footprint);
       return {red, green, blue, 1};
     }
     default:
-      return sample_levels<4>(texture, u, v, footprint_uv);
+      return sample_levels<4>(texture, u, v, footprint);
   }
 }
 

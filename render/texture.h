@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "render/area_footprint.h"
 #include "render/mesh.h"
 
 namespace render {
@@ -25,13 +26,10 @@ Texture make_texture(
 
 // Red, green, blue, alpha at (u, v), 0..1, colour in linear light; u to the right, v down from the
 // texture's top edge, repeated in both directions. One channel is grey, two are grey and alpha;
-// alpha is 1 where there is none. `footprint_uv` is the width, in units of u and v (of the longer
-// side), of the square whose mean is wanted: trilinear between the two mip levels whose texels are
-// nearest to trilinear_texel of it, bilinear at level 0 when that is below a texel. Coordinates
-// that are not finite, or beyond a million, count as 0.
-// Interpolated texels are a wider filter than boxes: nearest to the mean of a square, of edges and
-// of noise alike, is the level whose texels are so wide.
-inline constexpr float trilinear_texel = 0.7F;
-std::array<float, 4> sample(const Texture& texture, float u, float v, float footprint_uv);
+// alpha is 1 where there is none. What is wanted is the mean of the footprint, by the look-ups of
+// footprint_grid(), of which it takes up to so many along the longer side. Coordinates that are not
+// finite, or beyond a million, count as 0.
+inline constexpr int most_along_texture = 12;
+std::array<float, 4> sample(const Texture& texture, float u, float v, const UvFootprint& footprint);
 
 }  // namespace render

@@ -14,7 +14,6 @@
 #include "render/area_cover.h"
 #include "render/cell_transport.h"
 #include "render/environment.h"
-#include "render/texture.h"
 
 namespace render {
 namespace {
@@ -208,11 +207,16 @@ VideoTexture make_video_texture(const PackedFrame& frame) {
   return texture;
 }
 
+UvFootprint undistorted_square(int width, int height, float width_uv) {
+  const float root = std::sqrt(static_cast<float>(height) / static_cast<float>(width));
+  return {{width_uv * root, 0}, {0, width_uv / root}};
+}
+
 std::size_t find_video_samples(int width,
                                int height,
                                float u,
                                float v,
-                               float footprint_uv,
+                               const UvFootprint& footprint,
                                float blur_uv,
                                std::array<VideoSample, most_video_samples>& samples) {
   const auto unit = [](float value) {
@@ -225,45 +229,32 @@ std::size_t find_video_samples(int width,
     samples[count++] = {static_cast<std::uint32_t>(level), unit(at_u) * w - 0.5F,
                         unit(at_v) * h - 0.5F, share};
   };
-  const float texels = std::sqrt(static_cast<float>(width) * static_cast<float>(height));
-  const float footprint_texels = std::min(footprint_uv * texels, 1e6F);
-  const float blur_texels = std::min(blur_uv * texels, 1e6F);
-  const bool blurred = blur_texels >= footprint_texels;
-  const float widest = blurred ? blur_texels : footprint_texels;
-  if (!(widest > 1)) {
-    add(0, u, v, 1);
-    return count;
-  }
   int last = 0;
   while (std::max(width, height) >> last > 1) ++last;
-  const float texel = blurred ? blur_texels : trilinear_texel * 0.5F * footprint_texels;
-  const float level = std::max(0.0F, std::log2(texel));
-  const int fine = std::min(static_cast<int>(level), last);
-  const float fraction = fine < last ? level - static_cast<float>(fine) : 0;
-  const auto add_trilinear = [&](float at_u, float at_v, float share) {
-    add(fine, at_u, at_v, share * (1 - fraction));
-    if (fraction > 0) add(fine + 1, at_u, at_v, share * fraction);
-  };
+  const auto& [a, b] = footprint;
+  const float texels = std::sqrt(static_cast<float>(width) * static_cast<float>(height));
+  const float blur_texels = std::min(blur_uv * texels, 1e6F);
+  const bool blurred = blur_texels > 1 && blur_uv >= std::sqrt(std::abs(a[0] * b[1] - a[1] * b[0]));
+  FootprintGrid grid;
   if (blurred) {
-    add_trilinear(u, v, 1);
-    return count;
+    grid.set_level(blur_texels, last);
+  } else {
+    grid = footprint_grid(footprint, width, height, last, most_along_video);
   }
-  // Four places of one, at first.
-  const float apart_texels = 0.25F * footprint_texels * std::min(footprint_texels - 1, 1.0F);
-  const float apart_u = apart_texels / static_cast<float>(width);
-  const float apart_v = apart_texels / static_cast<float>(height);
-  for (const float du : {-apart_u, apart_u}) {
-    for (const float dv : {-apart_v, apart_v}) {
-      add_trilinear(u + du, v + dv, 0.25F);
-    }
+  const float share = 1 / static_cast<float>(grid.count());
+  for (int i = 0; i < grid.count(); ++i) {
+    const auto [du, dv] = grid.offset(i);
+    add(grid.fine, u + du, v + dv, share * (1 - grid.fraction));
+    if (grid.fraction > 0) add(grid.fine + 1, u + du, v + dv, share * grid.fraction);
   }
   return count;
 }
 
 Vec3f sample(const VideoTexture& texture, float u, float v, float footprint_uv) {
   std::array<VideoSample, most_video_samples> samples;
-  const std::size_t count =
-      find_video_samples(texture.width(), texture.height(), u, v, footprint_uv, 0, samples);
+  const std::size_t count = find_video_samples(
+      texture.width(), texture.height(), u, v,
+      undistorted_square(texture.width(), texture.height(), footprint_uv), 0, samples);
   Vec3f sum;
   for (std::size_t i = 0; i < count; ++i) {
     const auto& [level, x, y, share] = samples[i];

@@ -10,6 +10,7 @@
 #include "calibrate/vec.h"
 #include "capture/colour.h"
 #include "capture/image.h"
+#include "render/area_footprint.h"
 
 namespace render {
 
@@ -69,21 +70,24 @@ struct VideoSample {
   std::uint32_t level;
   float x, y, share;
 };
-inline constexpr std::size_t most_video_samples = 8;
+inline constexpr int most_along_video = 4;
+inline constexpr std::size_t most_video_samples = 2 * most_across * most_along_video;
 
 // The places of a look-up at (u, v), 0..1 from the picture's top left, into a video of this size;
-// its outermost texels go on beyond. `footprint_uv` is the width, in units of u and v on a surface
-// that shows the picture undistorted, of the square whose mean is wanted: four trilinear places
-// as in texture.h, each for a quarter of it; bilinear where it is below a texel. `blur_uv`: how
-// wide the texels of a level are that does for a rough lobe, if that is as wide. Returns how many.
+// its outermost texels go on beyond: those of footprint_grid(), up to most_along_video along its
+// longer side. `blur_uv`: how wide the texels of a level are that does for a rough lobe, if they
+// are as wide as the footprint, on a surface that shows the picture undistorted. Returns how many.
 // What is not finite counts as 0.
 std::size_t find_video_samples(int width,
                                int height,
                                float u,
                                float v,
-                               float footprint_uv,
+                               const UvFootprint& footprint,
                                float blur_uv,
                                std::array<VideoSample, most_video_samples>& samples);
+
+// A square so wide on a surface that shows a picture of this size undistorted.
+UvFootprint undistorted_square(int width, int height, float width_uv);
 
 // Light at (u, v), filtered so.
 Vec3f sample(const VideoTexture& texture, float u, float v, float footprint_uv);

@@ -35,7 +35,7 @@ std::vector<render::LocalLight> light_by(const std::string& object,
   for (int y = 0; y < frame.height; ++y) {
     for (int x = 0; x < frame.width; ++x) {
       const auto texel = sample(picture, (static_cast<float>(x) + 0.5F) / w,
-                                (static_cast<float>(y) + 0.5F) / h, 0);
+                                (static_cast<float>(y) + 0.5F) / h, {});
       std::copy_n(texel.begin(), 3, &frame.at(y, x));
     }
   }

@@ -35,8 +35,9 @@ float value_at(const capture::HalfImage& level, int y, int x, int c) {
 // The same light, as render's textures have it.
 std::array<float, 4> reference(const render::VideoTexture& texture, float u, float v, float wide) {
   std::array<render::VideoSample, render::most_video_samples> places;
-  const std::size_t count =
-      render::find_video_samples(texture.width(), texture.height(), u, v, wide, 0, places);
+  const std::size_t count = render::find_video_samples(
+      texture.width(), texture.height(), u, v,
+      render::undistorted_square(texture.width(), texture.height(), wide), 0, places);
   std::array<float, 4> sum{};
   for (const render::VideoSample& place : std::span(places).first(count)) {
     const capture::Image& level = texture.levels[place.level];

@@ -97,6 +97,52 @@ TEST(MirroredTexture, DoesNotAliasWhereverItIsSeen) {
   }
 }
 
+// A floor of tiles that reaches far away: pixels see strips of it, up to ten times as long as wide.
+TEST(Texture, OfAFloorSeenAtASlantIsAsInTheReference) {
+  register_shaders();
+  std::vector<std::uint8_t> texels;
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) texels.push_back(x < 6 || y < 6 ? 30 : 200);
+  }
+  render::SceneDescription scene;
+  scene.background = "environment";
+  scene.textures = {
+      std::make_shared<render::Texture>(render::make_texture(64, 64, 1, false, texels))};
+  render::StandardParameters tiles;
+  tiles.specular = 0;
+  std::fill_n(tiles.emission, 3, 1.0F);
+  std::fill_n(tiles.base_color, 3, 0.0F);
+  tiles.emission_texture = 0;
+  scene.materials = {make_standard_material("tiles", tiles)};
+  scene.meshes = {square({{{-20, 0, -1}, {20, 0, -1}, {20, 40, -1}, {-20, 40, -1}}}, 40, 0)};
+  scene.instances.emplace_back();
+  MadeShot shot;
+  shot.scene = std::make_unique<render::Scene>(std::move(scene));
+  const double f = width * 0.9;
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  shot.environment = made_sky(16, 0, 0);
+  shot.plate = capture::to_half(capture::make_image(height, width));
+  // Along the tiles, and across them; the horizon lies above the picture.
+  for (const double aside : {0.0, 4.0, -9.0}) {
+    shot.job.cam_from_set = calibrate::look_at({0.2, 0, 0.2}, {aside, 8, -3.5}, 0);
+    shot.job.effort.aa_samples = 1;
+    const capture::Image black = capture::make_image(height, width);
+    std::array<capture::Image, 2> truth;
+    for (std::uint32_t i = 0; i < 2; ++i) {
+      truth[i] = render_reference(shot.inputs(), shot.job, black, {.samples = 128, .seed = i + 1});
+    }
+    render::FrameResult result;
+    render_frame(shot.inputs(), shot.job, shot.plate, result);
+    capture::Image all = capture::make_image(height, width, 1);
+    std::ranges::fill(all.pixels, 1.0F);
+    const double error =
+        render::picture_error(capture::to_float(result.rgba), truth, all).relative_rms;
+    RecordProperty("error", std::to_string(error));
+    EXPECT_LT(error, 0.06) << aside;
+  }
+}
+
 // Metal flakes in a clear coat, as models of cars have them: a normal map of small tilted facets.
 // Far away each pixel holds many, which together are a rough metal.
 MadeShot flaky_paint(float tilt) {

@@ -49,6 +49,8 @@ TEST(Scene, GivesPositionNormalAndTextureCoordinatesOfAHit) {
   EXPECT_NEAR(point.u, 0.75F, 1e-6F);
   EXPECT_NEAR(point.v, 0.625F, 1e-6F);
   EXPECT_NEAR(point.uv_per_metre, 0.5F, 1e-6F);
+  EXPECT_NEAR(length(point.u_slope - Vec3f{0.5F, 0, 0}), 0, 1e-6F);
+  EXPECT_NEAR(length(point.v_slope - Vec3f{0, -0.5F, 0}), 0, 1e-6F);
 }
 
 TEST(TurnOfNormal, IsOneOverTheRadiusOnASphereWhicheverWay) {

@@ -166,8 +166,8 @@ TEST(SampleVideo, IsTheMeanOfASquare) {
 
 TEST(SampleVideo, HasNoJumpAsSquaresGrow) {
   const VideoTexture texture = make_video_texture(noise(64, 64));
-  float before = sample(texture, 0.43F, 0.58F, 0.9F / 64).x;
-  for (float footprint = 0.9F / 64; footprint < 1; footprint *= 1.01F) {
+  float before = sample(texture, 0.43F, 0.58F, 0.4F / 64).x;
+  for (float footprint = 0.4F / 64; footprint < 1; footprint *= 1.01F) {
     const float now = sample(texture, 0.43F, 0.58F, footprint).x;
     EXPECT_NEAR(now, before, 0.03F) << footprint;
     before = now;
