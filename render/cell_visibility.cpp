@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 #include "render/lanes.h"
 
@@ -100,20 +101,57 @@ float sum_of_members(const ShadowWindow& window, const Plane& of) {
   return sum;
 }
 
+// What pixels have between whole windows, `of` at their top left, along lines of a cell that are
+// `stride` apart in places that are `step` apart: half way between the two about them, and at the
+// border of the cell, beyond the last one, by how that differs from the next that shares no pixel
+// with it.
+template <std::size_t step, std::size_t stride>
+void put_between_windows(const Plane& of, Plane& between) {
+  constexpr std::size_t side = SoftLights::side, last = cell_size - side;
+  const auto line = [](std::size_t place) { return place * step; };
+  const auto each = [](auto&& put) {
+    for (std::size_t k = 0; k < cell_size * stride; k += stride) put(k);
+  };
+  for (std::size_t place = 2; place < last + 2; ++place) {
+    each([&](std::size_t k) {
+      between[k + line(place)] = 0.5F * (of[k + line(place - 2)] + of[k + line(place - 1)]);
+    });
+  }
+  const auto beyond = [&](std::size_t place, std::size_t window, std::size_t next, float by) {
+    each([&](std::size_t k) {
+      const float here = of[k + line(window)];
+      between[k + line(place)] = here + (here - of[k + line(next)]) * (by / side);
+    });
+  };
+  beyond(0, 0, side, 1.5F), beyond(1, 0, side, 0.5F);
+  beyond(last + 2, last, last - side, 0.5F), beyond(last + 3, last, last - side, 1.5F);
+}
+
 // In one colour.
 void share_lost(std::span<const ShadowWindow> windows,
                 const Plane& open,
                 const Plane& own_lost,
                 Plane& lost) {
-  alignas(64) Plane open_sums, lost_sums;
+  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  alignas(64) Plane open_sums, lost_sums, shares, rows, between;
   add_up_windows(open, open_sums);
   add_up_windows(own_lost, lost_sums);
+  shares.fill(unknown);
   for (const ShadowWindow& window : windows) {
-    const bool whole = window.members == whole_window;
-    const float all_open = whole ? open_sums[window.first] : sum_of_members(window, open);
-    const float all_lost = whole ? lost_sums[window.first] : sum_of_members(window, own_lost);
+    const std::size_t first = window.first;
+    if (window.members == whole_window) shares[first] = lost_sums[first] / open_sums[first];
+  }
+  put_between_windows<1, cell_size>(shares, rows);
+  put_between_windows<cell_size, 1>(rows, between);
+  for (const ShadowWindow& window : windows) {
     const std::size_t k = window.centre;
-    if (all_open > 0) lost[k] += open[k] * (all_lost / all_open) - own_lost[k];
+    float share = unknown;
+    if (window.members == whole_window) {
+      share = between[k] == between[k] ? std::clamp(between[k], 0.0F, 1.0F) : shares[window.first];
+    } else {
+      share = sum_of_members(window, own_lost) / sum_of_members(window, open);
+    }
+    if (share == share) lost[k] += open[k] * share - own_lost[k];  // some of it is open
   }
 }
 

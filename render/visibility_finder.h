@@ -1,6 +1,7 @@
 // Which pixels of a cell see which light, with few rays. Private to the kernel.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -12,6 +13,10 @@ namespace render {
 
 inline constexpr std::uint64_t block4 = 0x000F000F000F000FULL;  // columns 0-3 of a word's four rows
 inline constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 of its first two rows
+
+// Lights of the table that are no farther apart than so many times both their radii are side by
+// side.
+inline constexpr float touching = 1.2F;
 
 inline int bit_of(int x, int y) { return (y & 3) * 16 + x; }
 inline int point_of(int word, int bit) { return word * 64 + bit; }
@@ -48,6 +53,7 @@ class VisibilityFinder {
       test_first(first, i);
     }
     shoot_rest(first);
+    if (coarse_ && !lamps_) look_beside(first, count);
     for (std::size_t i = 0; i < count; ++i) {
       if (!skip_[i]) refine(first, i);
     }
@@ -147,6 +153,55 @@ class VisibilityFinder {
       }
       test_pixels(first, i, word, rest);
     }
+  }
+
+  // Whether blocks' pixels disagree.
+  bool is_mixed(std::size_t i) const {
+    std::uint64_t hidden = 0, seen = 0, tinted = 0;
+    for (std::size_t wi = 0; wi < 4; ++wi) {
+      hidden |= w_.tested[i][wi] & ~w_.seen[i][wi];
+      seen |= w_.tested[i][wi] & w_.seen[i][wi];
+      tinted |= tinted_[i][wi];
+    }
+    return (hidden != 0 && seen != 0) || tinted != 0;
+  }
+
+  // What hides a part of a light may hide a little of the one beside it in the sky, which one pixel
+  // a block misses: there another one of each is tested.
+  void look_beside(std::uint32_t first, std::size_t count) {
+    std::array<std::uint8_t, GatherWorkspace::group> mixed;
+    std::size_t any = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!skip_[i] && has_parts(first, i) && is_mixed(i)) {
+        mixed[any++] = static_cast<std::uint8_t>(i);
+      }
+    }
+    if (any == 0) return;
+    const auto& lights = context_.table->lights;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (skip_[i] || !has_parts(first, i) || is_mixed(i)) continue;
+      const DirectionalLight& light = lights[first + i];
+      const bool beside = std::any_of(mixed.begin(), mixed.begin() + any, [&](std::uint8_t j) {
+        const DirectionalLight& other = lights[first + j];
+        const float reach = touching * (light.spread + other.spread);
+        return dot(light.direction, other.direction) > 1 - 0.5F * reach * reach;
+      });
+      if (!beside) continue;
+      const std::uint32_t light_number = first + static_cast<std::uint32_t>(i);
+      for (int word = 0; word < 4; ++word) {
+        const auto wi = static_cast<std::size_t>(word);
+        for (int bx = 0; bx < cell_size; bx += 4) {
+          const std::uint64_t bits = block4 << bx;
+          if ((w_.lit[i][wi] & w_.same4[wi] & bits) != bits) continue;
+          test(first, i, word, opposite(first_of_block(light_number, word, bx), bx));
+        }
+      }
+    }
+    shoot_rest(first);
+  }
+  // Of a block's pixels, the one two columns and two rows away.
+  static int opposite(int pixel, int bx) {
+    return bit_of(bx + ((pixel % cell_size - bx) ^ 2), (pixel / cell_size) ^ 2);
   }
 
   // Tests pixels one by one, or one of each smooth 2x2 block.

@@ -5,11 +5,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <set>
 
 #include "compositing/billboard.h"
 #include "compositing/keyed_picture.h"
 #include "made_shot.h"
+#include "render/cell_visibility.h"
 #include "render/soft_lights.h"
 
 namespace compositing {
@@ -193,6 +195,42 @@ TEST(SoftLights, ComeNearerToAnEvenSkyThanAsManyHardOnes) {
   EXPECT_LT(gain(4), 0.5);
   EXPECT_LT(gain(16), 0.55);
   EXPECT_LT(gain(64), 0.7);
+}
+
+// Pixels at the border of a cell share with none beyond it: they go on as those beside them do.
+TEST(SoftLights, AreSharedAsEvenlyAtTheBorderOfACell) {
+  constexpr std::size_t count = 16;
+  const std::vector<render::DirectionalLight> lights(count, {{0, 0, 1}, {1, 2, 3}, 0.1F});
+  for (const bool across : {true, false}) {
+    // More and more of the lights are hidden, from one side of the cell to the other.
+    const auto hidden = [&](std::size_t k) {
+      return (static_cast<float>(across ? k % 16 : k / 16) + 0.5F) / 16;
+    };
+    render::CellMask all;
+    all.fill(~std::uint64_t{0});
+    render::CellVisibility visibility;
+    visibility.lit.assign(count, all);
+    visibility.seen.assign(count, {});
+    visibility.near.assign(count, {});
+    std::array<float, render::cell_pixels> zero{}, one;
+    one.fill(1);
+    for (std::size_t k = 0; k < render::cell_pixels; ++k) {
+      for (std::size_t light = 0; light < count; ++light) {
+        const bool sees = static_cast<float>(light) + 0.5F > 16 * hidden(k);
+        if (sees) visibility.seen[light][k / 64] |= std::uint64_t{1} << (k % 64);
+      }
+      const std::size_t x = std::clamp<std::size_t>(k % 16, 1, 13) - 1;
+      const std::size_t y = std::clamp<std::size_t>(k / 16, 1, 13) - 1;
+      visibility.windows.push_back(
+          {static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(y * 16 + x), 0xFFFF});
+    }
+    const auto sums = std::make_unique<render::LightSums>();
+    const auto soft = std::make_unique<render::LightSums>();
+    add_up_light({all, zero, zero, one}, lights, visibility, *sums, *soft);
+    for (std::size_t k = 0; k < render::cell_pixels; ++k) {
+      ASSERT_NEAR(sums->lost(k).y / sums->open(k).y, hidden(k), 0.04) << k % 16 << ", " << k / 16;
+    }
+  }
 }
 
 // What counts little tests one of a few lights: neighbours in the sky, that one can stand for.
