@@ -70,6 +70,7 @@ void CellBaker::bake(const FrameContext& frame,
   compares_centres_ = effort_.aa_samples > 1;
   compares_further_ = effort_.aa_tolerance > 0 || counting_ != nullptr;
   samples_.fill({});
+  first_.fill({});
   base_.fill({});
   light_.fill({});
   edge_.fill(Edge::none);
@@ -88,6 +89,7 @@ void CellBaker::bake(const FrameContext& frame,
   if (finds_edges) {
     trace_ring();
     find_edges();
+    shade_ring();
     find_glints();
     sample_edges();
     blend_neighbours();
@@ -221,6 +223,12 @@ void CellBaker::shade_points(int count, bool grid) {
   for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
     for (ShadePoint* p : group_points) clear_answer(*p);
     shader.shade(context, group_points, *this);
+    for (ShadePoint* p : group_points) {
+      // Around the cell, light is not asked for.
+      if (!shades_ring_ || p->depth > 0) continue;
+      p->diffuse = {};
+      p->catches_shadow = p->catches_lamps = false;
+    }
   });
   receive(count, grid);
   const auto& instances = frame_->inputs.scene->description().instances;
@@ -259,8 +267,10 @@ void CellBaker::collect(const ShadePoint& p) {
   Sample& sample = samples_[p.slot];
   const Light& light = light_of_point_[static_cast<std::size_t>(&p - points_.data())];
   const Vec3f own = p.throughput * p.radiance;
+  const Vec3f sent_back = own + p.throughput * p.diffuse * (light.arriving + light.lamps);
   base.radiance += own;
-  sample.added += own + p.throughput * p.diffuse * (light.arriving + light.lamps);
+  sample.added += sent_back;
+  if (p.depth == 0) first_[p.slot] = sent_back;
   if (p.video.index >= 0) add_video(p);
   if (p.environment_share != Vec3f{}) {
     add_environment(p.slot, target_of(p), p.incoming, 0, {}, false,
@@ -307,11 +317,11 @@ void CellBaker::shade_centres() {
 // at once find; what they mirror, or see behind a clear layer, nobody shares: in parts, it would be
 // grain.
 std::uint8_t CellBaker::part_of(const ShadePoint& p) const {
-  if (p.slot >= cell_pixels) {
+  if (is_further(p.slot)) {
     const std::uint32_t of_pixel = p.pixel * 7 + p.pixel / cell_size * 3;
     return SoftLights::part_of_sample(index_of_slot_[p.slot - cell_pixels] + of_pixel);
   }
-  if (p.kind != RayKind::camera || p.depth > 0) return SoftLights::middle;
+  if (shades_ring_ || p.kind != RayKind::camera || p.depth > 0) return SoftLights::middle;
   return SoftLights::part_of_pixel(p.pixel % cell_size, p.pixel / cell_size);
 }
 
@@ -331,7 +341,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   r.surface[k] = p.hit.instance * 4096 + p.hit.material;
   // Further samples of an edge pixel share its weight.
   const float further_share = 1 / static_cast<float>(effort_.aa_samples);
-  r.share[k] = largest(p.throughput) * (p.slot < cell_pixels ? 1.0F : further_share);
+  r.share[k] = largest(p.throughput) * (is_further(p.slot) ? further_share : 1.0F);
   // What is dark shows little of the light, what only mirrors nothing but compact lights.
   if (!p.catches_shadow && !p.catches_lamps) {
     constexpr float grey = 0.25F / std::numbers::pi_v<float>;

@@ -43,7 +43,8 @@ class CellBaker final : public RaySink {
  private:
   static constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
   static constexpr int ring_pixels = ring_size * ring_size;
-  static constexpr std::uint16_t nowhere = 0xFFFF;  // no receiver
+  static constexpr int around = 4 * (ring_size - 1);  // pixels around a cell
+  static constexpr std::uint16_t nowhere = 0xFFFF;    // no receiver
   static constexpr std::uint32_t no_catcher = ~0U;
 
   struct QueuedRay {
@@ -136,6 +137,15 @@ class CellBaker final : public RaySink {
     return p.slot < cell_pixels ? p.pixel : cell_pixels + p.pixel;
   }
   bool is_inside(std::size_t k) const { return (inside_[k / 64] >> (k % 64) & 1) != 0; }
+  // Of a sample through no pixel's centre.
+  bool is_further(std::size_t slot) const { return slot >= cell_pixels && !shades_ring_; }
+  // The pixels around a cell.
+  static std::array<int, 2> pixel_around(int i) {
+    if (i < ring_size) return {i - 1, -1};
+    if (i < 2 * ring_size) return {i - ring_size - 1, cell_size};
+    if (i < 2 * ring_size + cell_size) return {-1, i - 2 * ring_size};
+    return {cell_size, i - 2 * ring_size - cell_size};
+  }
 
   // cell_baker.cpp
   void trace(int count, bool coherent, RayKind kind, float cone_rad);
@@ -216,6 +226,8 @@ class CellBaker final : public RaySink {
   Met met_at(int i) const;
   void keep_centres();
   void trace_ring();
+  void shade_ring();
+  bool mirrors_across(int i) const;
   void find_edges();
   void find_glints();
   bool lit_unlike(std::size_t a, std::size_t b) const;
@@ -268,6 +280,10 @@ class CellBaker final : public RaySink {
   std::array<CellTransport::Base, slots> base_;
   std::array<Light, cell_pixels> light_;  // at what the centres met
   std::array<Met, ring_pixels> met_;
+  std::array<Vec3f, slots> first_;          // of `added`, what the first surface gives
+  std::array<Vec3f, around> mirrored_;      // of `added` at the pixels around, what it does not
+  std::array<std::uint8_t, around> knows_;  // that
+  CellTransport aside_;                     // of the pixels around: it tells nothing of the cell
   std::array<Edge, cell_pixels> edge_;
   std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_;  // of further samples
   std::array<std::uint16_t, cell_pixels> counts_;
@@ -286,6 +302,7 @@ class CellBaker final : public RaySink {
   RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for
   // Whether anything is decided by what samples see: centres', further ones'.
   bool compares_centres_ = false, compares_further_ = false;
+  bool shades_ring_ = false;       // the pixels around, not further samples
   bool smooths_ = false;           // only edges of things take rays
   float blend_contrast_ = 0;       // 0 = neighbours are not blended
   bool cuts_glass_later_ = false;  // rays inside clear bodies are followed further than others

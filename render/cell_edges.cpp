@@ -26,6 +26,12 @@ Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
   return {std::min(v.x, display_limit), std::min(v.y, display_limit), std::min(v.z, display_limit)};
 }
+// By how much the light of two pixels differs, as eyes see it.
+float step_between(Vec3f a, Vec3f b) {
+  a = clipped(a), b = clipped(b);
+  const float brightest = std::clamp(std::max(largest(a), largest(b)), darkest, 1.0F);
+  return largest(abs(a - b)) / std::sqrt(brightest);
+}
 
 }  // namespace
 
@@ -49,22 +55,65 @@ void CellBaker::keep_centres() {
 
 void CellBaker::trace_ring() {
   const auto& table = *frame_->inputs.directions;
-  std::array<std::uint16_t, 4 * (ring_size - 1)> place;
-  int count = 0;
-  const auto add = [&](int x, int y) {
-    place[static_cast<std::size_t>(count)] =
-        static_cast<std::uint16_t>((y + 1) * ring_size + x + 1);
+  for (int i = 0; i < around; ++i) {
+    const auto [x, y] = pixel_around(i);
     const bool in = x0_ + x >= 0 && y0_ + y >= 0 && x0_ + x < table.width && y0_ + y < table.height;
     const std::size_t t = in ? table.index(y0_ + y, x0_ + x) : 0;
-    set_camera_ray(count, in ? Vec3f{table.x[t], table.y[t], table.z[t]} : Vec3f{});
-    ++count;
-  };
-  for (int x = -1; x <= cell_size; ++x) add(x, -1);
-  for (int x = -1; x <= cell_size; ++x) add(x, cell_size);
-  for (int y = 0; y < cell_size; ++y) add(-1, y);
-  for (int y = 0; y < cell_size; ++y) add(cell_size, y);
-  trace(count, true, RayKind::camera, frame_->pixel_angle);
-  for (int i = 0; i < count; ++i) met_[place[static_cast<std::size_t>(i)]] = met_at(i);
+    set_camera_ray(i, in ? Vec3f{table.x[t], table.y[t], table.z[t]} : Vec3f{});
+  }
+  trace(around, true, RayKind::camera, frame_->pixel_angle);
+  for (int i = 0; i < around; ++i) {
+    const auto [x, y] = pixel_around(i);
+    met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)] = met_at(i);
+  }
+}
+
+// Whether what a pixel around the cell mirrors, or shows through something clear, may tell that the
+// one beside it in the cell wants further samples.
+bool CellBaker::mirrors_across(int i) const {
+  const auto [x, y] = pixel_around(i);
+  const int px = std::clamp(x, 0, cell_size - 1), py = std::clamp(y, 0, cell_size - 1);
+  const bool beside = (px == x) != (py == y);
+  const auto k = static_cast<std::size_t>(py * cell_size + px);
+  return beside && stream_.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID &&
+         is_inside(k) && edge_[k] == Edge::none && (sent_[k] > 0 || samples_[k].added != first_[k]);
+}
+
+// What the pixels around the cell mirror, or show through clear things: as at centres, but for the
+// light of what they see at once, and for these decisions alone.
+void CellBaker::shade_ring() {
+  knows_.fill(0);
+  if (!(effort_.glint_contrast > 0) || smooths_) return;
+  int count = 0;
+  for (int i = 0; i < around; ++i) {
+    if (!mirrors_across(i)) continue;
+    const auto k = static_cast<std::size_t>(i);
+    const auto [x, y] = pixel_around(i);
+    const int pixel = std::clamp(y, 0, cell_size - 1) * cell_size + std::clamp(x, 0, cell_size - 1);
+    knows_[k] = 1;
+    samples_[cell_pixels + k] = {};
+    ShadePoint& p = points_[static_cast<std::size_t>(count++)];
+    set_point(p, i, static_cast<std::uint32_t>(pixel), static_cast<std::uint32_t>(cell_pixels + k));
+    set_camera_cone(p, i, frame_->pixel_angle);
+  }
+  if (count == 0) return;
+  CellTransport& own = *transport_;
+  aside_.clear();
+  aside_.receiving = own.receiving;
+  std::swap(aside_.reach, own.reach);
+  transport_ = &aside_;
+  const std::size_t lamp_terms = lamp_terms_.size();
+  shades_ring_ = true;
+  shade_points(count, false);
+  bounce();
+  shades_ring_ = false;
+  lamp_terms_.resize(lamp_terms);
+  transport_ = &own;
+  std::swap(aside_.reach, own.reach);
+  std::fill(base_.begin() + cell_pixels, base_.end(), CellTransport::Base{});
+  for (std::size_t i = 0; i < around; ++i) {
+    mirrored_[i] = samples_[cell_pixels + i].added - first_[cell_pixels + i];
+  }
 }
 
 // Whether two neighbouring pixels show one surface: same thing, no crease, no step in depth.
@@ -114,9 +163,7 @@ void CellBaker::find_glints() {
   if (!(least > 0)) return;
   const auto compare = [&](std::size_t a, std::size_t b) {
     if (!is_inside(a) || !is_inside(b)) return;
-    const Vec3f shown_a = clipped(samples_[a].added), shown_b = clipped(samples_[b].added);
-    const float brightest = std::clamp(std::max(largest(shown_a), largest(shown_b)), darkest, 1.0F);
-    const float step = largest(abs(shown_a - shown_b)) / std::sqrt(brightest);
+    const float step = step_between(samples_[a].added, samples_[b].added);
     for (const std::size_t k : {a, b}) {
       if (step > least && !smooths_) {
         if (edge_[k] != Edge::shadow) edge_[k] = Edge::glint;
@@ -131,6 +178,16 @@ void CellBaker::find_glints() {
       const std::size_t k = y * cell_size + x;
       if (x + 1 < cell_size) compare(k, k + 1);
       if (y + 1 < cell_size) compare(k, k + cell_size);
+    }
+  }
+  for (int i = 0; i < around; ++i) {
+    if (!knows_[static_cast<std::size_t>(i)]) continue;
+    const auto [x, y] = pixel_around(i);
+    const auto k = static_cast<std::size_t>(std::clamp(y, 0, cell_size - 1) * cell_size +
+                                            std::clamp(x, 0, cell_size - 1));
+    const Vec3f beside = first_[k] + mirrored_[static_cast<std::size_t>(i)];
+    if (edge_[k] == Edge::none && step_between(samples_[k].added, beside) > least) {
+      edge_[k] = Edge::glint;
     }
   }
 }

@@ -62,7 +62,7 @@ Spread rounded(const Spread& spread, Vec3f direction) {
 
 // Which of the pattern's places in its pixel a further sample has.
 std::uint32_t CellBaker::sample_of(const ShadePoint& p) const {
-  return p.slot < cell_pixels ? 0 : index_of_slot_[p.slot - cell_pixels];
+  return is_further(p.slot) ? index_of_slot_[p.slot - cell_pixels] : 0;
 }
 
 // Alike for the same pixel, depth and number, however the picture is cut into tiles.
@@ -82,7 +82,7 @@ std::uint32_t CellBaker::pixel_in_picture(const ShadePoint& p) const {
 // stands for a cone about it that is the wider the less likely it is. False if the ray is left in
 // the middle of its lobe.
 bool CellBaker::turn_within_lobe(const ShadePoint& from, std::uint32_t number, NewRay& ray) const {
-  if (from.slot < cell_pixels || ray.normal == Vec3f{} || ray.roughness < mirror_roughness)
+  if (!is_further(from.slot) || ray.normal == Vec3f{} || ray.roughness < mirror_roughness)
     return false;
   const Vec3f view = -from.incoming;
   SampleSequence numbers = numbers_of(from, number, sample_of(from));
@@ -187,7 +187,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
 //
 // Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018.
 float CellBaker::chance_of(const ShadePoint& from, std::uint32_t path) const {
-  if (from.slot >= cell_pixels)
+  if (is_further(from.slot))
     return SampleSequence(path, pixel_in_picture(from), sample_of(from)).next();
   constexpr double a = 0.7548776662466927, b = 0.5698402909980532;
   const int x = x0_ + static_cast<int>(from.pixel % cell_size);
@@ -235,7 +235,7 @@ void CellBaker::add_environment(std::size_t slot,
     transport_->environment.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
                                        static_cast<std::uint16_t>(level)});
   }
-  const bool decides = slot < cell_pixels ? compares_centres_ : compares_further_;
+  const bool decides = is_further(slot) ? compares_further_ : compares_centres_;
   if (decides) samples_[slot].added += weight * planned_radiance(l);
 }
 
@@ -409,7 +409,7 @@ float CellBaker::compact_density(const Lobe& lobe, std::size_t light) const {
                     part(0, -out, blur_rad));
   }
   const ShadePoint& p = *lobe.point;
-  const bool further = p.slot >= cell_pixels;
+  const bool further = is_further(p.slot);
   const std::uint32_t samples = further ? static_cast<std::uint32_t>(samples_each_) : 1;
   const float part_rad = l.spread / std::sqrt(static_cast<float>(parts_of_source * samples));
   const float blur_rad = calibrate::hypotenuse(part_rad, lobe.cone_rad);
