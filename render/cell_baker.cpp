@@ -80,6 +80,7 @@ void CellBaker::bake(const FrameContext& frame,
   lamp_terms_.clear();
   compact_shares_.clear();
   lamps_apart_.fill(0);
+  is_first_.fill(0);
   sent_.fill(0);
   looked_up_.direction = {};
   trace_centres();
@@ -310,6 +311,7 @@ void CellBaker::shade_centres() {
   }
   run_background({group_.data(), leaving});
   shade_points(count, true);
+  choose_first();
   bounce();
 }
 
@@ -321,8 +323,16 @@ std::uint8_t CellBaker::part_of(const ShadePoint& p) const {
     const std::uint32_t of_pixel = p.pixel * 7 + p.pixel / cell_size * 3;
     return SoftLights::part_of_sample(index_of_slot_[p.slot - cell_pixels] + of_pixel);
   }
-  if (shades_ring_ || p.kind != RayKind::camera || p.depth > 0) return SoftLights::middle;
+  const bool alone = shades_ring_ || p.kind != RayKind::camera || p.depth > 0;
+  if (alone && !receivers_.mirrored) return SoftLights::middle;
   return SoftLights::part_of_pixel(p.pixel % cell_size, p.pixel / cell_size);
+}
+
+void CellBaker::clear_receivers() {
+  Receivers& r = receivers_;
+  r.active = r.by_lamps = r.by_caustics = {};
+  r.count = 0;
+  r.real_first.fill(0);
 }
 
 void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
@@ -352,11 +362,6 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
 // Finds who sees which light, and notes it.
 void CellBaker::receive(int count, bool grid) {
   Receivers& r = receivers_;
-  r.active = {};
-  r.by_lamps = r.by_caustics = {};
-  r.count = 0;
-  r.real_first.fill(0);
-  tested_.clear();
   std::array<std::uint16_t, stream_rays> place;     // of points among receivers
   std::array<std::uint16_t, stream_rays> point_at;  // and back
   std::fill_n(place.begin(), count, nowhere);
@@ -366,9 +371,14 @@ void CellBaker::receive(int count, bool grid) {
     std::uint8_t& flags = glossy[static_cast<std::size_t>(lobe.point - points_.data())];
     flags = static_cast<std::uint8_t>(flags | (lobe.lamps ? 3 : 1));
   }
+  const CellMask mirrored = grid ? CellMask{} : find_mirrored(count, glossy);
+  if (mirrored != CellMask{}) receive_mirrored(mirrored);
+  clear_receivers();
+  tested_.clear();
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const ShadePoint& p = points_[i];
     if (!glossy[i] && !receives_light(p)) continue;
+    if (!grid && is_first_[i] && in(mirrored, p.pixel)) continue;
     if (lender_[i] >= 0) {
       const auto centre = static_cast<std::size_t>(lender_[i]);
       if (transport_->receiving[centre / 64] >> (centre % 64) & 1) {

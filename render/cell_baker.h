@@ -57,6 +57,7 @@ class CellBaker final : public RaySink {
     bool one_of_many;  // of rays all over a rough lobe: its compact light is found apart
     bool lamps_apart;  // and so are the lamps that it mirrors: it does not see what glows by them
     bool beyond_cut;   // followed by chance: what is straight on is counted, for all that are not
+    bool first;        // that a centre sent on, or the brightest of several
     std::uint32_t path;
     Media media;
     // Of a ray that is cut, and only asks whether anything is in its way: what that is taken for,
@@ -160,6 +161,7 @@ class CellBaker final : public RaySink {
   void run_background(std::span<ShadePoint* const> leaving);
   void receive(int count, bool grid);
   std::uint8_t part_of(const ShadePoint& p) const;
+  void clear_receivers();
   void set_receiver(std::size_t k, const ShadePoint& p);
   void add_centre(const ShadePoint& p);
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
@@ -170,6 +172,27 @@ class CellBaker final : public RaySink {
   void mark_passed(std::size_t count);
   void bounce();
   void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
+
+  // cell_mirrored.cpp
+  void choose_first();
+  CellMask find_mirrored(int count, std::span<const std::uint8_t> glossy);
+  bool mirrors_smoothly(std::size_t first) const;
+  void receive_mirrored(const CellMask& mirrored);
+  void receive_mirrored_lamps(const CellMask& mirrored);
+  // Of what gather() asks for, by receiver, if shadow rays are counted.
+  template <class PixelOf, class F>
+  void count_shadow_rays(std::size_t receivers, PixelOf&& pixel_of, F&& gather) {
+    std::array<std::uint32_t, cell_pixels> rays;
+    if (counting_) {
+      rays.fill(0);
+      gather_.counts = rays.data();
+    }
+    gather();
+    gather_.counts = nullptr;
+    for (std::size_t k = 0; counting_ && k < receivers; ++k) {
+      counting_[pixel_of(k)].shadow_rays += rays[k];
+    }
+  }
 
   // cell_lamps.cpp
   void add_centre_lamps(std::span<const std::uint16_t> receiver_of_point);
@@ -254,8 +277,10 @@ class CellBaker final : public RaySink {
   std::array<Light, stream_rays> light_of_point_;
   std::array<ShadePoint*, stream_rays> group_;
   std::array<std::uint8_t, stream_rays> done_;
-  std::array<std::uint8_t, stream_rays> lamps_apart_;  // of the rays that met the points
-  std::array<std::int16_t, stream_rays> lender_;       // pixel whose light a point shares, or -1
+  std::array<std::uint8_t, stream_rays> lamps_apart_;   // of the rays that met the points
+  std::array<std::uint8_t, stream_rays> is_first_;      // as QueuedRay::first, of the points
+  std::array<std::uint16_t, cell_pixels> mirrored_at_;  // point that a centre mirrors, or nowhere
+  std::array<std::int16_t, stream_rays> lender_;        // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<CellTransport::EnvironmentTerm> sorted_places_;
   struct KeyedPlace {

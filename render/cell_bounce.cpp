@@ -111,7 +111,10 @@ void CellBaker::bounce() {
         p.throughput =
             p.throughput * passed_through(*frame_->inputs.scene, q.media, stream_.far_m[i]);
       }
-      if (hit) lamps_apart_[static_cast<std::size_t>(count - 1)] = q.lamps_apart;
+      if (hit) {
+        lamps_apart_[static_cast<std::size_t>(count - 1)] = q.lamps_apart;
+        is_first_[static_cast<std::size_t>(count - 1)] = q.first;
+      }
       p.media = q.media;
       p.kind = q.kind == RayKind::difference ? RayKind::reflection : q.kind;
       p.depth = q.depth;
@@ -122,6 +125,7 @@ void CellBaker::bounce() {
     shade_points(count, false);
   }
   lamps_apart_.fill(0);
+  is_first_.fill(0);
 }
 
 }  // namespace render

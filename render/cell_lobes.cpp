@@ -179,7 +179,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.steps,
                     ray.roughness, from.pixel, from.slot, ray.kind,
                     static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps,
-                    followed > 0 && followed < 1, next_path(from.path, pushed_), ray.media,
+                    followed > 0 && followed < 1, false, next_path(from.path, pushed_), ray.media,
                     asks ? from.diffuse : Vec3f{}});
 }
 

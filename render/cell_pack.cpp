@@ -52,8 +52,8 @@ void CellBaker::pack() {
   CellTransport& t = *transport_;
   std::copy_n(base_.begin(), cell_pixels, t.base.begin());
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
-  t.empty = t.receiving == CellMask{} && t.environment.empty() && t.lights.empty() &&
-            t.bent.empty() && t.video.empty() && lamp_terms_.empty();
+  t.empty = t.receiving == CellMask{} && t.mirrored.empty() && t.environment.empty() &&
+            t.lights.empty() && t.bent.empty() && t.video.empty() && lamp_terms_.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;

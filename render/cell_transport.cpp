@@ -35,6 +35,17 @@ void add_lamps(const CellTransport& cell, const FrameLight& light, RelightWorksp
   }
 }
 
+void light_mirrored(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
+  if (cell.mirrored.empty()) return;
+  const CellTransport::Mirrored& m = cell.mirrored.front();
+  add_up_light({cell.mirrored_receiving, m.nx, m.ny, m.nz}, light.lights, cell.mirrored_visibility,
+               w.mirrored, w.soft);
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (!in(cell.mirrored_receiving, k)) continue;
+    w.added[k] += m.diffuse[k] * (w.mirrored.open(k) - w.mirrored.lost(k));
+  }
+}
+
 void light_centres(const CellTransport& cell, RelightWorkspace& w) {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     const CellTransport::Base& base = cell.base[k];
@@ -142,8 +153,8 @@ void CellTransport::clear() {
   nx.fill(0), ny.fill(0), nz.fill(0);
   diffuse.fill({});
   shadow.fill({});
-  receiving = {};
-  visibility.clear();
+  receiving = mirrored_receiving = {};
+  visibility.clear(), mirrored_visibility.clear(), mirrored.clear();
   shared.clear(), lights.clear();
   environment.clear(), shadow_points.clear(), shadow_lights.clear();
   lamps.numbers.clear(), lamps.factors.clear(), lamps.tints.clear();
@@ -156,11 +167,14 @@ void CellTransport::clear() {
 
 std::size_t CellTransport::bytes() const {
   const auto of = [](const auto& v) { return v.capacity() * sizeof(v[0]); };
-  return sizeof *this + of(visibility.lit) + of(visibility.seen) + of(visibility.tints) +
-         of(visibility.near) + of(visibility.windows) + of(shared) + of(lights) + of(environment) +
-         of(shadow_points) + of(shadow_lights) + of(lamps.numbers) + of(lamps.factors) +
-         of(lamps.tints) + of(lamp_terms) + of(catchers) + of(caught) + of(bent) +
-         of(bent_caustics) + of(video) + of(borrowed) + of(further) + of(counts);
+  const auto of_sight = [&](const CellVisibility& v) {
+    return of(v.lit) + of(v.seen) + of(v.tints) + of(v.near) + of(v.windows);
+  };
+  return sizeof *this + of_sight(visibility) + of_sight(mirrored_visibility) + of(mirrored) +
+         of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
+         of(lamps.numbers) + of(lamps.factors) + of(lamps.tints) + of(lamp_terms) + of(catchers) +
+         of(caught) + of(bent) + of(bent_caustics) + of(video) + of(borrowed) + of(further) +
+         of(counts);
 }
 
 void relight(const CellTransport& cell,
@@ -175,6 +189,7 @@ void relight(const CellTransport& cell,
     add_lamps(cell, light, w);
   }
   light_centres(cell, w);
+  light_mirrored(cell, light, w);
   for (const CellTransport::Further& f : cell.further) {
     const std::size_t slot = cell_pixels + f.pixel;
     w.added[slot] = f.base.radiance;

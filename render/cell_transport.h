@@ -51,6 +51,12 @@ struct CellTransport {
     bool shadow;
     Vec3f weight;
   };
+  // What centres mirror, or see through something clear, where neighbours see one surface so: it
+  // gets its light as centres do. 0 where there is none.
+  struct Mirrored {
+    alignas(64) std::array<float, cell_pixels> nx, ny, nz;
+    std::array<Vec3f, cell_pixels> diffuse;  // radiance per irradiance, times its share
+  };
   // A point of a stand-in that is no centre: the plate passes as far as it sees light.
   struct ShadowPoint {
     std::uint16_t slot;
@@ -127,6 +133,9 @@ struct CellTransport {
   std::array<Vec3f, cell_pixels> shadow;   // plate's share, as far as light is seen
   CellMask receiving{};
   CellVisibility visibility;
+  std::vector<Mirrored> mirrored;  // one, or none
+  CellMask mirrored_receiving{};
+  CellVisibility mirrored_visibility;
   std::vector<SharedTerm> shared;
   std::vector<LightTerm> lights;
   std::vector<EnvironmentTerm> environment;
@@ -180,7 +189,7 @@ Vec3f plate_at(const capture::Image& level, float x, float y);
 
 // What relight() works in.
 struct RelightWorkspace {
-  LightSums light, soft;
+  LightSums light, mirrored, soft;
   alignas(64) std::array<float, cell_pixels> lamps_r, lamps_g, lamps_b;
   std::array<Vec3f, slots> added, share;
   std::array<float, slots> passed;

@@ -17,6 +17,8 @@ inline constexpr int cell_pixels = cell_size * cell_size;
 // 256 flags of a cell: word = four rows, bit = row % 4 * 16 + column.
 using CellMask = std::array<std::uint64_t, 4>;
 
+inline constexpr std::uint64_t block4 = 0x000F000F000F000FULL;  // columns 0-3 of a word's four rows
+
 inline bool in(const CellMask& mask, std::size_t k) { return (mask[k / 64] >> (k % 64) & 1) != 0; }
 
 // Light that glass weakens on its way to a pixel's centre.

@@ -34,8 +34,12 @@ struct Receivers {
   std::array<std::uint64_t, 4> by_lamps;  // of these, those that lamps matter to
   // Those that caustics light: to them light does not go straight through clear bodies.
   std::array<std::uint64_t, 4> by_caustics;
-  int count = 0;  // of entries, if not a grid
+  int count = 0;          // of entries, if not a grid
+  bool mirrored = false;  // a grid of what centres mirror: each is asked for compact lights
 };
+
+// The least cosine between normals of one smooth surface, from pixel to pixel.
+inline constexpr float alike_normals = 0.93F;
 
 // Structure of arrays of one stream of shadow rays, and scratch of one gather.
 struct GatherWorkspace {

@@ -101,9 +101,9 @@ struct Region {
 
 // A layer of the map as a summed-area table (Crow, "Summed-Area Tables for Texture Mapping",
 // SIGGRAPH 1984).
-class Layer {
+class LightLayer {
  public:
-  Layer(const TexelGrid& grid, const std::vector<double>& energy)
+  LightLayer(const TexelGrid& grid, const std::vector<double>& energy)
       : width_(static_cast<std::size_t>(grid.width()) + 1),
         table_(width_ * (static_cast<std::size_t>(grid.height()) + 1)) {
     for (int y = 0; y < grid.height(); ++y) {
@@ -136,7 +136,7 @@ struct Cut {
 // Cuts regions in two, by a method.
 class Cutter {
  public:
-  Cutter(const TexelGrid& grid, std::vector<Layer> layers, LightMethod method)
+  Cutter(const TexelGrid& grid, std::vector<LightLayer> layers, LightMethod method)
       : grid_(grid), layers_(std::move(layers)), method_(method) {}
 
   Region whole(std::size_t layer) const {
@@ -208,7 +208,7 @@ class Cutter {
   }
 
   const TexelGrid& grid_;
-  std::vector<Layer> layers_;
+  std::vector<LightLayer> layers_;
   LightMethod method_;
 };
 
@@ -285,7 +285,8 @@ LightRegions cut_light_regions(const capture::Image& map, const LightTableSettin
       if (bright[i] != 0) std::swap(energy[i], bright_energy[i]);
     }
   }
-  const Cutter cutter(grid, {Layer(grid, energy), Layer(grid, bright_energy)}, settings.method);
+  const Cutter cutter(grid, {LightLayer(grid, energy), LightLayer(grid, bright_energy)},
+                      settings.method);
   const auto count = static_cast<std::size_t>(settings.count);
   const std::vector<Region> regions = cut_layers(cutter, count);
   result.count = regions.size();

@@ -115,8 +115,8 @@ void LobeFilter::make_products(double alpha) {
   const std::size_t n = half();
   const auto length = static_cast<std::size_t>(height_) * 2;
   const RowTransform transform(length);
-  std::vector<Lanes> sums(length);
-  std::vector<Lanes> differences(length);
+  std::vector<Rows> sums(length);
+  std::vector<Rows> differences(length);
   const std::size_t all_frequencies = length / 2 + 1;
   sums_.assign(all_frequencies * n * n, 0);
   differences_.assign(sums_.size(), 0);
@@ -130,8 +130,8 @@ void LobeFilter::make_products(double alpha) {
   }
   for (std::size_t to = 0; to < n; ++to) {
     double total = 0;
-    for (std::size_t first = 0; first < n; first += lanes) {
-      for (std::size_t l = 0; l < lanes; ++l) {
+    for (std::size_t first = 0; first < n; first += rows_at_once) {
+      for (std::size_t l = 0; l < rows_at_once; ++l) {
         const std::size_t from = first + l;
         const double solid_angle =
             texel_solid_angle(static_cast<int>(from), static_cast<int>(length), height_);
@@ -148,7 +148,7 @@ void LobeFilter::make_products(double alpha) {
       // Both are even in j, so their transforms are real, and one complex transform does both.
       transform.forward(sums.data(), differences.data());
       for (std::size_t m = 0; m < all_frequencies; ++m) {
-        for (std::size_t l = 0; l < lanes; ++l) {
+        for (std::size_t l = 0; l < rows_at_once; ++l) {
           const std::size_t at = (m * n + first + l) * n + to;
           sums_[at] = sums[m][l];
           differences_[at] = differences[m][l];
@@ -190,7 +190,7 @@ struct Spectrum {
   std::vector<float> values;
 };
 
-// Of the sums and differences of the rows first .. first + lanes and their mirror images, one
+// Of the sums and differences of the rows from `first` on and their mirror images, one
 // colour.
 void transform_rows(const RowTransform& transform,
                     const capture::Image& map,
@@ -200,9 +200,9 @@ void transform_rows(const RowTransform& transform,
                     Spectrum& sums,
                     Spectrum& differences) {
   const std::size_t length = transform.length();
-  std::vector<Lanes> re(length);
-  std::vector<Lanes> im(length);
-  for (std::size_t l = 0; l < lanes; ++l) {
+  std::vector<Rows> re(length);
+  std::vector<Rows> im(length);
+  for (std::size_t l = 0; l < rows_at_once; ++l) {
     const int row = static_cast<int>(first + l);
     const float* upper = &map.pixels[map.index(row, 0, static_cast<int>(colour))];
     const float* lower = &map.pixels[map.index(map.height - 1 - row, 0, static_cast<int>(colour))];
@@ -218,7 +218,7 @@ void transform_rows(const RowTransform& transform,
     float* sum_im = sums.at(m, 2 * colour + 1) + first;
     float* difference_re = differences.at(m, 2 * colour) + first;
     float* difference_im = differences.at(m, 2 * colour + 1) + first;
-    for (std::size_t l = 0; l < lanes; ++l) {
+    for (std::size_t l = 0; l < rows_at_once; ++l) {
       sum_re[l] = re[m][l] + re[back][l];
       sum_im[l] = im[m][l] - im[back][l];
       difference_re[l] = im[m][l] + im[back][l];
@@ -253,15 +253,15 @@ void restore_rows(const RowTransform& transform,
                   std::size_t frequencies,
                   capture::Image& out) {
   const std::size_t length = transform.length();
-  std::vector<Lanes> re(length);
-  std::vector<Lanes> im(length);
+  std::vector<Rows> re(length);
+  std::vector<Rows> im(length);
   for (std::size_t m = 0; m < frequencies; ++m) {
     const float* sum_re = sums.at(m, 2 * colour) + first;
     const float* sum_im = sums.at(m, 2 * colour + 1) + first;
     const float* difference_re = differences.at(m, 2 * colour) + first;
     const float* difference_im = differences.at(m, 2 * colour + 1) + first;
     const std::size_t back = m == 0 ? 0 : length - m;
-    for (std::size_t l = 0; l < lanes; ++l) {
+    for (std::size_t l = 0; l < rows_at_once; ++l) {
       re[m][l] = sum_re[l] - difference_im[l];
       im[m][l] = sum_im[l] + difference_re[l];
       re[back][l] = sum_re[l] + difference_im[l];
@@ -269,7 +269,7 @@ void restore_rows(const RowTransform& transform,
     }
   }
   transform.backward(re.data(), im.data());
-  for (std::size_t l = 0; l < lanes; ++l) {
+  for (std::size_t l = 0; l < rows_at_once; ++l) {
     const int row = static_cast<int>(first + l);
     float* upper = &out.pixels[out.index(row, 0, static_cast<int>(colour))];
     float* lower = &out.pixels[out.index(out.height - 1 - row, 0, static_cast<int>(colour))];
@@ -291,7 +291,7 @@ void LobeFilter::apply(const capture::Image& map, capture::Image& out) const {
   out.pixels.resize(out.index(height_, 0));
   Spectrum sums(frequencies_, n);
   Spectrum differences(frequencies_, n);
-  for (std::size_t first = 0; first < n; first += lanes) {
+  for (std::size_t first = 0; first < n; first += rows_at_once) {
     for (std::size_t colour = 0; colour < 3; ++colour) {
       transform_rows(transform, map, first, colour, frequencies_, sums, differences);
     }
@@ -302,7 +302,7 @@ void LobeFilter::apply(const capture::Image& map, capture::Image& out) const {
     multiply(&sums_[m * n * n], sums.at(m, 0), smooth_sums.at(m, 0), n);
     multiply(&differences_[m * n * n], differences.at(m, 0), smooth_differences.at(m, 0), n);
   }
-  for (std::size_t first = 0; first < n; first += lanes) {
+  for (std::size_t first = 0; first < n; first += rows_at_once) {
     for (std::size_t colour = 0; colour < 3; ++colour) {
       restore_rows(transform, smooth_sums, smooth_differences, first, colour, frequencies_, out);
     }

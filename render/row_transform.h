@@ -11,11 +11,11 @@
 namespace render {
 
 // Rows that are transformed side by side, so that plain loops fill a vector register.
-inline constexpr std::size_t lanes = 16;
-using Lanes = std::array<float, lanes>;
+inline constexpr std::size_t rows_at_once = 16;
+using Rows = std::array<float, rows_at_once>;
 
-// The discrete Fourier transform of `lanes` complex sequences at once; the length is a power of
-// two.
+// The discrete Fourier transform of `rows_at_once` complex sequences at once; the length is a power
+// of two.
 //
 // Cooley and Tukey, "An Algorithm for the Machine Calculation of Complex Fourier Series", Math.
 // Comput. 19, 1965: radix 2, decimation in time.
@@ -40,7 +40,7 @@ class RowTransform {
   std::size_t length() const { return length_; }
 
   // In place: x[m] = sum over j of x[j] exp(-2 pi i j m / length).
-  void forward(Lanes* re, Lanes* im) const {
+  void forward(Rows* re, Rows* im) const {
     for (std::size_t i = 0; i < length_; ++i) {
       if (i < swap_[i]) {
         std::swap(re[i], re[swap_[i]]);
@@ -59,11 +59,11 @@ class RowTransform {
   }
 
   // The inverse, times the length: swapping the real and imaginary parts turns the sign around.
-  void backward(Lanes* re, Lanes* im) const { forward(im, re); }
+  void backward(Rows* re, Rows* im) const { forward(im, re); }
 
  private:
-  static void butterfly(Lanes& a_re, Lanes& a_im, Lanes& b_re, Lanes& b_im, float c, float s) {
-    for (std::size_t l = 0; l < lanes; ++l) {
+  static void butterfly(Rows& a_re, Rows& a_im, Rows& b_re, Rows& b_im, float c, float s) {
+    for (std::size_t l = 0; l < rows_at_once; ++l) {
       const float t_re = b_re[l] * c - b_im[l] * s;
       const float t_im = b_re[l] * s + b_im[l] * c;
       b_re[l] = a_re[l] - t_re;

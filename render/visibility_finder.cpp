@@ -5,7 +5,7 @@ namespace render {
 
 bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b) {
   return r.surface[a] == r.surface[b] &&
-         r.nx[a] * r.nx[b] + r.ny[a] * r.ny[b] + r.nz[a] * r.nz[b] > 0.93F;
+         r.nx[a] * r.nx[b] + r.ny[a] * r.ny[b] + r.nz[a] * r.nz[b] > alike_normals;
 }
 
 void find_smooth_blocks(const Receivers& r, GatherWorkspace& w) {

@@ -11,7 +11,6 @@
 
 namespace render {
 
-inline constexpr std::uint64_t block4 = 0x000F000F000F000FULL;  // columns 0-3 of a word's four rows
 inline constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 of its first two rows
 
 // Lights of the table that are no farther apart than so many times both their radii are side by
@@ -142,7 +141,7 @@ class VisibilityFinder {
       const auto wi = static_cast<std::size_t>(word);
       const std::uint64_t lit = w_.lit[i][wi];
       std::uint64_t rest = lit;
-      if (coarse_) {
+      if (coarse_ && !(compact && r_.mirrored)) {
         for (int bx = 0; bx < cell_size; bx += 4) {
           const std::uint64_t bits = block4 << bx;
           if ((lit & w_.same4[wi] & bits) != bits) continue;
