@@ -371,14 +371,14 @@ void CellBaker::receive(int count, bool grid) {
     std::uint8_t& flags = glossy[static_cast<std::size_t>(lobe.point - points_.data())];
     flags = static_cast<std::uint8_t>(flags | (lobe.lamps ? 3 : 1));
   }
-  const CellMask mirrored = grid ? CellMask{} : find_mirrored(count, glossy);
-  if (mirrored != CellMask{}) receive_mirrored(mirrored);
+  std::fill_n(shares_mirrored_.begin(), count, std::uint8_t{0});
+  if (!grid) receive_mirrored(count, glossy);
   clear_receivers();
   tested_.clear();
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const ShadePoint& p = points_[i];
     if (!glossy[i] && !receives_light(p)) continue;
-    if (!grid && is_first_[i] && in(mirrored, p.pixel)) continue;
+    if (shares_mirrored_[i]) continue;
     if (lender_[i] >= 0) {
       const auto centre = static_cast<std::size_t>(lender_[i]);
       if (transport_->receiving[centre / 64] >> (centre % 64) & 1) {
@@ -489,10 +489,12 @@ void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
   const auto slot = static_cast<std::uint16_t>(target_of(p));
   const auto c = static_cast<std::uint16_t>(centre);
   if (p.diffuse != Vec3f{}) {
-    transport_->shared.push_back({slot, c, false, p.throughput * p.diffuse});
+    transport_->shared.push_back(
+        {slot, c, CellTransport::SharedTerm::Of::light, p.throughput * p.diffuse});
   }
   if (p.catches_shadow) {
-    transport_->shared.push_back({slot, c, true, p.throughput * p.plate_share});
+    transport_->shared.push_back(
+        {slot, c, CellTransport::SharedTerm::Of::shadow, p.throughput * p.plate_share});
   }
   catch_lamps(p, centre, light_[centre].lamps);
 }

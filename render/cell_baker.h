@@ -177,8 +177,10 @@ class CellBaker final : public RaySink {
   void choose_first();
   CellMask find_mirrored(int count, std::span<const std::uint8_t> glossy);
   bool mirrors_smoothly(std::size_t first) const;
-  void receive_mirrored(const CellMask& mirrored);
-  void receive_mirrored_lamps(const CellMask& mirrored);
+  void receive_mirrored(int count, std::span<const std::uint8_t> glossy);
+  void light_mirrored(const CellMask& mirrored);
+  void receive_lamps(std::span<const std::uint16_t> points);
+  bool share_mirrored(std::size_t point);
   // Of what gather() asks for, by receiver, if shadow rays are counted.
   template <class PixelOf, class F>
   void count_shadow_rays(std::size_t receivers, PixelOf&& pixel_of, F&& gather) {
@@ -280,7 +282,15 @@ class CellBaker final : public RaySink {
   std::array<std::uint8_t, stream_rays> lamps_apart_;   // of the rays that met the points
   std::array<std::uint8_t, stream_rays> is_first_;      // as QueuedRay::first, of the points
   std::array<std::uint16_t, cell_pixels> mirrored_at_;  // point that a centre mirrors, or nowhere
-  std::array<std::int16_t, stream_rays> lender_;        // pixel whose light a point shares, or -1
+  // What centres mirror, where the transport has its light.
+  struct MirroredHit {
+    std::uint32_t instance, material;
+    float reach_m;  // about as far apart as neighbours'
+    Vec3f normal, position, light;
+  };
+  std::array<MirroredHit, cell_pixels> mirrored_hits_;
+  std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
+  std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<CellTransport::EnvironmentTerm> sorted_places_;
   struct KeyedPlace {

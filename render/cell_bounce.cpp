@@ -47,8 +47,9 @@ void CellBaker::meet_surroundings(const QueuedRay& ray, std::size_t i) {
     return;
   }
   const Vec3f weight = ray.throughput * ray.surroundings;
-  transport_->shared.push_back(
-      {static_cast<std::uint16_t>(target), static_cast<std::uint16_t>(ray.pixel), false, weight});
+  transport_->shared.push_back({static_cast<std::uint16_t>(target),
+                                static_cast<std::uint16_t>(ray.pixel),
+                                CellTransport::SharedTerm::Of::light, weight});
   const Light& light = light_[ray.pixel];
   samples_[ray.slot].added += weight * (light.arriving + light.lamps);
 }

@@ -4,6 +4,18 @@
 #include "render/cell_baker.h"
 
 namespace render {
+namespace {
+
+constexpr float reach_of_neighbours = 1.5F;  // by their cones
+
+Vec3f lesser(Vec3f a, Vec3f b) {
+  return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
+}
+Vec3f greater(Vec3f a, Vec3f b) {
+  return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)};
+}
+
+}  // namespace
 
 // Of the rays that each centre has sent on the brightest, to be followed together.
 void CellBaker::choose_first() {
@@ -56,8 +68,29 @@ bool CellBaker::mirrors_smoothly(std::size_t first) const {
   return true;
 }
 
-// Finds who of them sees which light, and notes it.
-void CellBaker::receive_mirrored(const CellMask& mirrored) {
+// Lights what of some points needs no light of its own: what centres mirror smoothly, and what
+// further samples see beside that.
+void CellBaker::receive_mirrored(int count, std::span<const std::uint8_t> glossy) {
+  std::array<std::uint16_t, stream_rays> points;
+  std::size_t n = 0;
+  const CellMask mirrored = find_mirrored(count, glossy);
+  if (mirrored != CellMask{}) {
+    light_mirrored(mirrored);
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      if (in(mirrored, k)) points[n++] = mirrored_at_[k];
+    }
+  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    if (points_[i].slot >= cell_pixels && !glossy[i] && share_mirrored(i)) {
+      points[n++] = static_cast<std::uint16_t>(i);
+    }
+  }
+  for (const std::uint16_t i : std::span(points).first(n)) shares_mirrored_[i] = 1;
+  if (n > 0 && !frame_->planned_table->lamps.empty()) receive_lamps(std::span(points).first(n));
+}
+
+// Finds who sees which light, and notes it.
+void CellBaker::light_mirrored(const CellMask& mirrored) {
   CellTransport& t = *transport_;
   Receivers& r = receivers_;
   clear_receivers();
@@ -81,24 +114,62 @@ void CellBaker::receive_mirrored(const CellMask& mirrored) {
     const Vec3f open = r.light.open(k);
     light_of_point_[mirrored_at_[k]] = {open, open - r.light.lost(k), {}};
     to.diffuse[k] = p.throughput * p.diffuse;
+    const float reach_m = reach_of_neighbours * (length(p.steps.a) + length(p.steps.b));
+    mirrored_hits_[k] = {p.hit.instance, p.hit.material, reach_m,
+                         p.light_normal, p.hit.position, light_of_point_[mirrored_at_[k]].arriving};
   }
-  if (!frame_->planned_table->lamps.empty()) receive_mirrored_lamps(mirrored);
 }
 
-// Lamps' light is found point by point.
-void CellBaker::receive_mirrored_lamps(const CellMask& mirrored) {
+// A point that a further sample came to may get its light from the nearest of what the centres
+// about its pixel mirror, of the same surface, where they are all lit alike.
+bool CellBaker::share_mirrored(std::size_t point) {
+  const CellMask& mirrored = transport_->mirrored_receiving;
+  const ShadePoint& p = points_[point];
+  if (p.depth == 0 || mirrored == CellMask{} || p.diffuse == Vec3f{} || p.catches_shadow ||
+      p.catches_lamps) {
+    return false;
+  }
+  const int px = static_cast<int>(p.pixel % cell_size), py = static_cast<int>(p.pixel / cell_size);
+  std::size_t nearest = cell_pixels;
+  float least = 0;
+  Vec3f lower, upper;
+  for (int y = std::max(py - 1, 0); y <= std::min(py + 1, cell_size - 1); ++y) {
+    for (int x = std::max(px - 1, 0); x <= std::min(px + 1, cell_size - 1); ++x) {
+      const auto k = static_cast<std::size_t>(y * cell_size + x);
+      if (!in(mirrored, k)) continue;
+      const MirroredHit& m = mirrored_hits_[k];
+      if (m.instance != p.hit.instance || m.material != p.hit.material ||
+          !(dot(m.normal, p.light_normal) > alike_normals)) {
+        continue;
+      }
+      const float apart_m = length(p.hit.position - m.position);
+      const bool any = nearest < cell_pixels;
+      lower = any ? lesser(lower, m.light) : m.light;
+      upper = any ? greater(upper, m.light) : m.light;
+      if (any && !(apart_m < least)) continue;
+      nearest = k, least = apart_m;
+    }
+  }
+  if (nearest == cell_pixels || !(least < mirrored_hits_[nearest].reach_m)) return false;
+  const Vec3f weight = p.throughput * p.diffuse;
+  if (largest(weight * (upper - lower)) > effort_.glint_contrast) return false;
+  light_of_point_[point].arriving = light_of_point_[point].open = mirrored_hits_[nearest].light;
+  transport_->shared.push_back({static_cast<std::uint16_t>(target_of(p)),
+                                static_cast<std::uint16_t>(nearest),
+                                CellTransport::SharedTerm::Of::mirrored_light, weight});
+  return true;
+}
+
+// Lamps' light is each point's own.
+void CellBaker::receive_lamps(std::span<const std::uint16_t> points) {
   Receivers& r = receivers_;
-  std::array<std::uint16_t, stream_rays> point_at;
   clear_receivers();
-  for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (!in(mirrored, k)) continue;
-    const auto n = static_cast<std::size_t>(r.count++);
-    point_at[n] = mirrored_at_[k];
-    set_receiver(n, points_[mirrored_at_[k]]);
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    set_receiver(n, points_[points[n]]);
     r.active[n / 64] |= std::uint64_t{1} << (n % 64);
   }
+  r.count = static_cast<int>(points.size());
   r.by_lamps = r.by_caustics = r.active;
-  const auto points = std::span(point_at).first(static_cast<std::size_t>(r.count));
   tested_.clear();
   add_tested(points);
   count_shadow_rays(

@@ -12,7 +12,7 @@ namespace {
 
 std::uint32_t key_of(const CellTransport::LightTerm& l) { return l.slot * 65536U + l.light; }
 std::uint32_t key_of(const CellTransport::SharedTerm& s) {
-  return (s.slot * 65536U + s.centre) * 2U + s.shadow;
+  return (s.slot * 65536U + s.centre) * 4U + static_cast<std::uint32_t>(s.of);
 }
 
 // Joins neighbouring terms of the same key, from one vector to another or within one. Returns how

@@ -42,7 +42,8 @@ void light_mirrored(const CellTransport& cell, const FrameLight& light, RelightW
                w.mirrored, w.soft);
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!in(cell.mirrored_receiving, k)) continue;
-    w.added[k] += m.diffuse[k] * (w.mirrored.open(k) - w.mirrored.lost(k));
+    w.mirrored_arriving[k] = w.mirrored.open(k) - w.mirrored.lost(k);
+    w.added[k] += m.diffuse[k] * w.mirrored_arriving[k];
   }
 }
 
@@ -199,12 +200,13 @@ void relight(const CellTransport& cell,
   light_shadow_points(cell, light, w);
   light_catchers(cell, light, plate, w, statistics);
   for (const CellTransport::SharedTerm& s : cell.shared) {
-    if (s.shadow) {
+    if (s.of == CellTransport::SharedTerm::Of::shadow) {
       const Vec3f share = s.weight * w.passing[s.centre];
       w.share[s.slot] += share;
       w.passed[s.slot] += mean(share);
     } else {
-      w.added[s.slot] += s.weight * w.arriving[s.centre];
+      const bool mirrored = s.of == CellTransport::SharedTerm::Of::mirrored_light;
+      w.added[s.slot] += s.weight * (mirrored ? w.mirrored_arriving : w.arriving)[s.centre];
     }
   }
   for (const CellTransport::LightTerm& l : cell.lights) {

@@ -45,10 +45,12 @@ struct CellTransport {
     float x, y;
     std::uint16_t slot, level;
   };
-  // Slot += weight * irradiance of a centre; or the plate's share, as far as the centre sees light.
+  // Slot += weight * irradiance of a centre, or of what it mirrors; or the plate's share, as far as
+  // the centre sees light.
   struct SharedTerm {
+    enum class Of : std::uint8_t { light, mirrored_light, shadow };
     std::uint16_t slot, centre;
-    bool shadow;
+    Of of;
     Vec3f weight;
   };
   // What centres mirror, or see through something clear, where neighbours see one surface so: it
@@ -194,7 +196,7 @@ struct RelightWorkspace {
   std::array<Vec3f, slots> added, share;
   std::array<float, slots> passed;
   // Irradiance, lamps' too; share that is seen of what is not lamps'.
-  std::array<Vec3f, cell_pixels> arriving, passing;
+  std::array<Vec3f, cell_pixels> arriving, passing, mirrored_arriving;
   std::vector<Vec3f> caught;  // irradiance of lamps at catchers
   // At shadow points: irradiance, where nothing virtual is in the way; share of it that arrives.
   std::vector<Vec3f> open_at_points, passing_at_points;

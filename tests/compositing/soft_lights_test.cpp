@@ -13,6 +13,7 @@
 #include "made_shot.h"
 #include "render/cell_visibility.h"
 #include "render/soft_lights.h"
+#include "render/texture.h"
 
 namespace compositing {
 namespace {
@@ -198,7 +199,7 @@ TEST(SoftLights, ComeNearerToAnEvenSkyThanAsManyHardOnes) {
 }
 
 // A grey floor with a ball over it, seen in a mirror that fills the picture.
-MadeShot mirrored_shadow() {
+MadeShot mirrored_shadow(bool tiles = false) {
   register_shaders();
   render::SceneDescription scene;
   scene.background = "environment";
@@ -206,6 +207,12 @@ MadeShot mirrored_shadow() {
   std::fill_n(grey.base_color, 3, 0.5F);
   grey.roughness = 1;
   grey.specular = 0;
+  if (tiles) {
+    grey.base_color_texture = 0;
+    const std::array<std::uint8_t, 4> texels{255, 20, 20, 255};
+    scene.textures = {
+        std::make_shared<render::Texture>(render::make_texture(2, 2, 1, false, texels))};
+  }
   mirror.metallic = 1;
   mirror.roughness = 0;
   scene.materials = {make_standard_material("grey", grey),
@@ -214,7 +221,9 @@ MadeShot mirrored_shadow() {
   upright->positions = {{-9, 3, -9}, {9, 3, -9}, {9, 3, 9}, {-9, 3, 9}};
   upright->triangles = {{0, 1, 2}, {0, 2, 3}};
   upright->materials = {1};
-  scene.meshes = {made_floor(20, 0), made_ball({0, 0.4F, 0.9F}, 0.5F, 0), upright};
+  auto floor = made_floor(20, 0);
+  if (tiles) floor->uvs = {{0, 0}, {40, 0}, {40, 40}, {0, 40}};
+  scene.meshes = {floor, made_ball({0, 0.4F, 0.9F}, 0.5F, 0), upright};
   for (std::uint32_t mesh = 0; mesh < 3; ++mesh) scene.instances.emplace_back().mesh = mesh;
   MadeShot shot = made_shot(160, 112, std::move(scene));
   shot.job.cam_from_set = calibrate::look_at({0, 0, 3}, {0, 3, 1.2}, 0);
@@ -248,6 +257,22 @@ TEST(SoftLights, AreAsSoftInAMirror) {
     // One pixel of sixteen asks where all agree.
     EXPECT_LT(hard.statistics.shadow_rays, 160U * 112U * static_cast<unsigned>(count) / 4) << count;
   }
+}
+
+// Further samples get the light of what they see in a mirror from what centres saw beside it.
+TEST(SoftLights, AreNotLookedForAgainByFurtherSamplesInAMirror) {
+  MadeShot shot = mirrored_shadow(true);
+  shot.job.lights = even_sky(64);
+  const render::FrameResult one = frame_of(shot);
+  shot.job.effort.aa_samples = 16;
+  shot.job.effort.aa_tolerance = 0;
+  const render::FrameResult many = frame_of(shot);
+  const auto more = [&](std::uint64_t render::RenderStatistics::*rays) {
+    return static_cast<double>(many.statistics.*rays - one.statistics.*rays);
+  };
+  const double further = more(&render::RenderStatistics::primary_rays);
+  EXPECT_GT(further, 3.0 * 160 * 112);
+  EXPECT_LT(more(&render::RenderStatistics::shadow_rays), 4 * further);
 }
 
 // A sun's shadows in a mirror are asked for pixel by pixel: they may be as small as a pixel.
