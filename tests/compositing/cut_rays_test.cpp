@@ -42,9 +42,12 @@ GlassShot shot_of(render::SceneDescription scene) {
 }
 
 TEST(CutRays, DoNotSeeTheSkyThroughWalls) {
-  const GlassShot shot = shot_of(made_room());
+  GlassShot shot = shot_of(made_room());
   const double truth = mean_of(shot.reference(512));
-  EXPECT_NEAR(mean_of(shot.kernel()), truth, 0.01 * truth);
+  // A fifth more, if they did.
+  EXPECT_NEAR(mean_of(shot.kernel()), truth, 0.02 * truth);
+  shot.job.effort.accuracy = 0.999F;
+  EXPECT_NEAR(mean_of(shot.kernel()), truth, 0.006 * truth) << "nearly all are followed";
 }
 
 }  // namespace
