@@ -100,6 +100,7 @@ void CellBaker::shade_ring() {
   CellTransport& own = *transport_;
   aside_.clear();
   aside_.receiving = own.receiving;
+  aside_.mirrored_receiving = own.mirrored_receiving;
   std::swap(aside_.reach, own.reach);
   transport_ = &aside_;
   const std::size_t lamp_terms = lamp_terms_.size();
