@@ -47,7 +47,8 @@ struct FootprintGrid {
 
 // Of a picture of width x height texels whose last level is `last`, with up to `most_along`
 // look-ups along the longer side. A footprint that is no rectangle counts as the one that spreads
-// as far in every direction. What is not finite counts as nothing.
+// as far in every direction. What is endless has the last level, what is no number counts as
+// nothing.
 inline FootprintGrid footprint_grid(
     const UvFootprint& footprint, int width, int height, int last, int most_along) {
   constexpr float least = 0.5F, widest = 1e6F;  // texels
@@ -59,7 +60,7 @@ inline FootprintGrid footprint_grid(
   FootprintGrid grid;
   if (!(xx + yy > least * least)) return grid;
   if (!(xx + yy < widest * widest)) {
-    if (xx + yy > 0) grid.fine = last;
+    grid.fine = last;
     return grid;
   }
   const float middle = 0.5F * (xx + yy), half = 0.5F * (xx - yy);

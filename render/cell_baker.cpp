@@ -227,6 +227,8 @@ void CellBaker::shade_points(int count, bool grid) {
     for (ShadePoint* p : group_points) {
       // Around the cell, light is not asked for.
       if (!shades_ring_ || p->depth > 0) continue;
+      answers_light_[static_cast<std::size_t>(p - points_.data())] =
+          p->diffuse != Vec3f{} || p->catches_lamps;
       p->diffuse = {};
       p->catches_shadow = p->catches_lamps = false;
     }
@@ -271,7 +273,7 @@ void CellBaker::collect(const ShadePoint& p) {
   const Vec3f sent_back = own + p.throughput * p.diffuse * (light.arriving + light.lamps);
   base.radiance += own;
   sample.added += sent_back;
-  if (p.depth == 0) first_[p.slot] = sent_back;
+  if (p.depth == 0) first_[p.slot] += sent_back;
   if (p.video.index >= 0) add_video(p);
   if (p.environment_share != Vec3f{}) {
     add_environment(p.slot, target_of(p), p.incoming, 0, {}, false,
@@ -315,9 +317,9 @@ void CellBaker::shade_centres() {
   bounce();
 }
 
-// Which part of wide lights a point looks for. Neighbours share what the points that centres see
-// at once find; what they mirror, or see behind a clear layer, nobody shares: in parts, it would be
-// grain.
+// Which part of wide lights a point looks for. Neighbours share what is found where the points that
+// centres see at once are, and what they mirror smoothly; further samples each take another. What
+// nobody shares, would be grain in parts.
 std::uint8_t CellBaker::part_of(const ShadePoint& p) const {
   if (is_further(p.slot)) {
     const std::uint32_t of_pixel = p.pixel * 7 + p.pixel / cell_size * 3;
@@ -396,7 +398,9 @@ void CellBaker::receive(int count, bool grid) {
     if (p.diffuse != Vec3f{} || p.catches_lamps || glossy[i] > 1) {
       r.by_lamps[k / 64] |= std::uint64_t{1} << (k % 64);
     }
-    if (p.diffuse != Vec3f{} || p.catches_lamps || (p.kind == RayKind::bent && p.catches_shadow)) {
+    const bool of_ring = shades_ring_ && p.depth == 0 && answers_light_[i];
+    if (p.diffuse != Vec3f{} || p.catches_lamps || of_ring ||
+        (p.kind == RayKind::bent && p.catches_shadow)) {
       r.by_caustics[k / 64] |= std::uint64_t{1} << (k % 64);
     }
   }

@@ -318,7 +318,9 @@ class CellBaker final : public RaySink {
   std::array<Vec3f, slots> first_;          // of `added`, what the first surface gives
   std::array<Vec3f, around> mirrored_;      // of `added` at the pixels around, what it does not
   std::array<std::uint8_t, around> knows_;  // that
-  CellTransport aside_;                     // of the pixels around: it tells nothing of the cell
+  std::array<std::uint8_t, stream_rays>
+      answers_light_;    // points around, before they were made not to
+  CellTransport aside_;  // of the pixels around: it tells nothing of the cell
   std::array<Edge, cell_pixels> edge_;
   std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_;  // of further samples
   std::array<std::uint16_t, cell_pixels> counts_;

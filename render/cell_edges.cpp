@@ -92,6 +92,7 @@ void CellBaker::shade_ring() {
     const int pixel = std::clamp(y, 0, cell_size - 1) * cell_size + std::clamp(x, 0, cell_size - 1);
     knows_[k] = 1;
     samples_[cell_pixels + k] = {};
+    first_[cell_pixels + k] = {};
     ShadePoint& p = points_[static_cast<std::size_t>(count++)];
     set_point(p, i, static_cast<std::uint32_t>(pixel), static_cast<std::uint32_t>(cell_pixels + k));
     set_camera_cone(p, i, frame_->pixel_angle);
@@ -104,11 +105,13 @@ void CellBaker::shade_ring() {
   std::swap(aside_.reach, own.reach);
   transport_ = &aside_;
   const std::size_t lamp_terms = lamp_terms_.size();
+  const auto sent = sent_;
   shades_ring_ = true;
   shade_points(count, false);
   bounce();
   shades_ring_ = false;
   lamp_terms_.resize(lamp_terms);
+  sent_ = sent;
   transport_ = &own;
   std::swap(aside_.reach, own.reach);
   std::fill(base_.begin() + cell_pixels, base_.end(), CellTransport::Base{});
@@ -187,9 +190,8 @@ void CellBaker::find_glints() {
     const auto k = static_cast<std::size_t>(std::clamp(y, 0, cell_size - 1) * cell_size +
                                             std::clamp(x, 0, cell_size - 1));
     const Vec3f beside = first_[k] + mirrored_[static_cast<std::size_t>(i)];
-    if (edge_[k] == Edge::none && step_between(samples_[k].added, beside) > least) {
-      edge_[k] = Edge::glint;
-    }
+    const bool may_be = edge_[k] == Edge::none || edge_[k] == Edge::blend;
+    if (may_be && step_between(samples_[k].added, beside) > least) edge_[k] = Edge::glint;
   }
 }
 

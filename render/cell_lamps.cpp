@@ -62,7 +62,9 @@ void CellBaker::catch_lamps(const ShadePoint& p, std::size_t centre, Vec3f irrad
   if (!p.catches_lamps || irradiance == Vec3f{}) return;
   transport_->catchers.push_back({static_cast<std::uint16_t>(target_of(p)),
                                   static_cast<std::uint32_t>(centre), p.throughput, p.albedo});
-  samples_[p.slot].added += p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);
+  const Vec3f caught = p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);
+  samples_[p.slot].added += caught;
+  if (p.depth == 0) first_[p.slot] += caught;
 }
 
 }  // namespace render

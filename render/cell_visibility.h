@@ -66,8 +66,8 @@ struct LitCentres {
 };
 
 // Adds up the table's light there: of all of it that is not behind real things, and what of it
-// virtual objects take. The centres of windows lose the share of the soft light that the window
-// loses as a whole; where nothing is lost, that is exactly so. `soft` is scratch.
+// virtual objects take. The centres of windows lose the share of the soft light that the windows
+// about them lose as wholes; where none of these loses any, exactly nothing. `soft` is scratch.
 void add_up_light(const LitCentres& centres,
                   std::span<const DirectionalLight> lights,
                   const CellVisibility& visibility,

@@ -52,7 +52,7 @@ class VisibilityFinder {
       test_first(first, i);
     }
     shoot_rest(first);
-    if (coarse_ && !lamps_) look_beside(first, count);
+    if (coarse_ && block_ < 4 && !lamps_) look_beside(first, count);
     for (std::size_t i = 0; i < count; ++i) {
       if (!skip_[i]) refine(first, i);
     }
@@ -165,8 +165,9 @@ class VisibilityFinder {
     return (hidden != 0 && seen != 0) || tinted != 0;
   }
 
-  // What hides a part of a light may hide a little of the one beside it in the sky, which one pixel
-  // a block misses: there another one of each is tested.
+  // What hides a part of a light may hide a little of the one beside it in the sky, or all but a
+  // little, which one pixel a block misses: there another one of each is tested. Lights of other
+  // groups than this are not looked at.
   void look_beside(std::uint32_t first, std::size_t count) {
     std::array<std::uint8_t, GatherWorkspace::group> mixed;
     std::size_t any = 0;

@@ -97,6 +97,20 @@ TEST(MirroredTexture, DoesNotAliasWhereverItIsSeen) {
   }
 }
 
+// Against two references of 128 paths a pixel, over all of the picture.
+double error_of(const MadeShot& shot) {
+  const capture::Image black = capture::make_image(height, width);
+  std::array<capture::Image, 2> truth;
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    truth[i] = render_reference(shot.inputs(), shot.job, black, {.samples = 128, .seed = i + 1});
+  }
+  render::FrameResult result;
+  render_frame(shot.inputs(), shot.job, shot.plate, result);
+  capture::Image all = capture::make_image(height, width, 1);
+  std::ranges::fill(all.pixels, 1.0F);
+  return render::picture_error(capture::to_float(result.rgba), truth, all).relative_rms;
+}
+
 // A floor of tiles that reaches far away: pixels see strips of it, up to ten times as long as wide.
 TEST(Texture, OfAFloorSeenAtASlantIsAsInTheReference) {
   register_shaders();
@@ -127,17 +141,7 @@ TEST(Texture, OfAFloorSeenAtASlantIsAsInTheReference) {
   for (const double aside : {0.0, 4.0, -9.0}) {
     shot.job.cam_from_set = calibrate::look_at({0.2, 0, 0.2}, {aside, 8, -3.5}, 0);
     shot.job.effort.aa_samples = 1;
-    const capture::Image black = capture::make_image(height, width);
-    std::array<capture::Image, 2> truth;
-    for (std::uint32_t i = 0; i < 2; ++i) {
-      truth[i] = render_reference(shot.inputs(), shot.job, black, {.samples = 128, .seed = i + 1});
-    }
-    render::FrameResult result;
-    render_frame(shot.inputs(), shot.job, shot.plate, result);
-    capture::Image all = capture::make_image(height, width, 1);
-    std::ranges::fill(all.pixels, 1.0F);
-    const double error =
-        render::picture_error(capture::to_float(result.rgba), truth, all).relative_rms;
+    const double error = error_of(shot);
     RecordProperty("error", std::to_string(error));
     EXPECT_LT(error, 0.06) << aside;
   }
@@ -199,17 +203,7 @@ MadeShot flaky_paint(float tilt) {
 TEST(NormalMap, FarAwayIsARougherSurfaceAsInTheReference) {
   for (const auto& [tilt, most] : {std::pair{0.0F, 0.02}, {0.1F, 0.1}, {0.25F, 0.16}}) {
     const MadeShot shot = flaky_paint(tilt);
-    const capture::Image black = capture::make_image(height, width);
-    std::array<capture::Image, 2> truth;
-    for (std::uint32_t i = 0; i < 2; ++i) {
-      truth[i] = render_reference(shot.inputs(), shot.job, black, {.samples = 128, .seed = i + 1});
-    }
-    render::FrameResult result;
-    render_frame(shot.inputs(), shot.job, shot.plate, result);
-    capture::Image all = capture::make_image(height, width, 1);
-    std::ranges::fill(all.pixels, 1.0F);
-    const capture::Image shown = capture::to_float(result.rgba);
-    EXPECT_LT(render::picture_error(shown, truth, all).relative_rms, most) << tilt;
+    EXPECT_LT(error_of(shot), most) << tilt;
   }
 }
 

@@ -113,6 +113,19 @@ TEST(RenderFrame, IsSmoothWhereAMirroredEdgeLiesOnTheBorderOfCells) {
   }
 }
 
+// What a lamp adds on the real floor is no mirrored light that a cell's neighbours would lack.
+TEST(RenderFrame, TakesNoMoreSamplesOnTheBordersOfCellsWhereALampShines) {
+  MadeShot shot = made_shot(64, 64, made_scene(false));
+  shot.job.cam_from_set = calibrate::look_at({0, 0, 3}, {0, 0, 0}, 0);
+  render::LocalLight lamp;
+  lamp.position = {0.3F, 0, 1.5F};
+  lamp.intensity = {2, 2, 2};
+  shot.job.lights.lamps = {lamp};
+  render::FrameResult result;
+  render_frame(shot.inputs(), shot.job, shot.plate, result);
+  EXPECT_EQ(result.statistics.primary_rays, 64U * 64U);
+}
+
 TEST(RenderFrame, MakesSoftShadowsWithoutSeamsBetweenCells) {
   MadeShot shot = made_shot(192, 144, made_scene(), 256);
   render::FrameResult adaptive, all;
