@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -11,6 +10,7 @@
 
 #include "capture/camera.h"
 #include "compositing/made_walker.h"
+#include "tests/made_files.h"
 
 namespace compositing {
 namespace {
@@ -267,9 +267,8 @@ TEST(FeetTracker, IgnoresAGlimpseOfAnotherPlaceAndFollowsThereIfItStays) {
 
 // The lowest row of the front foot, and its left and right, read off enlarged frames by eye.
 TEST(Feet, OfTheDancerAreHisAndNotTheAxes) {
-  const char* data = std::getenv("PLATELIGHT_DATA");
-  const std::string path = std::string(data ? data : "") + "/greenscreen/aframe_dancer_360x640.mp4";
-  if (!data || !std::filesystem::exists(path)) GTEST_SKIP() << "no clip: PLATELIGHT_DATA";
+  const std::string path = made::real_data() / "greenscreen/aframe_dancer_360x640.mp4";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no clip: PLATELIGHT_DATA";
   struct Truth {
     int frame;
     double left, right, y;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "compositing/keyer.h"
 #include "compositing/made_clip.h"
 #include "compositing/made_video_camera.h"
+#include "tests/made_files.h"
 
 namespace compositing {
 namespace {
@@ -21,9 +21,8 @@ namespace {
 using capture::Image;
 
 std::string data_path(const std::string& name) {
-  const char* place = std::getenv("PLATELIGHT_DATA");
-  if (place == nullptr || !std::filesystem::exists(std::filesystem::path(place) / name)) return {};
-  return (std::filesystem::path(place) / name).string();
+  const std::filesystem::path path = made::real_data() / name;
+  return std::filesystem::exists(path) ? path.string() : std::string();
 }
 
 std::vector<Image> frames_of(const std::string& path, int from, int to, int step) {
