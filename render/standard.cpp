@@ -76,8 +76,7 @@ MappedNormal mapped_normal(const StandardParameters& parameters,
   if (!(l > 1e-6F) || !(dot(normal, hit.normal) > 0)) return {hit.normal};
   MappedNormal mapped{normal / l};
   // Beside the map's own texels, whose eight bits are no unit vectors either.
-  const bool is_point = footprint.a == UvFootprint{}.a && footprint.b == UvFootprint{}.b;
-  if (!is_point) mapped.rougher = spread_of_normals(l / length(in_tangents({})));
+  if (footprint != UvFootprint{}) mapped.rougher = spread_of_normals(l / length(in_tangents({})));
   return mapped;
 }
 

@@ -26,6 +26,17 @@ std::shared_ptr<render::Mesh> square(std::array<render::Vec3f, 4> corners,
   return mesh;
 }
 
+// Before a black plate; light and camera are the caller's.
+MadeShot shot_of(render::SceneDescription scene) {
+  MadeShot shot;
+  shot.scene = std::make_unique<render::Scene>(std::move(scene));
+  const double f = width * 0.9;
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  shot.plate = capture::to_half(capture::make_image(height, width));
+  return shot;
+}
+
 // A glowing chequered wall 24 m behind a viewer who sees it in `mirrors` mirrors, one after the
 // other. Its squares of a few centimetres are much finer than the pixels there.
 struct ChequeredShot {
@@ -65,12 +76,8 @@ struct ChequeredShot {
     } else {
       add(square({{{-9, 3, -9}, {9, 3, -9}, {9, 3, 9}, {-9, 3, 9}}}, 1, 1));
     }
-    shot.scene = std::make_unique<render::Scene>(std::move(scene));
-    const double f = width * 0.9;
-    shot.directions = calibrate::make_direction_table(
-        {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+    shot = shot_of(std::move(scene));
     shot.environment = made_sky(16, 0, 0);
-    shot.plate = capture::to_half(capture::make_image(height, width));
     const calibrate::Vec3 towards =
         mirrors == 0 ? calibrate::Vec3{0.3, -24, 0.2} : calibrate::Vec3{0.6, 4, 0.3};
     shot.job.cam_from_set = calibrate::look_at({0.1, 0, 0.1}, towards, 0);
@@ -130,13 +137,8 @@ TEST(Texture, OfAFloorSeenAtASlantIsAsInTheReference) {
   scene.materials = {make_standard_material("tiles", tiles)};
   scene.meshes = {square({{{-20, 0, -1}, {20, 0, -1}, {20, 40, -1}, {-20, 40, -1}}}, 40, 0)};
   scene.instances.emplace_back();
-  MadeShot shot;
-  shot.scene = std::make_unique<render::Scene>(std::move(scene));
-  const double f = width * 0.9;
-  shot.directions = calibrate::make_direction_table(
-      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  MadeShot shot = shot_of(std::move(scene));
   shot.environment = made_sky(16, 0, 0);
-  shot.plate = capture::to_half(capture::make_image(height, width));
   // Along the tiles, and across them; the horizon lies above the picture.
   for (const double aside : {0.0, 4.0, -9.0}) {
     shot.job.cam_from_set = calibrate::look_at({0.2, 0, 0.2}, {aside, 8, -3.5}, 0);
@@ -177,11 +179,7 @@ MadeShot flaky_paint(float tilt) {
   panel->tangents.assign(4, {1, 0, 0, 1});
   scene.meshes = {panel};
   scene.instances.emplace_back();
-  MadeShot shot;
-  shot.scene = std::make_unique<render::Scene>(std::move(scene));
-  const double f = width * 0.9;
-  shot.directions = calibrate::make_direction_table(
-      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  MadeShot shot = shot_of(std::move(scene));
   // A soft box behind the viewer, whose reflection the flakes blur.
   shot.environment.radiance = capture::make_image(64, 128, 3);
   for (int y = 0; y < 64; ++y) {
@@ -193,7 +191,6 @@ MadeShot flaky_paint(float tilt) {
     }
   }
   render::smooth_for_reflections(shot.environment);
-  shot.plate = capture::to_half(capture::make_image(height, width));
   shot.job.cam_from_set = calibrate::look_at({0.3, 0, 0.2}, {0, 5, 0}, 0);
   return shot;
 }
