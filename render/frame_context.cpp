@@ -57,6 +57,9 @@ std::uint64_t transport_key(const FrameContext& context) {
     key.mix(light.direction), key.mix(light.irradiance);
     key.mix(light.spread), key.mix(std::uint64_t{light.compact});
   }
+  for (const RegionParts& parts : context.planned_table->parts) {
+    for (const Vec3f to : parts.directions) key.mix(to);
+  }
   for (const LocalLight& lamp : context.planned_table->lamps) {
     key.mix(lamp.position), key.mix(lamp.normal), key.mix(lamp.intensity);
     key.mix(lamp.area_m2), key.mix(std::uint64_t{lamp.ambient});
@@ -249,9 +252,6 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   if (!is_radiance(e.aa_tolerance) || !is_radiance(e.glint_contrast)) {
     throw std::invalid_argument("aa_tolerance and glint_contrast must be finite, and 0 or more");
   }
-  if (job.lights.lights.size() > most_lights) {
-    throw std::invalid_argument("a table holds at most " + std::to_string(most_lights) + " lights");
-  }
   if (!(e.accuracy >= 0 && e.accuracy <= 1)) throw std::invalid_argument("accuracy must be 0 to 1");
   if (e.max_depth < 0 || e.max_depth > 64) throw std::invalid_argument("max_depth must be 0 to 64");
   if (e.max_rays < 0) throw std::invalid_argument("max_rays must be 0 or more");
@@ -271,6 +271,14 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   for (const DirectionalLight& light : job.lights.lights) {
     if (!finite(light.direction) || !finite(light.irradiance) || !finite(light.planned)) {
       throw std::invalid_argument("a light of the table is not finite");
+    }
+  }
+  if (job.lights.parts.size() > job.lights.lights.size()) {
+    throw std::invalid_argument("a table has parts of more lights than it holds");
+  }
+  for (const RegionParts& parts : job.lights.parts) {
+    if (!std::ranges::all_of(parts.directions, finite)) {
+      throw std::invalid_argument("a part of a light of the table is not finite");
     }
   }
   if (job.lights.lamps.size() > most_lights) {
@@ -326,7 +334,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
   add_caustics(context, *planned_table);
   context.light_order = order_by_place(planned_table->lights);
-  context.soft_lights = SoftLights(planned_table->lights, e.soft_lights);
+  context.soft_lights = SoftLights(*planned_table, e.soft_lights);
   context.planned_table = std::move(planned_table);
   context.columns = (d.width + cell_size - 1) / cell_size;
   context.rows = (d.height + cell_size - 1) / cell_size;

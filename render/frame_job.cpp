@@ -6,7 +6,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t frame_job_magic = 0x394A4650;  // "PFJ9"
+constexpr std::uint32_t frame_job_magic = 0x414A4650;  // "PFJA"
 constexpr std::uint32_t tile_job_magic = 0x314A5450;   // "PTJ1"
 
 // Calls visit on every single number of an Effort, so that writing and reading cannot differ.
@@ -46,6 +46,7 @@ std::vector<std::byte> serialize(const FrameJob& job) {
     out.put(texture.stream), out.put(texture.time.count());
   }
   out.put_all(job.lights.lights);
+  out.put_all(job.lights.parts);
   out.put_all(job.lights.lamps);
   out.put(job.lights.version);
   out.put(job.lights.unseen_share), out.put(job.lights.error_estimate);
@@ -75,6 +76,7 @@ FrameJob parse_frame_job(std::span<const std::byte> bytes) {
     texture.time = capture::Time(in.get<capture::Time::rep>());
   }
   in.get_all(job.lights.lights);
+  in.get_all(job.lights.parts);
   in.get_all(job.lights.lamps);
   in.get(job.lights.version);
   in.get(job.lights.unseen_share), in.get(job.lights.error_estimate);

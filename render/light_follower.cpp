@@ -59,6 +59,7 @@ LightTable LightFollower::follow(const Environment& env, const LightFollowerSett
     light.irradiance = to_float(followed.irradiance);
     table.lights.push_back(light);
   }
+  table.parts = parts_;
   table.error_estimate = estimate_light_error(table.lights, env.radiance.height);
   return table;
 }
@@ -73,6 +74,9 @@ std::vector<RegionLight> LightFollower::make_anew(const Environment& env,
   for (const RegionLight& sum : sums)
     lights_.push_back(
         {.light = make_light(sum), .irradiance = sum.irradiance, .newest = sum.luminance});
+  std::vector<DirectionalLight> lights;
+  for (const Followed& followed : lights_) lights.push_back(followed.light);
+  parts_ = part_regions(regions_, map_, lights);
   averaged_frames_ = 0;
   ++version_;
   mark_compact();

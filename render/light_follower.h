@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "render/light_regions.h"
+#include "render/region_parts.h"
 
 namespace render {
 
@@ -52,6 +52,7 @@ class LightFollower {
 
   capture::Image map_;
   LightRegions regions_;
+  std::vector<RegionParts> parts_;
   CompactTexels compact_;
   LightTableSettings made_with_;
   int made_height_ = 0;  // of the environment

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "render/light_regions.h"
+#include "render/region_parts.h"
 
 namespace render {
 
@@ -64,6 +64,7 @@ LightTable make_light_table(const Environment& env, const LightTableSettings& se
   for (const RegionLight& region : sum_regions(regions, map, env.radiance)) {
     table.lights.push_back(make_light(region));
   }
+  table.parts = part_regions(regions, map, table.lights);
   table.error_estimate = estimate_light_error(table.lights, env.radiance.height);
   return table;
 }

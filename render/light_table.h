@@ -1,6 +1,8 @@
 // The light as a table of directional lights.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -18,6 +20,14 @@ struct DirectionalLight {
   Vec3f planned{};  // the irradiance by which sampling is decided (FrameInputs::planned); zero = as
                     // is
   friend bool operator==(const DirectionalLight&, const DirectionalLight&) = default;
+};
+
+// Directions all over the region that a light stands for; each of them has as much of its light.
+struct RegionParts {
+  static constexpr std::size_t side = 4;
+  static constexpr std::size_t count = side * side;
+  std::array<Vec3f, count> directions;  // unit; those that lie together in blocks lie so in the sky
+  friend bool operator==(const RegionParts&, const RegionParts&) = default;
 };
 
 inline constexpr std::uint32_t no_instance = ~0U;
@@ -60,6 +70,7 @@ std::optional<LampRay> ray_to_lamp(const LampReceiver& point, const LocalLight& 
 
 struct LightTable {
   std::vector<DirectionalLight> lights;
+  std::vector<RegionParts> parts;  // of the first lights; the regions of others count as discs
   std::vector<LocalLight> lamps;
   std::uint64_t version = 0;
   float unseen_share = 0;    // of the upward irradiance: filled, not measured

@@ -24,6 +24,28 @@ std::array<float, 2> on_disc(float u, float v) {
   return {radius * std::cos(angle), radius * std::sin(angle)};
 }
 
+// The parts of a region that is a disc, of the light of a number: turned from light to light, so
+// that what their parts miss does not add up.
+std::array<Vec3f, SoftLights::count> parts_of_disc(const DirectionalLight& light,
+                                                   std::size_t number) {
+  constexpr std::size_t side = SoftLights::side;
+  const Vec3f d = light.direction;
+  const Vec3f aside = std::abs(d.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0};
+  const Vec3f a = normalize(cross(aside, d)), b = cross(d, a);
+  const float turn = golden_angle * static_cast<float>(number);
+  const Vec3f right = a * std::cos(turn) + b * std::sin(turn), up = cross(d, right);
+  const float radius = further_out * std::tan(std::min(light.spread, widest_rad));
+  const auto place = [](std::size_t k) {
+    return (static_cast<float>(k) + 0.5F) * (2.0F / side) - 1;
+  };
+  std::array<Vec3f, SoftLights::count> parts;
+  for (std::size_t part = 0; part < parts.size(); ++part) {
+    const auto [u, v] = on_disc(place(part % side), place(part / side));
+    parts[part] = normalize(d + (right * u + up * v) * radius);
+  }
+  return parts;
+}
+
 // Of a direction on a Z curve over the octahedron that the sphere unfolds to, its corners at the
 // ground.
 std::uint32_t place_on_curve(Vec3f d) {
@@ -46,29 +68,17 @@ std::uint32_t place_on_curve(Vec3f d) {
 
 }  // namespace
 
-SoftLights::SoftLights(std::span<const DirectionalLight> lights, bool in_parts)
-    : regions_(lights.size()) {
-  for (std::size_t i = 0; i < lights.size(); ++i) {
-    const DirectionalLight& light = lights[i];
-    const Vec3f d = light.direction;
+SoftLights::SoftLights(const LightTable& table, bool in_parts) : regions_(table.lights.size()) {
+  for (std::size_t i = 0; i < table.lights.size(); ++i) {
+    const DirectionalLight& light = table.lights[i];
     Region& region = regions_[i];
-    region.range = {d, d};
+    region.range = {light.direction, light.direction};
     if (!in_parts || !has_parts(light)) continue;
     region.has = true;
-    const Vec3f aside = std::abs(d.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0};
-    const Vec3f a = normalize(cross(aside, d)), b = cross(d, a);
-    // Turned from light to light, so that what their parts miss does not add up.
-    const float turn = golden_angle * static_cast<float>(i);
-    const Vec3f right = a * std::cos(turn) + b * std::sin(turn), up = cross(d, right);
-    const float radius = further_out * std::tan(std::min(light.spread, widest_rad));
-    for (std::size_t part = 0; part < count; ++part) {
-      const auto place = [](std::size_t k) {
-        return (static_cast<float>(k) + 0.5F) * (2.0F / side) - 1;
-      };
-      const auto [u, v] = on_disc(place(part % side), place(part / side));
-      const Vec3f to = normalize(d + (right * u + up * v) * radius);
-      region.directions[part] = to;
-      DirectionRange& range = region.range;
+    region.directions =
+        i < table.parts.size() ? table.parts[i].directions : parts_of_disc(light, i);
+    DirectionRange& range = region.range;
+    for (const Vec3f to : region.directions) {
       range.lower = {std::min(range.lower.x, to.x), std::min(range.lower.y, to.y),
                      std::min(range.lower.z, to.z)};
       range.upper = {std::max(range.upper.x, to.x), std::max(range.upper.y, to.y),

@@ -22,8 +22,8 @@ struct DirectionRange {
 // After Keller and Heidrich, "Interleaved Sampling", EGWR 2001.
 class SoftLights {
  public:
-  static constexpr std::size_t side = 4;
-  static constexpr std::size_t count = side * side;
+  static constexpr std::size_t side = RegionParts::side;
+  static constexpr std::size_t count = RegionParts::count;
   static constexpr std::uint8_t middle = count;  // no part, but the middle of the region
 
   // Lights of compact sources have no parts: sources have lights enough of their own, and the
@@ -34,7 +34,7 @@ class SoftLights {
 
   SoftLights() = default;
   // If `in_parts` is not set, no light has parts.
-  explicit SoftLights(std::span<const DirectionalLight> lights, bool in_parts = true);
+  explicit SoftLights(const LightTable& table, bool in_parts = true);
 
   bool has(std::size_t light) const { return light < regions_.size() && regions_[light].has; }
   // The part that a pixel looks for: those of any 4x4 pixels are all of them, and pixels that are

@@ -468,6 +468,11 @@ TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
   refuse([](render::FrameJob& job) { job.effort.accuracy = 2; });
   refuse([](render::FrameJob& job) { job.effort.max_depth = -1; });
   refuse([](render::FrameJob& job) { job.effort.max_rays = -1; });
+  refuse([](render::FrameJob& job) { job.lights.parts.resize(job.lights.lights.size() + 1); });
+  refuse([](render::FrameJob& job) {
+    job.lights.parts.resize(1);
+    job.lights.parts[0].directions[3].y = std::nanf("");
+  });
   refuse([](render::FrameJob& job) { job.lights.lights[0].irradiance.x = std::nanf(""); });
   refuse([](render::FrameJob& job) {
     job.lights.lights.assign(render::most_compact_lights + 1, {{0, 0, 1}, {1, 1, 1}, 0, 1});

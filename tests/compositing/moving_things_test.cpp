@@ -80,7 +80,7 @@ TEST(MovedThings, MissNoPointThatTheyShade) {
     if (i % 4 == 1) table.lamps[0].position = from + (inside - from) * dice(1, 3);
     render::CellReach reach;
     reach.add_receiver(grid, from);
-    const render::SoftLights soft(table.lights);
+    const render::SoftLights soft(table);
     const render::MovedThings things({{middle - half, middle + half}}, grid, table, soft,
                                      reach.lit);
     told += things.may_change(reach);

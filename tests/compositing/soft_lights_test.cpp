@@ -67,7 +67,9 @@ TEST(SoftLights, LookAllOverTheirRegions) {
                                                         {{1, 0, 0}, {1, 1, 1}, 0.02F},
                                                         {{0.6F, 0, 0.8F}, {9, 9, 9}, 0.01F, 1},
                                                         {{0, 1, 0}, {1, 1, 1}, 0}}};
-  const SoftLights soft(lights);
+  render::LightTable table;
+  table.lights.assign(lights.begin(), lights.end());
+  const SoftLights soft(table);
   EXPECT_FALSE(soft.has(2)) << "a compact light has no parts";
   EXPECT_FALSE(soft.has(3)) << "nor has one that is no region";
   EXPECT_FALSE(soft.has(4));

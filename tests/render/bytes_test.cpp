@@ -27,6 +27,8 @@ FrameJob made_job() {
   job.textures = {{0, capture::Time(1)}, {1, capture::Time(2)}};
   job.lights.lights = {{{0, 0, 1}, {1, 2, 3}, 0.1F}, {{1, 0, 0}, {4, 5, 6}, 0.2F}};
   job.lights.lights[1].compact = 1;
+  job.lights.parts.resize(1);
+  for (Vec3f& to : job.lights.parts[0].directions) to = {0, 0.6F, 0.8F};
   job.lights.lamps = {{{1, 2, 3}, {0, 0, -1}, {7, 8, 9}, {1, 1, 2}, 0.25F, 1, 4, 5, 1}};
   job.lights.version = 5;
   job.match = {1.5F, 0.1F, -0.2F, 0.3F, 1, -0.1F, 0.05F, 0.15F, 0.5F};
