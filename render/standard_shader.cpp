@@ -28,7 +28,8 @@ class StandardShader final : public Shader {
              RaySink& rays) const override {
     for (ShadePoint* p : points) {
       const StandardParameters block = block_of(context.scene->materials[p->hit.material]);
-      const StandardSurface surface = standard_surface(block, *context.scene, p->hit, p->steps);
+      const Spread seen{as_wide(p->steps.a, p->blur_m), as_wide(p->steps.b, p->blur_m)};
+      const StandardSurface surface = standard_surface(block, *context.scene, p->hit, seen);
       const Vec3f view = -p->incoming;
       const StandardWeights weights = standard_weights(surface, view);
       constexpr float per_pi = 0.318309886F;
@@ -83,6 +84,11 @@ class StandardShader final : public Shader {
   }
 
  private:
+  // A step across what a sample sees, of all that a rough lobe sees there.
+  static Vec3f as_wide(Vec3f step, float blur_m) {
+    const float l = length(step);
+    return l > 0 ? step * (calibrate::hypotenuse(l, blur_m) / l) : step;
+  }
   static void mirror(
       const ShadePoint& p, Vec3f normal, Vec3f view, float roughness, Vec3f weight, RaySink& rays) {
     Vec3f direction = normalize(mirrored(view, normal));

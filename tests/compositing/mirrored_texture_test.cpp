@@ -42,7 +42,7 @@ MadeShot shot_of(render::SceneDescription scene) {
 struct ChequeredShot {
   MadeShot shot;
 
-  explicit ChequeredShot(int mirrors, float roughness = 0) {
+  explicit ChequeredShot(int mirrors, float roughness = 0, float repeats = 331.7F) {
     register_shaders();
     std::vector<std::uint8_t> texels;
     for (int y = 0; y < 16; ++y) {
@@ -69,7 +69,7 @@ struct ChequeredShot {
       scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
     };
     const float s = 30, far = -24;
-    add(square({{{-s, far, -s}, {s, far, -s}, {s, far, s}, {-s, far, s}}}, 331.7F, 0));
+    add(square({{{-s, far, -s}, {s, far, -s}, {s, far, s}, {-s, far, s}}}, repeats, 0));
     if (mirrors == 2) {  // a corner of two, which sends back where it comes from
       add(square({{{0, 4, -9}, {9, -5, -9}, {9, -5, 9}, {0, 4, 9}}}, 1, 1));
       add(square({{{0, 4, -9}, {-9, -5, -9}, {-9, -5, 9}, {0, 4, 9}}}, 1, 1));
@@ -116,6 +116,11 @@ double error_of(const MadeShot& shot) {
   capture::Image all = capture::make_image(height, width, 1);
   std::ranges::fill(all.pixels, 1.0F);
   return render::picture_error(capture::to_float(result.rgba), truth, all).relative_rms;
+}
+
+// Squares of .6 m, ten times as wide as pixels are there, and a lobe as wide as many of them.
+TEST(MirroredTexture, IsAsBlurredAsTheLobeOfARoughMirror) {
+  EXPECT_LT(error_of(ChequeredShot(1, 0.3F, 50).shot), 0.12) << "sharp, it would be about 1";
 }
 
 // A floor of tiles that reaches far away: pixels see strips of it, up to ten times as long as wide.
