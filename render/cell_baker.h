@@ -264,7 +264,6 @@ class CellBaker final : public RaySink {
   int neighbour_of(int i, const Further& f) const;
   CellMask edges() const;
   CellMask uncertain(int n) const;
-  bool is_uncertain(std::size_t k, int n) const;
   Vec3f spread_of_further(std::size_t k) const;
   void count_errors();
   Vec3f direction_in(int x, int y, const std::array<float, 2>& offset) const;

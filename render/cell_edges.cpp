@@ -21,6 +21,11 @@ constexpr int few_samples = 4;
 constexpr int pattern_middle = 1;
 constexpr std::size_t own_centre = 4;  // of a pixel's neighbours, row by row
 constexpr float blend_parts = 1024;    // of a blend of neighbours, in whole numbers
+constexpr float first_tolerance =
+    0.5F;  // of a pixel's first further samples, in terms of the effort's
+// Steps of light across the corner of a pixel matter, in terms of those across its sides: a tip
+// that no side shows covers little of it.
+constexpr float corner_contrast = 4;
 
 Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
@@ -177,11 +182,21 @@ void CellBaker::find_glints() {
     }
     if (!smooths_ && lit_unlike(a, b)) edge_[a] = edge_[b] = Edge::shadow;
   };
+  const auto compare_across = [&](std::size_t a, std::size_t b) {
+    if (smooths_ || !is_inside(a) || !is_inside(b)) return;
+    if (!(step_between(samples_[a].added, samples_[b].added) > corner_contrast * least)) return;
+    for (const std::size_t k : {a, b}) {
+      if (!takes_rays(k)) edge_[k] = Edge::surface;
+    }
+  };
   for (std::size_t y = 0; y < cell_size; ++y) {
     for (std::size_t x = 0; x < cell_size; ++x) {
       const std::size_t k = y * cell_size + x;
       if (x + 1 < cell_size) compare(k, k + 1);
       if (y + 1 < cell_size) compare(k, k + cell_size);
+      if (x + 1 == cell_size || y + 1 == cell_size) continue;
+      compare_across(k, k + cell_size + 1);
+      compare_across(k + 1, k + cell_size);
     }
   }
   for (int i = 0; i < around; ++i) {
@@ -368,32 +383,42 @@ CellMask CellBaker::edges() const {
   return mask;
 }
 
-// Pixels whose mean of `n` further samples is uncertain, and those beside them: what one pixel saw
-// of a small bright thing the next one may have missed.
+// Of pixels with `n` further samples, those that take more: where more would take the most away
+// from the picture's squared error. That is the variance of a sample over n, and falls by an n-th
+// of itself with one more; so of more samples a larger error is allowed. A pixel counts as varied
+// as those around it, for what one of them saw of a small bright thing the next one may have
+// missed.
 CellMask CellBaker::uncertain(int n) const {
+  std::array<float, cell_pixels> variances{};
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (!takes_rays(k) || counts_[k] == 0) continue;
+    const float degrees = std::max(static_cast<float>(counts_[k]) - 1, 1.0F);
+    variances[k] = std::max(largest(spread_of_further(k)), 0.0F) / degrees;
+  }
+  const float of_first = first_tolerance * effort_.aa_tolerance;
+  const auto samples_n = static_cast<float>(n);
+  const float most = of_first * of_first * samples_n * samples_n /
+                     static_cast<float>(std::max(effort_.aa_samples, 1));
   CellMask mask{};
   for (int k = 0; k < cell_pixels; ++k) {
-    if (!is_uncertain(static_cast<std::size_t>(k), n)) continue;
+    const auto own = static_cast<std::size_t>(k);
+    if (!takes_rays(own) || counts_[own] != n) continue;
+    float around = 0, pixels = 0;
     for (int y = std::max(0, k / cell_size - 1); y <= std::min(cell_size - 1, k / cell_size + 1);
          ++y) {
       for (int x = std::max(0, k % cell_size - 1); x <= std::min(cell_size - 1, k % cell_size + 1);
            ++x) {
         const auto i = static_cast<std::size_t>(y * cell_size + x);
-        if (edge_[i] != Edge::none && counts_[i] == n) mask[i / 64] |= std::uint64_t{1} << (i % 64);
+        if (!takes_rays(i)) continue;
+        around += variances[i];
+        ++pixels;
       }
+    }
+    if (std::max(variances[own], around / pixels) > most) {
+      mask[own / 64] |= std::uint64_t{1} << (own % 64);
     }
   }
   return mask;
-}
-
-// Whether the mean of a pixel's first `n` further samples may be off by more than is allowed. A
-// pixel that took no more than before stays as it is.
-bool CellBaker::is_uncertain(std::size_t k, int n) const {
-  if (counts_[k] != n) return false;
-  const auto samples_n = static_cast<float>(n);
-  const float tolerance = effort_.aa_tolerance;
-  return largest(spread_of_further(k)) >
-         tolerance * tolerance * samples_n * std::max(samples_n - 1, 1.0F);
 }
 
 // The squares of what a pixel's further samples differ from their mean by, added up.

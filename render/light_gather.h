@@ -70,6 +70,8 @@ struct GatherWorkspace {
   // can share.
   std::array<float, cell_pixels> sharp_m;
   CellMask same4, same2;  // pixels whose 4x4, 2x2 block is one smooth surface
+  // Of every 4x4 block that is one, on which sides the surface, or the cell, ends where it does.
+  std::array<std::uint8_t, 16> ends;
 };
 
 class Caustics;

@@ -23,7 +23,11 @@ inline int point_of(int word, int bit) { return word * 64 + bit; }
 // Whether two pixels show the same surface, and it is nearly flat between them.
 bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b);
 
-// Marks the blocks of a cell that are one smooth surface.
+// Sides of a block.
+inline constexpr unsigned ends_left = 1, ends_right = 2, ends_above = 4, ends_below = 8;
+inline constexpr unsigned both_ends = ends_left | ends_right;
+
+// Marks the blocks of a cell that are one smooth surface, and where that ends.
 void find_smooth_blocks(const Receivers& r, GatherWorkspace& w);
 
 // Pixels of one light, or lamp, whose visibility must be tested: see gather_cell.
@@ -110,8 +114,9 @@ class VisibilityFinder {
   }
 
   // The pixel that stands for a block: another one for each light. Where blocks are looked at more
-  // closely, it is an outermost one at the border of the cell, so that no shadow comes in unseen
-  // from the cell beside, and the two cells agree where they meet.
+  // closely, it is an outermost one where the surface ends beside the block, for things that touch
+  // cast narrow shadows, and at the border of the cell, so that no shadow comes in unseen from the
+  // cell beside, and the two cells agree where they meet.
   int first_of_block(std::uint32_t light, int word, int bx) const {
     auto any = static_cast<int>((light * 7 + light / 16) & 15);
     // Of lights that have parts, another one for each block: blocks side by side, of different
@@ -120,13 +125,31 @@ class VisibilityFinder {
       any ^= (bx / 4 & 1) * 2 + (word & 1) * 8 + bx / 8 + (word & 2) * 2;
     }
     if (block_ == 4) return bit_of(bx + (any & 3), any >> 2);
-    return bit_of(bx + outermost(bx / 4, any & 3), outermost(word, any >> 2));
+    return bit_of(bx + at_end(ends_across(word, bx), any & 3),
+                  at_end(ends_down(word, bx), any >> 2));
   }
-  // The same block's pixel towards the middle of the cell: thin shadows of bright light slip
-  // through where blocks' pixels are far apart.
-  static int second_of_block(std::uint32_t light, int word, int bx) {
+  // Of four pixels in a row, or a column, the one at the end; the first, if both are.
+  static int at_end(unsigned ends, int any) {
+    return (ends & ends_left) != 0 ? 0 : (ends & ends_right) != 0 ? 3 : any;
+  }
+  unsigned ends_across(int word, int bx) const {
+    return w_.ends[static_cast<std::size_t>(word * 4 + bx / 4)] & both_ends;
+  }
+  // As if the column were a row.
+  unsigned ends_down(int word, int bx) const {
+    return w_.ends[static_cast<std::size_t>(word * 4 + bx / 4)] / ends_above;
+  }
+  // The same block's pixel towards the middle of the cell, for thin shadows of bright light slip
+  // through where blocks' pixels are far apart; or the one at the other end.
+  int second_of_block(std::uint32_t light, int word, int bx) const {
     const auto any = static_cast<int>((light * 7 + light / 16) & 15);
-    return bit_of(bx + outermost(3 - bx / 4, any & 3), outermost(3 - word, any >> 2));
+    const int x = ends_across(word, bx) == both_ends ? 3 : outermost(3 - bx / 4, any & 3);
+    const int y = ends_down(word, bx) == both_ends ? 3 : outermost(3 - word, any >> 2);
+    return bit_of(bx + x, y);
+  }
+  bool asks_twice(bool compact, int word, int bx) const {
+    const bool narrow = ends_across(word, bx) == both_ends || ends_down(word, bx) == both_ends;
+    return block_ < 4 && (compact || narrow);
   }
   // Of four pixels, in the first to last of four blocks.
   static int outermost(int block, int any) { return block == 0 ? 0 : block == 3 ? 3 : any; }
@@ -146,7 +169,9 @@ class VisibilityFinder {
           const std::uint64_t bits = block4 << bx;
           if ((lit & w_.same4[wi] & bits) != bits) continue;
           test(first, i, word, first_of_block(light, word, bx));
-          if (compact && block_ < 4) test(first, i, word, second_of_block(light, word, bx));
+          if (asks_twice(compact, word, bx)) {
+            test(first, i, word, second_of_block(light, word, bx));
+          }
           rest &= ~bits;
         }
       }
