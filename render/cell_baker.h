@@ -249,6 +249,10 @@ class CellBaker final : public RaySink {
 
   // cell_edges.cpp
   Met met_at(int i) const;
+  // What the centre of a pixel met.
+  const Met& met_by(std::size_t k) const {
+    return met_[(k / cell_size + 1) * ring_size + k % cell_size + 1];
+  }
   void keep_centres();
   void trace_ring();
   void shade_ring();

@@ -21,10 +21,10 @@ constexpr int few_samples = 4;
 constexpr int pattern_middle = 1;
 constexpr std::size_t own_centre = 4;  // of a pixel's neighbours, row by row
 constexpr float blend_parts = 1024;    // of a blend of neighbours, in whole numbers
-constexpr float first_tolerance =
-    0.5F;  // of a pixel's first further samples, in terms of the effort's
-// Steps of light across the corner of a pixel matter, in terms of those across its sides: a tip
-// that no side shows covers little of it.
+// Of a pixel's first further samples, in terms of the effort's.
+constexpr float first_tolerance = 0.5F;
+// Steps of light across the corner of a pixel from one surface to another matter, in terms of those
+// across its sides: a tip that no side shows covers little of it.
 constexpr float corner_contrast = 4;
 
 Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
@@ -185,6 +185,8 @@ void CellBaker::find_glints() {
   const auto compare_across = [&](std::size_t a, std::size_t b) {
     if (smooths_ || !is_inside(a) || !is_inside(b)) return;
     if (!(step_between(samples_[a].added, samples_[b].added) > corner_contrast * least)) return;
+    // Of one surface, further rays would find what its centres have.
+    if (continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera)) return;
     for (const std::size_t k : {a, b}) {
       if (!takes_rays(k)) edge_[k] = Edge::surface;
     }
@@ -213,13 +215,10 @@ void CellBaker::find_glints() {
 // Whether the light that arrives at two neighbours of one surface shows by more than the effort
 // allows that a shadow ends between them.
 bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
-  const auto met = [&](std::size_t k) -> const Met& {
-    return met_[(k / cell_size + 1) * ring_size + k % cell_size + 1];
-  };
   const CellMask& receiving = transport_->receiving;
   const auto receives = [&](std::size_t k) { return (receiving[k / 64] >> (k % 64) & 1) != 0; };
   if (!receives(a) || !receives(b) ||
-      !continuous(met(a), met(b), frame_->pixel_angle, frame_->camera))
+      !continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera))
     return false;
   const auto shown = [&](std::size_t k) {
     const Light& light = light_[k];
@@ -385,20 +384,20 @@ CellMask CellBaker::edges() const {
 
 // Of pixels with `n` further samples, those that take more: where more would take the most away
 // from the picture's squared error. That is the variance of a sample over n, and falls by an n-th
-// of itself with one more; so of more samples a larger error is allowed. A pixel counts as varied
-// as those around it, for what one of them saw of a small bright thing the next one may have
-// missed.
+// of itself with one more; so of more samples a larger error is allowed, by the root of their
+// number. A pixel counts as varied as the mean of those around it, or as it is itself, if that is
+// more: what one of them saw of a small bright thing the next one may have missed.
 CellMask CellBaker::uncertain(int n) const {
   std::array<float, cell_pixels> variances{};
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (!takes_rays(k) || counts_[k] == 0) continue;
+    if (!takes_rays(k)) continue;
     const float degrees = std::max(static_cast<float>(counts_[k]) - 1, 1.0F);
     variances[k] = std::max(largest(spread_of_further(k)), 0.0F) / degrees;
   }
   const float of_first = first_tolerance * effort_.aa_tolerance;
   const auto samples_n = static_cast<float>(n);
-  const float most = of_first * of_first * samples_n * samples_n /
-                     static_cast<float>(std::max(effort_.aa_samples, 1));
+  const float most =
+      of_first * of_first * samples_n * samples_n / static_cast<float>(effort_.aa_samples);
   CellMask mask{};
   for (int k = 0; k < cell_pixels; ++k) {
     const auto own = static_cast<std::size_t>(k);

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "render/lobe_filter.h"
+#include "render/region_parts.h"
 
 namespace render {
 namespace {

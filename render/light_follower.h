@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "render/region_parts.h"
+#include "render/light_regions.h"
 
 namespace render {
 

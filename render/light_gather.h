@@ -70,7 +70,7 @@ struct GatherWorkspace {
   // can share.
   std::array<float, cell_pixels> sharp_m;
   CellMask same4, same2;  // pixels whose 4x4, 2x2 block is one smooth surface
-  // Of every 4x4 block that is one, on which sides the surface, or the cell, ends where it does.
+  // Of every 4x4 block that is one, the sides on which the surface ends with it, or the cell does.
   std::array<std::uint8_t, 16> ends;
 };
 
@@ -102,8 +102,10 @@ struct LightContext {
 
 // Finds what the pixels of a cell see, and adds up their light. Shadow rays go to
 // one pixel of every 4x4 block of a smooth surface first, another for each light, but an outermost
-// one at the cell's border; where blocks disagree with their neighbours, to their 2x2 blocks or
-// pixels, as the effort's interleave asks; for lights that have parts, all over the cell.
+// one at the cell's border and where the surface ends beside the block, and to two of compact
+// lights and of surfaces that end on both sides; where blocks disagree with their neighbours, to
+// their 2x2 blocks or pixels, as the effort's interleave asks; for lights that have parts, all over
+// the cell.
 void gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "render/light_regions.h"
 #include "render/region_parts.h"
 
 namespace render {

@@ -27,7 +27,7 @@ struct Box {
   int x0, x1, y0, y1;
 };
 
-// Of the texels of each region; a map without any has none.
+// About the texels of each region; empty, the other way round, where it has none.
 std::vector<Box> boxes_of(const LightRegions& regions) {
   std::vector<Box> boxes(regions.count, {2 * regions.height, 0, regions.height, 0});
   if (boxes.empty()) return boxes;
@@ -82,6 +82,11 @@ class RegionCutter {
       : regions_(regions), map_(map), texel_rad_(pi / regions.height) {}
 
   RegionParts parts(std::size_t light, const DirectionalLight& of, const Box& box) {
+    if (box.x0 >= box.x1) {
+      RegionParts middle;
+      middle.directions.fill(of.direction);
+      return middle;
+    }
     take_energies(light, box);
     const double middle_rad = (box.y0 + box.y1) / 2.0 * texel_rad_;
     const bool wide = columns_ * std::sin(middle_rad) >= rows_;
@@ -101,7 +106,7 @@ class RegionCutter {
  private:
   void take_energies(std::size_t light, const Box& box) {
     columns_ = box.x1 - box.x0, rows_ = box.y1 - box.y0;
-    energy_.assign(size(std::max(columns_, 0)) * size(std::max(rows_, 0)), 0);
+    energy_.assign(size(columns_) * size(rows_), 0);
     for (int y = 0; y < rows_; ++y) {
       const double solid_angle =
           texel_solid_angle(box.y0 + y, 2 * regions_.height, regions_.height);

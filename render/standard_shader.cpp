@@ -84,10 +84,11 @@ class StandardShader final : public Shader {
   }
 
  private:
-  // A step across what a sample sees, of all that a rough lobe sees there.
+  // A step across what a sample sees, of all that a rough lobe sees there, which rays that stand
+  // for a part of one have in their steps already.
   static Vec3f as_wide(Vec3f step, float blur_m) {
     const float l = length(step);
-    return l > 0 ? step * (calibrate::hypotenuse(l, blur_m) / l) : step;
+    return l > 0 ? step * (std::max(l, blur_m) / l) : step;
   }
   static void mirror(
       const ShadePoint& p, Vec3f normal, Vec3f view, float roughness, Vec3f weight, RaySink& rays) {

@@ -120,7 +120,7 @@ class VisibilityFinder {
   int first_of_block(std::uint32_t light, int word, int bx) const {
     auto any = static_cast<int>((light * 7 + light / 16) & 15);
     // Of lights that have parts, another one for each block: blocks side by side, of different
-    // quarters.
+    // quarters, but where they end.
     if (!lamps_ && context_.has_parts(light)) {
       any ^= (bx / 4 & 1) * 2 + (word & 1) * 8 + bx / 8 + (word & 2) * 2;
     }

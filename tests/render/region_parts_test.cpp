@@ -136,6 +136,17 @@ TEST(RegionParts, AreSoundWhateverTheMap) {
   }
 }
 
+TEST(RegionParts, OfARegionWithoutTexelsAreItsMiddle) {
+  LightRegions regions{1, {0, 0}, 2, {0, 0}};
+  const std::vector<DirectionalLight> lights{{.direction = {0, 0, 1}}, {.direction = {0, 1, 0}}};
+  const std::vector<RegionParts> parts =
+      part_regions(regions, capture::make_image(1, 2, 3), lights);
+  ASSERT_EQ(parts.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (const Vec3f to : parts[i].directions) EXPECT_EQ(to, lights[i].direction);
+  }
+}
+
 TEST(RegionParts, StayAsLongAsDirectionsDo) {
   LightFollower follower;
   const Environment env = make_sun_and_sky({}, 128);
