@@ -12,36 +12,35 @@
 namespace render {
 namespace {
 
-constexpr float half_court = court_m / 2;
-constexpr float court_front = court_middle_y - half_court;
-constexpr float court_back = court_middle_y + half_court;
+constexpr float half_paved = court_m / 2;
+constexpr float front_y = court_middle_y - half_paved;
+constexpr float back_y = court_middle_y + half_paved;
 constexpr float kerb_height = 0.14F;
-constexpr float wall_y = court_back + 2.2F;
+constexpr float wall_y = back_y + 2.2F;
 constexpr float wall_height = 2.4F;
 constexpr float far_m = 150;  // where the ground ends
 
 // Rough ground hides its own glints: hardly any mirrored light leaves it.
-constexpr float rough_ground = 0.1F;
+constexpr float rough_paving = 0.1F;
 
-constexpr std::array<float, 3> white{1, 1, 1};
+constexpr std::array<float, 3> pale{1, 1, 1};
 
-void add_ground(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
+void add_paving(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
   const auto asphalt = court.add(make_court_texture(texture_size, seed));
   const auto paving = court.add(make_paving_texture(std::max(texture_size / 4, 1), seed + 1));
-  court.add("court",
-            make_rectangle({-half_court, court_front, 0}, {court_m, 0, 0}, {0, court_m, 0}, 0),
-            white, 0.85F, asphalt, rough_ground);
+  court.add("court", make_rectangle({-half_paved, front_y, 0}, {court_m, 0, 0}, {0, court_m, 0}, 0),
+            pale, 0.85F, asphalt, rough_paving);
   constexpr float slab_tile = 2.4F;
   const float depth = 2 * far_m;
   Mesh around =
-      make_rectangle({-far_m, court_back, kerb_height}, {depth, 0, 0}, {0, far_m, 0}, slab_tile);
+      make_rectangle({-far_m, back_y, kerb_height}, {depth, 0, 0}, {0, far_m, 0}, slab_tile);
   append(around,
-         make_rectangle({-far_m, court_front - far_m, 0}, {depth, 0, 0}, {0, far_m, 0}, slab_tile));
-  append(around, make_rectangle({-far_m, court_front, kerb_height}, {far_m - half_court, 0, 0},
+         make_rectangle({-far_m, front_y - far_m, 0}, {depth, 0, 0}, {0, far_m, 0}, slab_tile));
+  append(around, make_rectangle({-far_m, front_y, kerb_height}, {far_m - half_paved, 0, 0},
                                 {0, court_m, 0}, slab_tile));
-  append(around, make_rectangle({half_court, court_front, kerb_height}, {far_m - half_court, 0, 0},
+  append(around, make_rectangle({half_paved, front_y, kerb_height}, {far_m - half_paved, 0, 0},
                                 {0, court_m, 0}, slab_tile));
-  court.add("paving", std::move(around), white, 0.9F, paving, rough_ground);
+  court.add("paving", std::move(around), pale, 0.9F, paving, rough_paving);
 }
 
 void add_concrete(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
@@ -54,14 +53,14 @@ void add_concrete(MadeSceneBuilder& court, int texture_size, std::uint32_t seed)
     const float from = static_cast<float>(i) * stone;
     const Mesh piece =
         make_box({gap, 0, -0.1F}, {stone - gap, 0.16F, kerb_height + 0.01F}, 0.018F, 1.3F);
-    append(kerbs, piece, {-half_court + from, court_back, 0});
-    for (const float side : {-half_court - 0.16F, half_court}) {
+    append(kerbs, piece, {-half_paved + from, back_y, 0});
+    for (const float side : {-half_paved - 0.16F, half_paved}) {
       append(kerbs,
              make_box({0, gap, -0.1F}, {0.16F, stone - gap, kerb_height + 0.01F}, 0.018F, 1.3F),
-             {side, court_front + from, 0});
+             {side, front_y + from, 0});
     }
   }
-  court.add("kerb", std::move(kerbs), white, 0.8F, concrete, rough_ground);
+  court.add("kerb", std::move(kerbs), pale, 0.8F, concrete, rough_paving);
 
   Mesh panels;
   constexpr float tile = wall_height;  // two panels wide
@@ -71,12 +70,12 @@ void add_concrete(MadeSceneBuilder& court, int texture_size, std::uint32_t seed)
     append(panels, make_rectangle({tile * static_cast<float>(i), wall_y, kerb_height}, {tile, 0, 0},
                                   {0, 0, wall_height}, 0));
   }
-  court.add("wall", std::move(panels), white, 0.75F, wall, rough_ground);
+  court.add("wall", std::move(panels), pale, 0.75F, wall, rough_paving);
   court.add("coping",
             make_box({first_panel * tile, wall_y - 0.05F, kerb_height + wall_height},
                      {last_panel * tile, wall_y + 0.35F, kerb_height + wall_height + 0.09F}, 0.015F,
                      1.1F),
-            white, 0.8F, concrete, rough_ground);
+            pale, 0.8F, concrete, rough_paving);
 }
 
 void add_things(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
@@ -92,7 +91,7 @@ void add_things(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
          {-5.5F, 6.05F, 0.8F}, 0.2F);
   append(crates, make_box({-0.35F, -0.35F, 0}, {0.35F, 0.35F, 0.7F}, 0.012F, 0.8F),
          {-6.7F, 6.3F, 0}, 0.5F);
-  court.add("crates", std::move(crates), white, 0.7F, boards);
+  court.add("crates", std::move(crates), pale, 0.7F, boards);
 
   const MadeCard& card = court_card;
   Mesh sheet;
@@ -121,18 +120,18 @@ void add_things(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
       {{0.055F, 0}, {0.055F, 0.86F}, {0.04F, 0.9F}, {0, 0.9F}}};
   for (int i = -2; i <= 2; ++i) {
     append(posts, make_lathe(post, 32, 1),
-           {2.6F * static_cast<float>(i) + 1.3F, court_back + 0.5F, kerb_height});
+           {2.6F * static_cast<float>(i) + 1.3F, back_y + 0.5F, kerb_height});
   }
   court.add("bollards", std::move(posts), {0.55F, 0.40F, 0.03F}, 0.4F);
 
   Mesh lamp;
   constexpr std::array<std::array<float, 2>, 6> pole{
       {{0.11F, 0}, {0.11F, 0.5F}, {0.07F, 0.55F}, {0.05F, 5.4F}, {0.02F, 5.45F}, {0, 5.45F}}};
-  append(lamp, make_lathe(pole, 40, 1), {6.4F, court_back + 1.0F, kerb_height});
+  append(lamp, make_lathe(pole, 40, 1), {6.4F, back_y + 1.0F, kerb_height});
   append(lamp, make_box({-1.2F, -0.03F, 5.3F}, {0, 0.03F, 5.36F}, 0.008F, 1),
-         {6.4F, court_back + 1.0F, kerb_height});
+         {6.4F, back_y + 1.0F, kerb_height});
   append(lamp, make_box({-1.75F, -0.13F, 5.25F}, {-1.15F, 0.13F, 5.37F}, 0.03F, 1),
-         {6.4F, court_back + 1.0F, kerb_height});
+         {6.4F, back_y + 1.0F, kerb_height});
   court.add("lamp post", std::move(lamp), {0.55F, 0.56F, 0.57F}, 0.5F, -1, 1, 1);
 }
 
@@ -140,7 +139,7 @@ void add_things(MadeSceneBuilder& court, int texture_size, std::uint32_t seed) {
 
 SceneDescription make_court(const MadeCourtSettings& settings) {
   MadeSceneBuilder court;
-  add_ground(court, settings.texture_size, settings.seed);
+  add_paving(court, settings.texture_size, settings.seed);
   add_concrete(court, settings.texture_size, settings.seed);
   add_things(court, settings.texture_size, settings.seed);
   return court.take();
