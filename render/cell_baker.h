@@ -100,14 +100,31 @@ class CellBaker final : public RaySink {
   enum class Edge : std::uint8_t {
     none,
     surface,  // another surface begins: those that meet what a neighbour met share its radiance
-    glint,    // mirrored light changes quickly: they share only the light that arrives
-    shadow,   // the light that arrives does: they share nothing
+    glint,    // mirrored light changes quickly, or a sharp shadow ends: they share only the light
+              // that arrives, of sources that all centres about see alike
+    shadow,   // the light that arrives does, of other sources: they share nothing
     blend,    // light changes, but too little for rays yet: neighbours are blended
   };
 
   struct Further {
     std::uint16_t pixel;
     std::uint16_t index;  // in the frame's pattern
+  };
+
+  // A source that casts sharp shadows, which centres about a pixel see unlike each other.
+  struct Doubt {
+    std::uint16_t number;  // among the compact lights, or the cell's lamps
+    bool is_lamp;
+    friend bool operator==(const Doubt&, const Doubt&) = default;
+  };
+
+  // What a point has of such a source by its centre, and what by itself: irradiance per source's if
+  // nothing is in the way, and what passes.
+  struct AskedAgain {
+    std::uint16_t number = 0;  // of the light table's lights, or its lamps
+    bool is_lamp = false;
+    float per_source = 0, per_source_centre = 0;
+    Vec3f passed{}, passed_centre{};
   };
 
   // What a cone sees of the environment.
@@ -201,6 +218,18 @@ class CellBaker final : public RaySink {
   void add_point_lamps(std::span<const std::uint16_t> point_of_receiver);
   void catch_lamps(const ShadePoint& p, std::size_t light_point, Vec3f irradiance);
 
+  // cell_doubts.cpp
+  Vec3f compact_at(std::size_t c, std::size_t centre) const;
+  Vec3f lamp_at(std::size_t place, std::size_t centre) const;
+  template <class OfLight, class OfLamp>
+  void for_each_doubt(std::size_t a, std::size_t b, OfLight&& light, OfLamp&& lamp) const;
+  Vec3f light_in_doubt(std::size_t a, std::size_t b) const;
+  void find_doubts(std::size_t pixel, std::size_t centre);
+  void settle_doubts(int count);
+  void ask_again(const ShadePoint& p, std::size_t receiver, std::size_t centre, const Doubt& doubt);
+  void flush_asked();
+  void add_asked(const ShadePoint& p, const AskedAgain& asked);
+
   // cell_video.cpp
   void add_video(const ShadePoint& p);
 
@@ -231,6 +260,7 @@ class CellBaker final : public RaySink {
   void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
   void find_compact_tints();
   void add_compact(const Lobe& lobe, std::size_t light, Vec3f passed);
+  void mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share);
   bool mirrors_lamps(const ShadePoint& from, const NewRay& ray) const;
   bool glows_by_lamps(const ShadePoint& p) const;
   void add_lamps_of_centre(const Lobe& lobe, std::size_t centre);
@@ -264,16 +294,21 @@ class CellBaker final : public RaySink {
   void blend_neighbours();
   void take_from_centre(std::size_t k, int dx, int dy, int times);
   void trace_further(int count);
+  float share_of_cone() const;
   void finish_further(int count);
+  bool bent_mirror(std::size_t k, const Met& here, const Met& there) const;
   int neighbour_of(int i, const Further& f) const;
   CellMask edges() const;
   CellMask uncertain(int n) const;
-  Vec3f spread_of_further(std::size_t k) const;
+  float spread_of(std::size_t k, const std::array<Vec3f, cell_pixels>& squares) const;
+  float variance_of_further(std::size_t k) const;
   void count_errors();
   Vec3f direction_in(int x, int y, const std::array<float, 2>& offset) const;
   bool takes_rays(std::size_t k) const { return edge_[k] != Edge::none && edge_[k] != Edge::blend; }
   void clear_further(std::size_t k);
   void add_further(std::size_t k, const Sample& sample, int times);
+  void add_to_batch(const Further& f, const Sample& sample);
+  void end_batch();
 
   RayStream stream_;
   GatherWorkspace gather_;
@@ -303,6 +338,8 @@ class CellBaker final : public RaySink {
   std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
   std::vector<PointLamp> reached_;
+  std::vector<Doubt> doubts_;  // about one pixel
+  std::vector<AskedAgain> asked_;
   std::vector<CellTransport::LightTerm> lamp_terms_;  // many times the transport's
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
@@ -325,8 +362,16 @@ class CellBaker final : public RaySink {
       answers_light_;    // points around, before they were made not to
   CellTransport aside_;  // of the pixels around: it tells nothing of the cell
   std::array<Edge, cell_pixels> edge_;
-  std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_;  // of further samples
-  std::array<std::uint16_t, cell_pixels> counts_;
+  std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_,
+      batch_squares_;  // of further samples
+  std::array<std::uint16_t, cell_pixels> counts_, batches_;
+  // Further samples of a pixel that follow each other, added up.
+  struct Batch {
+    std::size_t pixel = 0;
+    int number = 0, count = 0;
+    Vec3f shown{}, behind{};
+  };
+  Batch batch_;
   std::array<std::uint16_t, cell_pixels> index_of_slot_;  // of further samples, in the pattern
   int samples_each_ = 1;  // of the pixels that take further ones now
   std::array<std::array<std::uint16_t, 9>, cell_pixels> borrowed_;  // by neighbour, row by row

@@ -12,10 +12,12 @@ namespace render {
 namespace {
 
 constexpr float display_limit = 4;  // brighter light than this, in display white, looks alike
+constexpr float sample_limit = 64;  // ... where a sixteenth of a pixel is as bright
 constexpr float plate_contrast =
     0.4F;                         // by which virtual things are taken to differ from the plate
 constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
 constexpr Scene::Surface no_hit{~0U, ~0U};
+constexpr float alike_mirrors = 0.99F;  // cosine between normals: what they mirror is alike
 // Of so few further samples, the one in the middle of the pattern would be the centre's once more.
 constexpr int few_samples = 4;
 constexpr int pattern_middle = 1;
@@ -31,6 +33,14 @@ Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
   return {std::min(v.x, display_limit), std::min(v.y, display_limit), std::min(v.z, display_limit)};
 }
+// What counts of a sample's light for how uncertain its pixel is.
+Vec3f counted(Vec3f v) {
+  return {std::min(v.x, sample_limit), std::min(v.y, sample_limit), std::min(v.z, sample_limit)};
+}
+// How many samples that follow each other in the pattern are looked at together, of so many first
+// ones: so that there are four such batches, or what can be.
+constexpr int batch_of(int aa_samples) { return aa_samples >= 16 ? 4 : aa_samples >= 8 ? 2 : 1; }
+
 // By how much the light of two pixels differs, as eyes see it.
 float step_between(Vec3f a, Vec3f b) {
   a = clipped(a), b = clipped(b);
@@ -213,20 +223,30 @@ void CellBaker::find_glints() {
 }
 
 // Whether the light that arrives at two neighbours of one surface shows by more than the effort
-// allows that a shadow ends between them.
+// allows that a shadow ends between them, other than sharp ones, which further samples find.
 bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
-  const CellMask& receiving = transport_->receiving;
-  const auto receives = [&](std::size_t k) { return (receiving[k / 64] >> (k % 64) & 1) != 0; };
-  if (!receives(a) || !receives(b) ||
+  const CellTransport& t = *transport_;
+  if (!in(t.receiving, a) || !in(t.receiving, b) ||
       !continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera))
     return false;
-  const auto shown = [&](std::size_t k) {
+  const auto shown = [&](std::size_t k, Vec3f in_doubt) {
     const Light& light = light_[k];
-    return transport_->diffuse[k] * (light.arriving + light.lamps) +
-           transport_->shadow[k] * passing(light.open, light.open - light.arriving) *
-               plate_contrast;
+    return t.diffuse[k] * (light.arriving + light.lamps - in_doubt) +
+           t.shadow[k] * passing(light.open, light.open - light.arriving) * plate_contrast;
   };
-  return largest(abs(clipped(shown(a)) - clipped(shown(b)))) > effort_.glint_contrast;
+  const auto differ = [&](Vec3f in_doubt) {
+    return largest(abs(clipped(shown(a, in_doubt)) - clipped(shown(b, {})))) >
+           effort_.glint_contrast;
+  };
+  if (!differ({})) return false;
+  const bool catches = t.shadow[a] != Vec3f{} || t.shadow[b] != Vec3f{};
+  return catches || differ(light_in_doubt(a, b));
+}
+
+// Whether a pixel's centre, which shows the same surface, mirrors another part of what is about.
+bool CellBaker::bent_mirror(std::size_t k, const Met& here, const Met& there) const {
+  const bool mirrors = sent_[k] > 0 || samples_[k].added != first_[k];
+  return mirrors && dot(here.normal, there.normal) < alike_mirrors;
 }
 
 // The nearest pixel whose centre shows the same surface as a further_ ray met_, or -1.
@@ -234,6 +254,7 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
   const Met here = met_at(index);
   const int px = f.pixel % cell_size, py = f.pixel / cell_size;
   const auto& offset = frame_->pattern[f.index];
+  const bool shares = edge_[f.pixel] == Edge::surface;  // all of its radiance
   float best = 1e9F;
   int found = -1;
   for (int dy = -1; dy <= 1; ++dy) {
@@ -247,6 +268,7 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
       if (distance >= best) continue;
       const Met& there = met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)];
       if (!continuous(here, there, frame_->pixel_angle, frame_->camera)) continue;
+      if (shares && bent_mirror(static_cast<std::size_t>(k), here, there)) continue;
       best = distance;
       found = k;
     }
@@ -273,25 +295,35 @@ void CellBaker::take_from_centre(std::size_t k, int dx, int dy, int times) {
   taken = static_cast<std::uint16_t>(taken + times);
 }
 
+// How wide the cone of a further sample is, of its pixel's. The first ones share the pixel's area
+// among them. Where more are taken, things are thin, and most of them are lines, of which each
+// sample crosses another place: their cones are as narrow as they lie apart across a line. Wider
+// ones would mirror a bent edge as if all around were bent as much, and lose most of its glint.
+float CellBaker::share_of_cone() const {
+  const auto n = static_cast<float>(samples_each_);
+  return samples_each_ > effort_.aa_samples ? 1 / n : 1 / std::sqrt(n);
+}
+
 void CellBaker::finish_further(int count) {
-  const float finer = 1 / std::sqrt(static_cast<float>(samples_each_));
+  const float finer = share_of_cone();
   trace_further(count);
   int shaded = 0;
   std::size_t leaving = 0;
-  std::array<std::uint16_t, stream_rays> pixel_of;
+  std::array<std::uint16_t, stream_rays> sample_of_ray;
   std::size_t used = 0;
   for (int i = 0; i < count; ++i) {
     const Further& f = further_[static_cast<std::size_t>(i)];
     const int neighbour = neighbour_of(i, f);
     if (neighbour >= 0 && edge_[f.pixel] == Edge::surface) {
+      sample_of_ray[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(neighbour);
       take_from_centre(f.pixel, neighbour % cell_size - f.pixel % cell_size,
                        neighbour / cell_size - f.pixel / cell_size, 1);
       continue;
     }
     const std::size_t slot = cell_pixels + used;
     samples_[slot] = {};
-    index_of_slot_[used] = f.index;
-    pixel_of[used++] = f.pixel;
+    index_of_slot_[used++] = f.index;
+    sample_of_ray[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(slot);
     const bool hit = stream_.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID;
     ShadePoint& p =
         hit ? points_[static_cast<std::size_t>(shaded++)] : points_[stream_rays - ++leaving];
@@ -303,11 +335,35 @@ void CellBaker::finish_further(int count) {
   }
   run_background({group_.data(), leaving});
   shade_points(shaded, false);
+  settle_doubts(shaded);
   lender_.fill(-1);
   bounce();
-  for (std::size_t i = 0; i < used; ++i) {
-    add_further(pixel_of[i], samples_[cell_pixels + i], 1);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const Sample& sample = samples_[sample_of_ray[i]];
+    if (sample_of_ray[i] >= cell_pixels) add_further(further_[i].pixel, sample, 1);
+    add_to_batch(further_[i], sample);
   }
+  end_batch();
+}
+
+// Samples that follow each other in the pattern are spread over the pixel by themselves. What such
+// batches differ by tells how far off the mean of all may be: of an edge much less than what its
+// samples differ by would make believe.
+void CellBaker::add_to_batch(const Further& f, const Sample& sample) {
+  const int number = f.index / batch_of(effort_.aa_samples);
+  if (batch_.count > 0 && (batch_.pixel != f.pixel || batch_.number != number)) end_batch();
+  batch_.pixel = f.pixel, batch_.number = number;
+  ++batch_.count;
+  batch_.shown += counted(sample.added);
+  batch_.behind += sample.plate * plate_contrast;
+}
+
+void CellBaker::end_batch() {
+  if (batch_.count == 0) return;
+  batch_squares_[batch_.pixel] += (batch_.shown * batch_.shown + batch_.behind * batch_.behind) *
+                                  (1 / static_cast<float>(batch_.count));
+  ++batches_[batch_.pixel];
+  batch_ = {};
 }
 
 // More camera rays in pixels that an edge crosses. While edges are only smoothed, these are edges
@@ -322,6 +378,7 @@ void CellBaker::sample_edges() {
     if (!takes_centre) continue;
     borrowed_[k][own_centre] = 1;
     add_further(k, samples_[k], 1);
+    ++batches_[k];
   }
   int first = 0;
   for (int end = effort_.aa_samples; end <= samples_max; first = end, end *= 4) {
@@ -391,8 +448,7 @@ CellMask CellBaker::uncertain(int n) const {
   std::array<float, cell_pixels> variances{};
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!takes_rays(k)) continue;
-    const float degrees = std::max(static_cast<float>(counts_[k]) - 1, 1.0F);
-    variances[k] = std::max(largest(spread_of_further(k)), 0.0F) / degrees;
+    variances[k] = variance_of_further(k);
   }
   const float of_first = first_tolerance * effort_.aa_tolerance;
   const auto samples_n = static_cast<float>(n);
@@ -420,20 +476,35 @@ CellMask CellBaker::uncertain(int n) const {
   return mask;
 }
 
-// The squares of what a pixel's further samples differ from their mean by, added up.
-Vec3f CellBaker::spread_of_further(std::size_t k) const {
+// The squares of what a pixel's further samples, or batches of them, differ from their mean by,
+// added up. Not less than rounding leaves.
+float CellBaker::spread_of(std::size_t k, const std::array<Vec3f, cell_pixels>& squares) const {
   const Vec3f shown = shown_sum_[k], behind = behind_sum_[k];
-  return squares_[k] - (shown * shown + behind * behind) * (1 / static_cast<float>(counts_[k]));
+  const Vec3f of_mean = (shown * shown + behind * behind) * (1 / static_cast<float>(counts_[k]));
+  return std::max(largest(squares[k] - of_mean), 0.0F);
+}
+
+// Of a pixel's further samples, the variance that independent ones would have whose mean is as far
+// off as theirs. Batches that agree may all be off alike: each has a sample in every quarter of
+// the pixel. But then what crosses it is an edge, or small, and the mean of n such samples is off
+// as n^(-3/4) (Mitchell, "Consequences of Stratified Sampling in Graphics", SIGGRAPH 1996).
+float CellBaker::variance_of_further(std::size_t k) const {
+  const auto n = static_cast<float>(counts_[k]), batches = static_cast<float>(batches_[k]);
+  if (!(n > 1)) return 0;
+  const float alone = spread_of(k, squares_) / (n - 1);
+  if (batches == n) return alone;
+  const float spread = batches > 1 ? spread_of(k, batch_squares_) / (batches - 1) : 0.0F;
+  return std::max(spread, alone / std::sqrt(n));
 }
 
 void CellBaker::count_errors() {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     const auto n = static_cast<float>(counts_[k]);
     if (edge_[k] == Edge::none || !(n > 1)) continue;
-    // Not less than rounding leaves. What was blended is as sure as one of it.
-    const float spread = std::max(largest(spread_of_further(k)), 0.0F);
-    const bool blended = edge_[k] == Edge::blend;
-    counting_[k].error = std::sqrt(spread / (blended ? n : n * (n - 1)));
+    // What was blended is as sure as one of it.
+    const float variance =
+        edge_[k] == Edge::blend ? spread_of(k, squares_) : variance_of_further(k);
+    counting_[k].error = std::sqrt(variance / n);
   }
 }
 
@@ -452,14 +523,15 @@ Vec3f CellBaker::direction_in(int x, int y, const std::array<float, 2>& offset) 
 }
 
 void CellBaker::clear_further(std::size_t k) {
-  squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
+  squares_[k] = batch_squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
+  batches_[k] = 0;
   borrowed_[k] = {};
 }
 
 void CellBaker::add_further(std::size_t k, const Sample& sample, int times) {
   counts_[k] = static_cast<std::uint16_t>(counts_[k] + times);
   const auto n = static_cast<float>(times);
-  const Vec3f shown = clipped(sample.added);
+  const Vec3f shown = counted(sample.added);
   // Whatever the plate shows: decisions hold from frame to frame.
   const Vec3f behind = sample.plate * plate_contrast;
   shown_sum_[k] += shown * n;

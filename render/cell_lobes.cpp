@@ -301,7 +301,10 @@ void CellBaker::find_compact_tints() {
 }
 
 void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
-  const Vec3f share = lobe.difference ? passed - Vec3f{1, 1, 1} : passed;
+  mirror_compact(lobe, light, lobe.difference ? passed - Vec3f{1, 1, 1} : passed);
+}
+
+void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share) {
   if (share == Vec3f{}) return;
   const float density = compact_density(lobe, light) * lobe.share;
   if (!(density > 0)) return;
@@ -379,7 +382,7 @@ void CellBaker::add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed) {
   const Vec3f weight = lobe.throughput * passed * (density * facing / (squared + disc));
   const Vec3f planned = weight * frame_->planned_table->lamps[number].intensity;
   const float least = (1 - frame_->job->effort.accuracy) / (8 * static_cast<float>(lamps.size()));
-  if (!(largest(planned) > least)) return;
+  if (!(std::max(largest(planned), largest(-planned)) > least)) return;
   lamp_terms_.push_back(
       {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(number), weight});
   samples_[p.slot].added += planned;

@@ -197,7 +197,7 @@ std::array<std::array<float, 2>, samples_max> sample_pattern() {
       column ^= column >> 1;
     }
     const auto middle = [](std::uint32_t v) {
-      return (static_cast<float>(v >> 24) + 0.5F) / samples_max - 0.5F;
+      return (static_cast<float>(v >> 22) + 0.5F) / samples_max - 0.5F;
     };
     pattern[i] = {middle(x), middle(y)};
   }

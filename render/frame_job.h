@@ -20,9 +20,9 @@ namespace render {
 struct Effort {
   int aa_samples = 16;  // camera rays in pixels where an edge passes; 1 = no anti-aliasing
   // Standard error, in radiance, that a pixel of further camera rays may have before it takes four
-  // times as many, and again, up to 256: of the first aa_samples half of this, and twice as much
+  // times as many, and again, up to 1,024: of the first aa_samples half of this, and twice as much
   // each time. 0 = aa_samples must do.
-  float aa_tolerance = 0.1F;
+  float aa_tolerance = 0.06F;
   // Radiance by which the virtual light of neighbouring pixels may differ before they are sampled
   // like edges, where it is 1 or more; below, by the root of the radiance less. 0 = it never
   // matters.

@@ -13,7 +13,7 @@
 
 namespace render {
 
-inline constexpr int samples_max = 256;  // camera rays in one pixel
+inline constexpr int samples_max = 1024;  // camera rays in one pixel
 
 // What all tiles of one frame share, made once per frame.
 struct FrameContext {

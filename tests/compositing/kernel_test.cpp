@@ -458,7 +458,7 @@ TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
     shot.job = before;
   };
   refuse([](render::FrameJob& job) { job.effort.aa_samples = 0; });
-  refuse([](render::FrameJob& job) { job.effort.aa_samples = 257; });
+  refuse([](render::FrameJob& job) { job.effort.aa_samples = 1025; });
   refuse([](render::FrameJob& job) { job.effort.aa_tolerance = -0.1F; });
   refuse([](render::FrameJob& job) { job.effort.aa_tolerance = std::nanf(""); });
   refuse([](render::FrameJob& job) { job.effort.glint_contrast = -0.1F; });

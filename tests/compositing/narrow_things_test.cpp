@@ -2,9 +2,11 @@
 // them, wherever in a cell, and tips of bright things that no pixel's centre shows.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 
 #include "made_shot.h"
 
@@ -112,6 +114,137 @@ TEST(NarrowTips, AreSeenWhereNoPixelsSideShowsThem) {
       const double shown = static_cast<double>(float_from_half(frame.rgba.pixels[tip]));
       EXPECT_NEAR(shown / double{glow}, across * down, 0.04) << at << ' ' << across << ' ' << down;
     }
+  }
+}
+
+// A dim sun, or a lamp as far away, from the right: a roof of which nothing is in the picture casts
+// a shadow that ends aslant across its columns, a twentieth of a pixel further from row to row.
+enum class Source { sun, lamp };
+
+MadeShot under_a_roof(Source source, float roughness) {
+  render::SceneDescription scene = made_scene(false);
+  scene.instances.clear(), scene.meshes.clear();
+  render::StandardParameters grey;
+  std::fill_n(grey.base_color, 3, 0.5F);
+  grey.roughness = roughness;
+  grey.specular = roughness < 1 ? 1 : 0;
+  scene.materials.push_back(make_standard_material("grey", grey));
+  scene.meshes.push_back(made_floor(20, static_cast<std::uint32_t>(scene.materials.size() - 1)));
+  scene.instances.emplace_back().name = "floor";
+  auto roof = std::make_shared<render::Mesh>();
+  roof->positions = {{0.75F, -5, 1}, {5, -5, 1}, {5, 5, 1}, {1.25F, 5, 1}};
+  roof->triangles = {{0, 1, 2}, {0, 2, 3}};
+  roof->materials = {static_cast<std::uint32_t>(scene.materials.size() - 1)};
+  scene.meshes.push_back(std::move(roof));
+  scene.instances.emplace_back().mesh = 1;
+  MadeShot shot = from_above(std::move(scene));
+  shot.environment.compact_apart = true;  // so that the sun is mirrored as a light
+  const float half = std::sqrt(0.5F), far_m = 1000;
+  shot.job.lights.lights = {{{0, 0, 1}, {0.3F, 0.3F, 0.3F}, 0}};
+  if (source == Source::sun) {
+    shot.job.lights.lights.push_back({{half, 0, half}, {0.4F, 0.4F, 0.4F}, 0, 1});
+  } else {
+    const float intensity = 0.4F * far_m * far_m;
+    shot.job.lights.lamps.push_back(
+        {{half * far_m, 0, half * far_m}, {}, {intensity, intensity, intensity}});
+  }
+  return shot;
+}
+
+TEST(SharpShadows, EndWithinPixelsAlsoWhereTheyAreFaint) {
+  for (const Source source : {Source::sun, Source::lamp}) {
+    for (const float roughness : {1.0F, 0.5F}) {
+      const render::FrameResult frame = frame_of(under_a_roof(source, roughness));
+      double squares = 0, by_halves = 0, largest_step = 0;
+      int pixels = 0;
+      for (int row = 0; row < side; ++row) {
+        const auto at = [&](int column) {
+          return static_cast<double>(
+              float_from_half(frame.rgba.pixels[frame.rgba.index(row, column)]));
+        };
+        const double end_m = 0.05 * double{metres_up(row)};  // the roof's edge, less its height
+        const double end = middle + end_m / metres_a_pixel + 0.5;
+        for (int x = 2; x < side - 2; ++x) {
+          const double lit = std::clamp(end - x, 0.0, 1.0);
+          if (lit <= 0 || lit >= 1) continue;
+          if (x % 16 == 0 || x % 16 == 15) continue;  // between cells it is not found
+          const double bright = at(x - 2), dark = at(x + 2);
+          const double off = (at(x) - dark) / (bright - dark) - lit;
+          squares += off * off;
+          by_halves += std::pow((lit > 0.5 ? 1 : 0) - lit, 2);
+          largest_step = std::max(largest_step, bright - dark);
+          ++pixels;
+        }
+      }
+      EXPECT_GT(pixels, side / 4);
+      EXPECT_GT(largest_step, 0.03);
+      EXPECT_LT(largest_step, 0.1) << "less than the effort looks for in broad light";
+      EXPECT_LT(std::sqrt(squares), 0.3 * std::sqrt(by_halves))
+          << (source == Source::sun) << roughness;
+    }
+  }
+}
+
+// A sheet of bare metal in the sun, whose end is rounded within less than half a pixel.
+MadeShot of_a_sheet(double column, double zoom, float roughness) {
+  render::SceneDescription scene = made_scene(false);
+  render::StandardParameters metal;
+  metal.metallic = 1;
+  metal.roughness = roughness;
+  scene.materials.push_back(make_standard_material("metal", metal));
+  auto sheet = std::make_shared<render::Mesh>();
+  constexpr int around = 32;
+  constexpr float radius = 0.004F;
+  const auto add = [&](float x, float z, render::Vec3f normal) {
+    for (const float y : {-5.0F, 5.0F}) {
+      sheet->positions.push_back({x, y, z});
+      sheet->normals.push_back(normal);
+    }
+  };
+  const float end = metres_right(column) - radius, height = 0.1F;
+  for (int i = 0; i <= around; ++i) {
+    const float angle = std::numbers::pi_v<float> / 2 * static_cast<float>(i) / around;
+    const render::Vec3f out{std::cos(angle), 0, std::sin(angle)};
+    add(end + radius * out.x, height + radius * out.z, out);
+  }
+  add(-5, height + radius, {0, 0, 1});
+  for (std::uint32_t i = 0; i <= around; ++i) {
+    sheet->triangles.push_back({2 * i, 2 * i + 2, 2 * i + 1});
+    sheet->triangles.push_back({2 * i + 1, 2 * i + 2, 2 * i + 3});
+  }
+  sheet->materials = {static_cast<std::uint32_t>(scene.materials.size() - 1)};
+  scene.meshes.push_back(std::move(sheet));
+  scene.instances.emplace_back().mesh = 1;
+  MadeShot shot = from_above(std::move(scene));
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", side, side, {1000 * zoom, 1000 * zoom, middle, middle}});
+  shot.environment = made_sky(32, 0, 0);
+  shot.environment.compact_apart = true;
+  shot.job.lights.lights = {{{0.6F, 0, 0.8F}, {3, 3, 3}, 0.005F, 1}};
+  std::ranges::fill(shot.plate.pixels, capture::Half{0});
+  return shot;
+}
+
+double mean_of_middle(const render::FrameResult& frame, int size) {
+  double sum = 0;
+  for (int y = (side - size) / 2; y < (side + size) / 2; ++y) {
+    for (int x = (side - size) / 2; x < (side + size) / 2; ++x) {
+      sum += static_cast<double>(float_from_half(frame.rgba.pixels[frame.rgba.index(y, x)]));
+    }
+  }
+  return sum / (size * size);
+}
+
+TEST(BentEdges, GlintAsBrightFromFarAsFromNear) {
+  constexpr int zoom = 8;
+  for (const float roughness : {0.15F, 0.3F, 0.5F}) {
+    double far = 0, near = 0;
+    for (const double column : {31.0, 31.2, 31.4, 31.6, 31.8}) {
+      far += mean_of_middle(frame_of(of_a_sheet(column, 1, roughness)), side / zoom);
+      near += mean_of_middle(frame_of(of_a_sheet(column, zoom, roughness)), side);
+    }
+    EXPECT_GT(near, 0.1);
+    EXPECT_NEAR(far / near, 1, 0.06) << roughness;
   }
 }
 
