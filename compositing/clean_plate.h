@@ -87,6 +87,8 @@ struct PlateSight {
                        // less than a fourth of its light
 };
 
+struct CellSums;
+
 // Keeps a plate true under light that changes: by a gain on a grid of 8x8 pixels, from those cells
 // whose colour is the plate's. Behind the person it is taken from around; where nothing is in sight
 // from the frame before.
@@ -98,6 +100,10 @@ class PlateLight {
   explicit PlateLight(CleanPlate plate, PlateUse use = PlateUse::screen);
 
   const CleanPlate& plate() const { return plate_; }
+  const LitPlate& bare() const { return bare_; }  // without gain
+  // Of colour, against the primary; of the gain within a cell: what noise may make of them.
+  float tolerance() const { return tolerance_; }
+  float spread() const { return spread_; }
   const LitPlate& lit() const { return *lit_; }
   // The same, not touched by later updates while it is held.
   std::shared_ptr<const LitPlate> shared_lit() const { return lit_; }
@@ -107,13 +113,15 @@ class PlateLight {
   PlateSight update(const capture::Image& frame, bool follow);
   PlateSight update(const CodedFrame& frame, bool follow);
   void check_size(int height, int width) const;
+  // Throw the same.
+  void check(const capture::Image& frame) const;
+  void check(const CodedFrame& frame) const;
 
  private:
   template <class Rows>
   PlateSight update_from(const Rows& rows, bool follow);
   template <class Rows>
   PlateSight measure(const Rows& rows);
-  struct CellSums;
   template <class Rows>
   CellSums look_at(const Rows& rows, int row, int column) const;
   std::array<F8, 3> ratios_at(int y, int x) const;

@@ -10,7 +10,7 @@ namespace {
 
 // The least code that is at least as bright, of light 0..1.
 constexpr int codes = 4096;
-const std::array<std::uint8_t, codes>& codes_of(capture::Transfer transfer) {
+const std::array<std::uint8_t, codes>& least_codes(capture::Transfer transfer) {
   static const auto all = [] {
     std::array<std::array<std::uint8_t, codes>, 4> tables{};
     for (std::size_t t = 0; t < tables.size(); ++t) {
@@ -23,6 +23,23 @@ const std::array<std::uint8_t, codes>& codes_of(capture::Transfer transfer) {
     return tables;
   }();
   return all[static_cast<std::size_t>(transfer)];
+}
+
+// First to third at most, first at least.
+CodeBounds codes_of(F4 bounds,
+                    const std::array<std::uint8_t, codes>& table,
+                    const std::array<int, 3>& order) {
+  using I4 = std::int32_t __attribute__((vector_size(16)));
+  const F4 zero{}, one = zero + 1.0F;
+  bounds = bounds > zero ? bounds : zero;
+  bounds = bounds < one ? bounds : one;
+  const I4 at = __builtin_convertvector(bounds * static_cast<float>(codes - 1), I4);
+  const auto code = [&](int i) {
+    return static_cast<std::uint32_t>(table[static_cast<std::size_t>(at[i])]);
+  };
+  return {0xFF000000U | code(0) << (8 * order[0]) | code(1) << (8 * order[1]) |
+              code(2) << (8 * order[2]),
+          code(3) << (8 * order[0])};
 }
 
 // Calls add(bounds) for each block: the greatest light of the three channels and the least of the
@@ -62,21 +79,21 @@ void bound_screen(const LitPlate& lit,
                   capture::Transfer transfer,
                   const std::array<int, 3>& order,
                   std::vector<CodeBounds>& bounds) {
-  const auto& table = codes_of(transfer);
-  using I4 = std::int32_t __attribute__((vector_size(16)));
+  const auto& table = least_codes(transfer);
   bounds.clear();
-  for_each_block(lit, [&](F4 b) {
-    const F4 zero{}, one = zero + 1.0F;
-    b = b > zero ? b : zero;
-    b = b < one ? b : one;
-    const I4 at = __builtin_convertvector(b * static_cast<float>(codes - 1), I4);
-    const auto code = [&](int i) {
-      return static_cast<std::uint32_t>(table[static_cast<std::size_t>(at[i])]);
-    };
-    bounds.push_back({0xFF000000U | code(0) << (8 * order[0]) | code(1) << (8 * order[1]) |
-                          code(2) << (8 * order[2]),
-                      code(3) << (8 * order[0])});
-  });
+  for_each_block(lit, [&](F4 b) { bounds.push_back(codes_of(b, table, order)); });
+}
+
+LightBounds under(const LightBounds& bounds, float gain) {
+  const auto& [first, second, third] = bounds.most;
+  return {{first * gain, second * gain, third * gain}, bounds.least * gain};
+}
+
+CodeBounds codes_of(const LightBounds& bounds,
+                    capture::Transfer transfer,
+                    const std::array<int, 3>& order) {
+  return codes_of(F4{bounds.most[0], bounds.most[1], bounds.most[2], bounds.least},
+                  least_codes(transfer), order);
 }
 
 }  // namespace compositing

@@ -22,4 +22,11 @@ void bound_screen(const LitPlate& lit,
                   const std::array<int, 3>& order,
                   std::vector<CodeBounds>& bounds);
 
+// Bounds of the same under so many times the light.
+LightBounds under(const LightBounds& bounds, float gain);
+// As codes.
+CodeBounds codes_of(const LightBounds& bounds,
+                    capture::Transfer transfer,
+                    const std::array<int, 3>& order);
+
 }  // namespace compositing

@@ -162,6 +162,12 @@ class LightRows {
     for (F8& c : channels) c = (c > 0.0F) & (c < 1e9F) ? c : F8{};
   }
 
+  // Eight pixels in the picture's order: red, green, blue.
+  void load_rgb(int y, int x, std::array<F8, 3>& rgb) const {
+    load_apart(at(y, x), rgb);
+    for (F8& c : rgb) c = (c > 0.0F) & (c < 1e9F) ? c : F8{};
+  }
+
   // Which of `rows` rows from y on have eight pixels, from x on, within bounds: a bit each.
   unsigned rows_within(int y, int x, int rows, const LightBounds& bounds) const {
     unsigned within = 0;
@@ -175,15 +181,49 @@ class LightRows {
     return within;
   }
 
+  // The same of the means of pairs of rows, both of which are told by one bit each.
+  unsigned pairs_within(int y, int x, int rows, const LightBounds& bounds) const {
+    unsigned within = 0;
+    for (int row = 0; row < rows; row += 2) {
+      std::array<F8, 3> c, d;
+      load_raw(at(y + row, x), c);
+      load_raw(at(y + std::min(row + 1, rows - 1), x), d);
+      for (std::size_t i = 0; i < 3; ++i) c[i] = 0.5F * (c[i] + d[i]);
+      const I8 inside = (c[0] >= bounds.least) & (c[0] <= bounds.most[0]) &
+                        (c[1] <= bounds.most[1]) & (c[2] <= bounds.most[2]);
+      if (!any_of(~inside)) within |= 3U << row;
+    }
+    return within & ((1U << rows) - 1);
+  }
+
+  // Whether eight pixels of `rows` rows from (y, x) on have all no more of the first channel than
+  // of the mean of the others, or hardly.
+  bool lacks_first(int y, int x, int rows) const {
+    constexpr float hardly = 0.03F;
+    for (int row = 0; row < rows; ++row) {
+      std::array<F8, 3> c;
+      load_raw(at(y + row, x), c);
+      if (any_of(~(c[0] <= 0.5F * (c[1] + c[2]) + hardly))) return false;
+    }
+    return true;
+  }
+
  private:
   const float* at(int y, int x) const {
     return pixels_ + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
                           static_cast<std::size_t>(x));
   }
 
-  // Eight pixels of three channels, apart.
   void load_raw(const float* from, std::array<F8, 3>& channels) const {
     std::array<F8, 3> rgb;
+    load_apart(from, rgb);
+    for (std::size_t i = 0; i < 3; ++i) {
+      channels[i] = order_[i] == 0 ? rgb[0] : order_[i] == 1 ? rgb[1] : rgb[2];
+    }
+  }
+
+  // Eight pixels of three channels, apart.
+  static void load_apart(const float* from, std::array<F8, 3>& rgb) {
     const F4 a = load_four(from), b = load_four(from + 4), c = load_four(from + 8);
     const F4 d = load_four(from + 12), e = load_four(from + 16), f = load_four(from + 20);
     const F8 ad = __builtin_shufflevector(a, d, 0, 1, 2, 3, 4, 5, 6, 7);
@@ -195,9 +235,6 @@ class LightRows {
     rgb[0] = __builtin_shufflevector(ad, rg23, 0, 3, 8, 10, 4, 7, 12, 14);
     rgb[1] = __builtin_shufflevector(gb01, rg23, 0, 2, 9, 11, 4, 6, 13, 15);
     rgb[2] = __builtin_shufflevector(gb01, cf, 1, 3, 8, 11, 5, 7, 12, 15);
-    for (std::size_t i = 0; i < 3; ++i) {
-      channels[i] = order_[i] == 0 ? rgb[0] : order_[i] == 1 ? rgb[1] : rgb[2];
-    }
   }
 
   const float* pixels_;
@@ -239,6 +276,14 @@ class CodeRows {
     light_.apply(channels);
   }
 
+  void load_rgb(int y, int x, std::array<F8, 3>& rgb) const {
+    I8 texels;
+    std::memcpy(&texels, at(y, x), sizeof texels);
+    rgb = {to_float_lanes(texels & 255), to_float_lanes((texels >> 8) & 255),
+           to_float_lanes((texels >> 16) & 255)};
+    light_.apply(rgb);
+  }
+
   // Which of `rows` rows from y on, eight at most, have eight pixels, from x on, within bounds: a
   // bit each.
   unsigned rows_within(int y, int x, int rows, const CodeBounds& bounds) const {
@@ -274,6 +319,90 @@ class CodeRows {
     }
 #endif
     return within;
+  }
+
+  unsigned pairs_within(int y, int x, int rows, const CodeBounds& bounds) const {
+    const std::uint8_t* from = at(y, x);
+    const std::size_t down = 4 * static_cast<std::size_t>(width_);
+    unsigned within = 0;
+#if defined(__AVX2__)
+    const __m256i most = _mm256_set1_epi32(static_cast<int>(bounds.most));
+    const __m256i least = _mm256_set1_epi32(static_cast<int>(bounds.least));
+    const auto texels = [&](int row) {
+      return _mm256_loadu_si256(
+          reinterpret_cast<const __m256i*>(from + static_cast<std::size_t>(row) * down));
+    };
+    const auto outside = [&](int row, int next) {
+      const __m256i mean = _mm256_avg_epu8(texels(row), texels(next));
+      return _mm256_or_si256(_mm256_subs_epu8(mean, most), _mm256_subs_epu8(least, mean));
+    };
+    if (rows == 8) {
+      const __m256i a = outside(0, 1), b = outside(2, 3), c = outside(4, 5), d = outside(6, 7);
+      const __m256i any = _mm256_or_si256(_mm256_or_si256(a, b), _mm256_or_si256(c, d));
+      if (_mm256_testz_si256(any, any) != 0) return 0xFF;
+      within |= _mm256_testz_si256(a, a) != 0 ? 0x03U : 0;
+      within |= _mm256_testz_si256(b, b) != 0 ? 0x0CU : 0;
+      within |= _mm256_testz_si256(c, c) != 0 ? 0x30U : 0;
+      within |= _mm256_testz_si256(d, d) != 0 ? 0xC0U : 0;
+      return within;
+    }
+    for (int row = 0; row < rows; row += 2) {
+      const __m256i off = outside(row, std::min(row + 1, rows - 1));
+      if (_mm256_testz_si256(off, off) != 0) within |= 3U << row;
+    }
+#else
+    for (int row = 0; row < rows; row += 2, from += 2 * down) {
+      const std::uint8_t* const next = row + 1 < rows ? from + down : from;
+      bool inside = true;
+      for (int i = 0; i < 4 * key_lanes; ++i) {
+        const int shift = 8 * (i % 4);
+        const auto mean = static_cast<std::uint32_t>((from[i] + next[i] + 1) / 2);
+        inside &= mean <= (bounds.most >> shift & 255);
+        inside &= mean >= (bounds.least >> shift & 255);
+      }
+      if (inside) within |= 3U << row;
+    }
+#endif
+    return within & ((1U << rows) - 1);
+  }
+
+  bool lacks_first(int y, int x, int rows) const {
+    constexpr int hardly = 10;
+    const std::uint8_t* from = at(y, x);
+    const std::size_t down = 4 * static_cast<std::size_t>(width_);
+#if defined(__AVX2__)
+    // Of each pixel, its channels in the lowest byte.
+    const auto lowest = [&](int shift) {
+      const int byte = shift / 8;
+      return _mm256_setr_epi8(
+          static_cast<char>(byte), -1, -1, -1, static_cast<char>(byte + 4), -1, -1, -1,
+          static_cast<char>(byte + 8), -1, -1, -1, static_cast<char>(byte + 12), -1, -1, -1,
+          static_cast<char>(byte), -1, -1, -1, static_cast<char>(byte + 4), -1, -1, -1,
+          static_cast<char>(byte + 8), -1, -1, -1, static_cast<char>(byte + 12), -1, -1, -1);
+    };
+    const __m256i first = lowest(shifts_[0]), second = lowest(shifts_[1]);
+    const __m256i third = lowest(shifts_[2]), slack = _mm256_set1_epi32(hardly);
+    __m256i more = _mm256_setzero_si256();
+    for (int row = 0; row < rows; ++row, from += down) {
+      const __m256i texels = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(from));
+      const __m256i mean =
+          _mm256_avg_epu8(_mm256_shuffle_epi8(texels, second), _mm256_shuffle_epi8(texels, third));
+      more = _mm256_or_si256(more, _mm256_subs_epu8(_mm256_shuffle_epi8(texels, first),
+                                                    _mm256_adds_epu8(mean, slack)));
+    }
+    return _mm256_testz_si256(more, more) != 0;
+#else
+    const auto code = [&](const std::uint8_t* texel, std::size_t c) {
+      return static_cast<int>(texel[shifts_[c] / 8]);
+    };
+    for (int row = 0; row < rows; ++row, from += down) {
+      for (int i = 0; i < key_lanes; ++i) {
+        const std::uint8_t* const texel = from + 4 * i;
+        if (code(texel, 0) > (code(texel, 1) + code(texel, 2) + 1) / 2 + hardly) return false;
+      }
+    }
+    return true;
+#endif
   }
 
  private:

@@ -9,22 +9,13 @@
 #include <cstring>
 #include <span>
 
-#include "capture/half.h"
 #include "capture/image.h"
 #include "compositing/key_lanes.h"
 #include "compositing/key_scratch.h"
+#include "compositing/key_store.h"
 #include "compositing/key_texel.h"
 
 namespace compositing {
-
-// How smoothing tells noise from motion: mean change of alpha over 3x3 pixels, in units of the
-// noise; what is below `calm` moves by `least_gain` of the way, what is above `moving` at once.
-inline constexpr float calm = 1.0F, moving = 2.0F, least_gain_of_change = 0.2F;
-// Alpha below this share of the noise is none; from twice of it on it is as it was.
-inline constexpr float haze_of_noise = 0.6F;
-// One pixel alone of eight in a row is a speck of noise up to so many times of that: what is bare
-// then stays bare over wide stretches, which rays pass at once.
-inline constexpr float speck_of_haze = 3, most_of_speck = 0.25F;
 
 // One frame through `Formula`, which tells the share of the screen, of that a matte, and of that a
 // foreground.
@@ -44,39 +35,24 @@ class KeyPass {
     float noise;                   // of alpha, one sigma; 0 = no smoothing
     std::span<const Bounds> bare;  // what is screen at a glance, of each 8x8 pixels; or empty
   };
-  // (height, width, 4), and where it may not be 0: see KeyedFrame.
-  struct Outputs {
-    capture::Half* pixels;
-    std::uint8_t* written;
-  };
-
   KeyPass(const Source& source,
           const Formula& formula,
           const Inputs& in,
           KeyScratch& scratch,
-          const Outputs& out)
+          const KeyStore::Outputs& out)
       : source_(source),
         formula_(formula),
         in_(in),
         scratch_(scratch),
-        out_(out),
-        across_(static_cast<std::size_t>((in.plate.width + key_lanes - 1) / key_lanes)) {
+        store_(in.plate, in.noise, scratch, out),
+        across_(store_.across()) {
     const std::size_t stride = (across_ + 2) * key_lanes;
     scratch.change.assign(3 * stride, 0);
     for (std::size_t i = 0; i < 3; ++i) change_[i] = scratch.change.data() + key_lanes + i * stride;
     for (auto& places : scratch.places) places.resize(across_);
     for (auto& waiting : scratch.waiting) waiting.resize(across_);
     for (auto& changed : scratch.changed) changed.clear(), changed.reserve(across_);
-    const std::size_t rows = 8 * static_cast<std::size_t>((in.plate.height + 7) / 8);
-    if (scratch.past.size() != across_ * rows || !scratch.has_previous) {
-      scratch.previous.assign(across_ * rows * key_lanes, 0);
-      scratch.past.assign(across_ * rows, KeyPast::clear);
-      scratch.has_previous = false;
-    }
     smooths_ = in.noise > 0 && scratch.has_previous;
-    haze_ = in.noise * haze_of_noise;
-    const auto order = channels_of(in.plate.colour);
-    for (std::size_t i = 0; i < 3; ++i) place_of_[static_cast<std::size_t>(order[i])] = i;
   }
 
   // Returns how many pixels are neither clear nor whole.
@@ -89,32 +65,13 @@ class KeyPass {
     }
     finish_row(height - 1);
     scratch_.has_previous = true;
-    return soft_;
+    return store_.soft();
   }
 
  private:
   static constexpr std::size_t together = 16;  // blocks: they stay in the nearest cache
 
   float* change(int y) const { return change_[static_cast<std::size_t>(y) % 3]; }
-  std::uint16_t* previous(int y) const {
-    return scratch_.previous.data() + static_cast<std::size_t>(y) * across_ * key_lanes;
-  }
-  std::size_t block_at(int y, int x) const {
-    return 8 * (static_cast<std::size_t>(y / 8) * across_ + static_cast<std::size_t>(x / 8)) +
-           static_cast<std::size_t>(y % 8);
-  }
-  capture::Half* pixels(int y, int x) const {
-    return out_.pixels +
-           4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(in_.plate.width) +
-                static_cast<std::size_t>(x));
-  }
-  void clear_pixels(int y, int x, int count) {
-    std::uint8_t& written = out_.written[block_at(y, x)];
-    if (written == 0) return;
-    std::fill_n(pixels(y, x), 4 * count, capture::Half{0});
-    written = 0;
-  }
-
   // Where a row of pixels lies in the plate.
   struct PlateRow {
     const float* above;  // cells
@@ -193,10 +150,7 @@ class KeyPass {
       if (x < whole * key_lanes) {
         const unsigned bare = source_.rows_within(top, x, rows, in_.bare[band + i]);
         live &= ~bare;
-        std::uint64_t past, written;
-        std::memcpy(&past, &scratch_.past[8 * (band + i)], sizeof past);
-        std::memcpy(&written, out_.written + 8 * (band + i), sizeof written);
-        if ((past | written) != 0) live |= settle(top, x, bare);
+        if (store_.has_any_before(band + i)) live |= store_.settle(top, x, bare);
       }
       if (live != 0) prefetch_plate(top, x);
       for (; live != 0; live &= live - 1) {
@@ -213,23 +167,6 @@ class KeyPass {
     const int first = top / plate.step, column = std::min(x / plate.step + 1, plate.columns - 1);
     for (int row = first; row < std::min(first + 3, plate.rows); ++row)
       __builtin_prefetch(plate.cell(row, column));
-  }
-
-  // Clears what has become bare screen, of the rows whose bits are set; returns those that the
-  // person has just left, and which are to be smoothed.
-  unsigned settle(int top, int x, unsigned bare) {
-    unsigned left = 0;
-    for (; bare != 0; bare &= bare - 1) {
-      const int row = std::countr_zero(bare), y = top + row;
-      KeyPast& past = scratch_.past[block_at(y, x)];
-      if (past > KeyPast::faint) {
-        left |= 1U << row;
-        continue;
-      }
-      past = KeyPast::clear;
-      clear_pixels(y, x, key_lanes);
-    }
-    return left;
   }
 
   void see_row(int y) {
@@ -258,7 +195,7 @@ class KeyPass {
     for (std::size_t i = 0; i < row.size(); ++i) {
       KeyBlock& block = row[i];
       block.x = places[i];
-      __builtin_prefetch(previous(y) + block.x);
+      __builtin_prefetch(store_.previous(y, block.x));
       block.count = std::min(key_lanes, in_.plate.width - block.x);
       source_.load(y, block.x, block.count, block.light);
       const auto p = plate_at_lanes(plate_here, block.x);
@@ -286,7 +223,7 @@ class KeyPass {
     }
     for (const KeyBlock& block : row) {
       const F8 alpha = block.matte.alpha;
-      const KeyPast past = scratch_.past[block_at(y, block.x)];
+      const KeyPast past = store_.past(y, block.x);
       const bool clear = past == KeyPast::clear && !any_of(alpha > 0.0F);
       const bool whole = past == KeyPast::whole && !any_of(alpha < 1.0F);
       if (clear || whole || !(in_.noise > 0)) {
@@ -309,7 +246,7 @@ class KeyPass {
     const auto slot = static_cast<std::size_t>(y) % 2;
     F8 before = all_of(past == KeyPast::whole ? 1 : 0);
     if (past == KeyPast::mixed || past == KeyPast::faint)
-      before = load_previous(previous(y) + block.x);
+      before = KeyStore::load(store_.previous(y, block.x));
     const F8 d = block.matte.alpha - before;
     store_lanes(change(y) + block.x, d < 0.0F ? -d : d);
     scratch_.changed[static_cast<std::size_t>(y) % 3].push_back(block.x);
@@ -334,39 +271,11 @@ class KeyPass {
     }
   }
 
-  static F8 load_previous(const std::uint16_t* from) {
-    using U8 = std::uint16_t __attribute__((vector_size(16)));
-    U8 codes;
-    std::memcpy(&codes, from, sizeof codes);
-    return __builtin_convertvector(codes, F8) * (1.0F / 65535);
-  }
-  // Keeps smoothed alpha; alpha of bare screen is noise, which is above 0 only, and so would leave
-  // a haze: it is taken away.
-  void keep(int y, KeyBlock& block) {
-    F8& alpha = block.matte.alpha;
-    KeyPast past = KeyPast::mixed;
-    if (!any_of(alpha < 1.0F)) past = KeyPast::whole;
-    if (!any_of(alpha > haze_)) past = any_of(alpha > 0.0F) ? KeyPast::faint : KeyPast::clear;
-    scratch_.past[block_at(y, block.x)] = past;
-    if (past == KeyPast::mixed || past == KeyPast::faint)
-      store_previous(previous(y) + block.x, alpha);
-    alpha = least(alpha, most(2 * (alpha - haze_), F8{}));
-    if (count_of(alpha > 0.0F) == 1 &&
-        !any_of(alpha > std::min(speck_of_haze * haze_, most_of_speck)))
-      alpha = F8{};
-  }
-
-  static void store_previous(std::uint16_t* to, F8 alpha) {
-    using U8 = std::uint16_t __attribute__((vector_size(16)));
-    const U8 codes = __builtin_convertvector(to_int_lanes(alpha * 65535.0F + 0.5F), U8);
-    std::memcpy(to, &codes, sizeof codes);
-  }
-
   void finish_row(int y) {
     const auto slot = static_cast<std::size_t>(y) % 2;
     const std::span<KeyBlock> row = std::span(scratch_.waiting[slot]).first(waiting_[slot]);
     if (smooths_) smooth(y, row);
-    for (KeyBlock& block : row) keep(y, block);
+    for (KeyBlock& block : row) store_.keep(y, block);
     for (const KeyBlock& block : row) put(y, block);
   }
 
@@ -393,65 +302,22 @@ class KeyPass {
   }
 
   void put(int y, const KeyBlock& block) {
-    if (!any_of(block.matte.alpha > 0.0F)) return clear_pixels(y, block.x, block.count);
-    out_.written[block_at(y, block.x)] = 1;
-    write(formula_.foreground(block.light, block.plate, block.matte), block.count,
-          pixels(y, block.x));
-  }
-
-  void write(const KeyedTexel<F8>& texel, int count, capture::Half* to) {
-    const auto channel = [&](std::size_t place) {
-      const F8 v = place == 0 ? texel.first : place == 1 ? texel.second : texel.third;
-      return least(v, all_of(capture::half_max));
-    };
-    const std::array<F8, 4> rgba{channel(place_of_[0]), channel(place_of_[1]),
-                                 channel(place_of_[2]), texel.alpha};
-    const F8 part = texel.alpha * (1.0F - texel.alpha);
-    const I8 soft = part > 0.0475F;  // .05 < alpha < .95
-    if (count == key_lanes) {
-      soft_ += count_of(soft);
-      write_eight(rgba, to);
-      return;
-    }
-    for (int i = 0; i < count; ++i) {
-      soft_ -= soft[i];
-      for (std::size_t c = 0; c < 4; ++c) *to++ = capture::half_from_float(rgba[c][i]);
-    }
-  }
-
-  static void write_eight(const std::array<F8, 4>& rgba, capture::Half* to) {
-#if defined(__F16C__) && defined(__AVX2__)
-    __m128i h[4];
-    for (std::size_t c = 0; c < 4; ++c) {
-      h[c] = _mm256_cvtps_ph(std::bit_cast<__m256>(rgba[c]), _MM_FROUND_TO_NEAREST_INT);
-    }
-    const __m128i rg0 = _mm_unpacklo_epi16(h[0], h[1]), rg1 = _mm_unpackhi_epi16(h[0], h[1]);
-    const __m128i ba0 = _mm_unpacklo_epi16(h[2], h[3]), ba1 = _mm_unpackhi_epi16(h[2], h[3]);
-    auto* out = reinterpret_cast<__m128i*>(to);
-    _mm_storeu_si128(out, _mm_unpacklo_epi32(rg0, ba0));
-    _mm_storeu_si128(out + 1, _mm_unpackhi_epi32(rg0, ba0));
-    _mm_storeu_si128(out + 2, _mm_unpacklo_epi32(rg1, ba1));
-    _mm_storeu_si128(out + 3, _mm_unpackhi_epi32(rg1, ba1));
-#else
-    for (int i = 0; i < key_lanes; ++i) {
-      for (std::size_t c = 0; c < 4; ++c) *to++ = capture::half_from_float(rgba[c][i]);
-    }
-#endif
+    if (!any_of(block.matte.alpha > 0.0F)) return store_.clear_pixels(y, block.x, block.count);
+    store_.mark_written(y, block.x);
+    store_.write(formula_.foreground(block.light, block.plate, block.matte), block.count,
+                 store_.pixels(y, block.x));
   }
 
   const Source& source_;
   const Formula& formula_;
   const Inputs in_;
   KeyScratch& scratch_;
-  const Outputs out_;
-  std::size_t across_;                     // blocks of a row
-  std::array<std::size_t, 8> count_{};     // of blocks that are not bare, of eight rows
-  std::array<std::size_t, 2> waiting_{};   // of blocks, of two rows
-  std::array<std::size_t, 3> place_of_{};  // of red, green and blue in the keyer's order
+  KeyStore store_;
+  std::size_t across_;                    // blocks of a row
+  std::array<std::size_t, 8> count_{};    // of blocks that are not bare, of eight rows
+  std::array<std::size_t, 2> waiting_{};  // of blocks, of two rows
   std::array<float*, 3> change_{};
   bool smooths_ = false;
-  float haze_ = 0;  // alpha that is none
-  std::int64_t soft_ = 0;
 };
 
 }  // namespace compositing

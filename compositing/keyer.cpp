@@ -11,6 +11,7 @@
 #include "compositing/background_subtraction.h"
 #include "compositing/key_glance.h"
 #include "compositing/key_pass.h"
+#include "compositing/quick_pass.h"
 
 namespace compositing {
 namespace {
@@ -73,6 +74,21 @@ void check(const KeySettings& s) {
   within(s.smoothing, 0, 4, "smoothing");
 }
 
+// Of each 8x8 pixels whether any is covered; empty if none is.
+std::vector<std::uint8_t> masked_blocks(const KeyMasks& masks, int height, int width) {
+  const std::size_t across = (static_cast<std::size_t>(width) + 7) / 8;
+  std::vector<std::uint8_t> masked;
+  for (const auto* mask : {&masks.garbage, &masks.core}) {
+    for (std::size_t i = 0; i < mask->size(); ++i) {
+      if ((*mask)[i] == 0) continue;
+      masked.resize(across * ((static_cast<std::size_t>(height) + 7) / 8));
+      const std::size_t y = i / static_cast<std::size_t>(width);
+      masked[y / 8 * across + (i % static_cast<std::size_t>(width)) / 8] = 1;
+    }
+  }
+  return masked;
+}
+
 // The camera is looked for in every so many frames; so far it may be off, in pixels.
 constexpr int frames_between_looks = 3;
 constexpr float shift_still_px = 1;
@@ -112,6 +128,11 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
             settings.edge,
             settings.despill,
             lit.colour == ScreenColour::yellow};
+  if (settings.effort == KeyEffort::quick && settings.method == KeyMethod::screen &&
+      settings.learned && !has_two_primaries(lit.colour)) {
+    quick_.emplace(light_.bare(), light_.tolerance(), light_.spread());
+    masked_ = masked_blocks(masks_, lit.height, lit.width);
+  }
 }
 
 Keyer::Target Keyer::target(KeyedFrame& keyed) const {
@@ -146,8 +167,14 @@ KeyReport Keyer::key(const CodedFrame& frame, HalfImage& keyed) {
 }
 
 KeyReport Keyer::key_light(const capture::Image& frame, const Target& target) {
-  const PlateSight sight = light_.update(frame, settings_.follows_light);
+  light_.check(frame);
   const LightRows rows(frame, channels_of(light_.plate().colour));
+  if (quick_) {
+    const PlateSight sight = quick_->update(rows, settings_.follows_light);
+    watch(rows);
+    return report(sight, key_quickly(rows, std::span(quick_->light_bounds()), target));
+  }
+  const PlateSight sight = light_.update(frame, settings_.follows_light);
   watch(rows);
   scratch_.bare_light.clear();
   if (glances()) bound_screen(light_.lit(), scratch_.bare_light);
@@ -155,9 +182,16 @@ KeyReport Keyer::key_light(const capture::Image& frame, const Target& target) {
 }
 
 KeyReport Keyer::key_codes(const CodedFrame& frame, const Target& target) {
-  const PlateSight sight = light_.update(frame, settings_.follows_light);
   const auto order = channels_of(light_.plate().colour);
+  light_.check(frame);
   const CodeRows rows(frame.rgba.data(), frame.width, order, light_polynomial(frame.transfer));
+  if (quick_) {
+    const PlateSight sight = quick_->update(rows, settings_.follows_light);
+    watch(rows);
+    const std::span bare(quick_->code_bounds(frame.transfer));
+    return report(sight, key_quickly(rows, bare, target));
+  }
+  const PlateSight sight = light_.update(frame, settings_.follows_light);
   watch(rows);
   scratch_.bare_codes.clear();
   if (glances()) bound_screen(light_.lit(), frame.transfer, order, scratch_.bare_codes);
@@ -206,6 +240,19 @@ float Keyer::key_rows(const Source& source,
   if (settings_.method == KeyMethod::difference) return run(DifferenceFormula{dials_});
   if (has_two_primaries(lit.colour)) return run(ScreenFormula<true>{dials_});
   return run(ScreenFormula<false>{dials_});
+}
+
+template <class Source>
+float Keyer::key_quickly(const Source& source,
+                         std::span<const typename Source::Bounds> bare,
+                         const Target& target) {
+  const LitPlate& plate = light_.bare();
+  const float noise = settings_.smoothing * plate.sigma;
+  QuickPass<Source> pass(
+      source, {plate, *quick_, dials_, masks_.garbage, masks_.core, masked_, noise, bare}, scratch_,
+      {target.pixels, target.written});
+  return static_cast<float>(pass.run()) /
+         (static_cast<float>(plate.height) * static_cast<float>(plate.width));
 }
 
 KeyReport Keyer::report(const PlateSight& sight, float soft) const {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -14,12 +15,21 @@
 #include "compositing/key_texel.h"
 #include "compositing/keyed_frame.h"
 #include "compositing/plate_watch.h"
+#include "compositing/quick_light.h"
 
 namespace compositing {
 
 enum class KeyMethod : std::uint8_t {
   screen,      // by the colour of a screen
   difference,  // by the distance from a plate of any still background: background_subtraction.h
+};
+
+// How much is done for a frame.
+enum class KeyEffort : std::uint8_t {
+  // In little more than a third of the time, with greater errors (quick_pass.h, keying.md). For
+  // screens of one primary, by the table; others, and follow(), take the full way.
+  quick,
+  full
 };
 
 // One setting for all clips; the first two are what a difficult one may want.
@@ -32,6 +42,7 @@ struct KeySettings {
   bool learned = true;        // the table; without it the plain ratio, for screens unlike any
   bool follows_light = true;  // the plate's gain is measured in each frame
   float smoothing = 1;        // of alpha over frames, in units of the noise; 0 = none
+  KeyEffort effort = KeyEffort::full;
 };
 
 // Where the key holds. Each is (height, width) of 0..255, or empty.
@@ -77,8 +88,8 @@ class Keyer {
   KeyReport key(const capture::Image& frame, capture::HalfImage& keyed);
   KeyReport key(const CodedFrame& frame, capture::HalfImage& keyed);
 
-  // For keying texels by themselves (key_texel.h): the plate as lit in the newest frame; one that
-  // is held stays as it is.
+  // For keying texels by themselves (key_texel.h): the plate as lit in the newest frame, or, where
+  // frames are keyed quickly, in the last one that was followed; one that is held stays as it is.
   const LitPlate& lit() const { return light_.lit(); }
   std::shared_ptr<const LitPlate> shared_lit() const { return light_.shared_lit(); }
   const KeyDials& dials() const { return dials_; }
@@ -103,12 +114,18 @@ class Keyer {
   float key_rows(const Source& source,
                  std::span<const typename Source::Bounds> bare,
                  const Target& target);
+  template <class Source>
+  float key_quickly(const Source& source,
+                    std::span<const typename Source::Bounds> bare,
+                    const Target& target);
   bool glances() const;
   template <class Rows>
   void watch(const Rows& rows);
   KeyReport report(const PlateSight& sight, float soft) const;
 
   PlateLight light_;
+  std::optional<QuickLight> quick_;   // of quick keying
+  std::vector<std::uint8_t> masked_;  // of quick keying: 8x8 pixels that a mask covers some of
   PlateWatch watch_;
   PlateShift shift_;
   int until_look_ = 0;   // frames

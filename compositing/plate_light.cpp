@@ -8,21 +8,12 @@
 
 #include "compositing/clean_plate.h"
 #include "compositing/key_lanes.h"
+#include "compositing/plate_cells.h"
 
 namespace compositing {
 namespace {
 
 constexpr float least_excess = 0.004F;  // of display white: below it a plate shows no screen
-constexpr float least_gain = 0.15F, most_gain = 2.5F;
-constexpr float clipped_from = 0.985F;
-// Of a cell's gain in its neighbourhood's light: deep shadow, and what is too dark to have a
-// colour.
-constexpr float deep = 0.25F, black = 0.03F;
-// How far from screen in sight a place is near it, and from where on deep within what stands before
-// it: in cells of a picture as high as those that the table is learned from. Hair is the wider the
-// higher a picture is.
-constexpr float near_cells = 2, deep_cells = 3, learned_height = 270;
-
 int cells_along(int side, int step) { return (side + step - 1) / step; }
 
 float excess_of(const float* c, ScreenColour colour) {
@@ -53,30 +44,6 @@ std::vector<float> means_over(const CleanPlate& plate, int step) {
   return means;
 }
 
-// 1 in the first `count` lanes, 0 beyond.
-F8 lanes_below(int count) {
-  F8 v{};
-  for (int i = 0; i < key_lanes; ++i) v[i] = i < count ? 1.0F : 0.0F;
-  return v;
-}
-
-// Of pairs of neighbours: sums of a's in the lower part of each half, of b's in the upper.
-F8 pair_sums(F8 a, F8 b) {
-  return __builtin_shufflevector(a, b, 0, 2, 8, 10, 4, 6, 12, 14) +
-         __builtin_shufflevector(a, b, 1, 3, 9, 11, 5, 7, 13, 15);
-}
-
-// The sum of each.
-F8 sums_of(const std::array<F8, key_lanes>& v) {
-  const F8 a = pair_sums(pair_sums(v[0], v[1]), pair_sums(v[2], v[3]));
-  const F8 b = pair_sums(pair_sums(v[4], v[5]), pair_sums(v[6], v[7]));
-  return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11) +
-         __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
-}
-
-F8 chosen(I8 which, F8 value) { return std::bit_cast<F8>(which & std::bit_cast<I8>(value)); }
-F8 size_of(F8 v) { return std::bit_cast<F8>(std::bit_cast<I8>(v) & 0x7FFFFFFF); }
-
 }  // namespace
 
 std::array<float, 4> plate_at(const LitPlate& plate, int y, int x) {
@@ -96,6 +63,32 @@ std::array<float, 4> plate_at(const LitPlate& plate, int y, int x) {
     p[i] = top + v * (low - top);
   }
   return p;
+}
+
+// Between neighbours across, then down.
+void smooth_gains(const GapFiller& filler, std::vector<float>& blurred, std::vector<float>& gains) {
+  const int rows = filler.rows(), columns = filler.columns();
+  const auto width = static_cast<std::size_t>(columns);
+  for (int row = 0; row < rows; ++row) {
+    const float* from = filler.value(row, 0);
+    float* to = &blurred[static_cast<std::size_t>(row) * width];
+    if (columns == 1) {
+      to[0] = from[0];
+      continue;
+    }
+    to[0] = 0.75F * from[0] + 0.25F * from[1];
+    for (int i = 1; i + 1 < columns; ++i)
+      to[i] = 0.25F * (from[i - 1] + from[i + 1]) + 0.5F * from[i];
+    to[columns - 1] = 0.75F * from[columns - 1] + 0.25F * from[columns - 2];
+  }
+  for (int row = 0; row < rows; ++row) {
+    const auto at = [&](int r) {
+      return &blurred[static_cast<std::size_t>(std::clamp(r, 0, rows - 1)) * width];
+    };
+    const float *above = at(row - 1), *here = at(row), *below = at(row + 1);
+    float* to = &gains[static_cast<std::size_t>(row) * width];
+    for (int i = 0; i < columns; ++i) to[i] = 0.25F * (above[i] + below[i]) + 0.5F * here[i];
+  }
 }
 
 PlateLight::PlateLight(CleanPlate plate, PlateUse use)
@@ -220,39 +213,19 @@ inline std::array<F8, 3> PlateLight::ratios_at(int y, int x) const {
   return ratios;
 }
 
-// What is seen of one cell, in lanes to be summed.
-struct PlateLight::CellSums {
-  F8 alike{};  // pixels of the plate's colour that are lit by far not more nor less than it
-  F8 gain{}, gain_squared{}, off{}, bright{};  // of those; how far off in units of the plate
-  F8 dark{};                                   // pixels in deep shadow
-};
-
 template <class Rows>
-[[gnu::always_inline]] inline PlateLight::CellSums PlateLight::look_at(const Rows& source,
-                                                                       int row,
-                                                                       int column) const {
+[[gnu::always_inline]] inline CellSums PlateLight::look_at(const Rows& source,
+                                                           int row,
+                                                           int column) const {
   static_assert(cell == key_lanes);
   const int bottom = std::min(bare_.height, (row + 1) * cell);
   const int count = std::min(cell, bare_.width - column * cell);
   const I8 inside = count == cell ? ~I8{} : lanes_below(count) > 0.0F;
-  const F8 one = all_of(1);
   CellSums sums;
   for (int y = row * cell + 1; y < bottom; y += rows_apart_) {
-    const auto ratios = ratios_at(y, column * cell);
     std::array<F8, 3> c;
     source.load(y, column * cell, count, c);
-    const F8 q = c[0] * ratios[0];
-    const F8 d1 = less_times(c[1], c[0], ratios[1]), d2 = less_times(c[2], c[0], ratios[2]);
-    const F8 away = size_of(d1) + size_of(d2);
-    const I8 coloured = (away < tolerance_ * c[0]) & inside;
-    const I8 alike = coloured & (q > least_gain) & (q < most_gain);
-    const F8 gain = chosen(alike, q);
-    sums.dark += chosen(coloured & (q > black) & (q < deep), one);
-    sums.alike += chosen(alike, one);
-    sums.gain += gain;
-    sums.gain_squared = times_plus(gain, gain, sums.gain_squared);
-    sums.off += chosen(alike, away * ratios[0]);
-    sums.bright += chosen(alike & (c[0] >= clipped_from), one);
+    sums.add(c, ratios_at(y, column * cell), inside, tolerance_);
   }
   return sums;
 }
@@ -260,7 +233,7 @@ template <class Rows>
 // Gain of each cell whose pixels have the plate's colour, all about equally bright.
 template <class Rows>
 PlateSight PlateLight::measure(const Rows& source) {
-  F8 screen{}, all_known{}, seen{}, clipped{}, off{}, dark{};
+  SightSums all;
   for (int row = 0; row < filler_.rows(); ++row) {
     for (int first = 0; first < filler_.columns(); first += key_lanes) {
       const int cells = std::min(key_lanes, filler_.columns() - first);
@@ -270,42 +243,17 @@ PlateSight PlateLight::measure(const Rows& source) {
       const auto bytes = static_cast<std::size_t>(cells) * sizeof(float);
       F8 pixels{};
       std::memcpy(&pixels, &pixels_[at], bytes);
-      std::array<F8, key_lanes> alike, gain, squared, away, bright;
-      for (int i = 0; i < key_lanes; ++i) {
-        CellSums sums;
-        if (i < cells && pixels[i] > 0) sums = look_at(source, row, first + i);
-        const auto k = static_cast<std::size_t>(i);
-        alike[k] = sums.alike, gain[k] = sums.gain, squared[k] = sums.gain_squared;
-        away[k] = sums.off, bright[k] = sums.bright;
-        dark += sums.dark;
+      std::array<CellSums, key_lanes> sums;
+      for (int i = 0; i < cells; ++i) {
+        if (pixels[i] > 0) sums[static_cast<std::size_t>(i)] = look_at(source, row, first + i);
       }
-      const F8 n = sums_of(alike), zero{}, one = all_of(1);
-      const F8 over = one / (n > 0.0F ? n : one);
-      const F8 gains = sums_of(gain), mean = gains * over;
-      const F8 variance = sums_of(squared) * over - mean * mean;
-      const F8 most_deviation = 0.02F * mean + spread_;
-      const I8 known = pixels > 0.0F;
-      const I8 good = known & (n >= 0.6F * pixels) & (variance <= most_deviation * most_deviation);
-      const F8 value = chosen(good, mean), weight = chosen(good, one);
-      std::memcpy(filler_.value(row, first), &value, bytes);
-      std::memcpy(&filler_.weight(row, first), &weight, bytes);
-      std::memcpy(&shown_[at], &weight, bytes);
-      screen += chosen(known, one), all_known += most(pixels, zero), seen += weight;
-      clipped += chosen(good, sums_of(bright) * over);
-      off += chosen(good, sums_of(away) / most(gains, all_of(least_gain)));
+      const auto [gain, known] = all.add(sums, pixels, spread_);
+      std::memcpy(filler_.value(row, first), &gain, bytes);
+      std::memcpy(&filler_.weight(row, first), &known, bytes);
+      std::memcpy(&shown_[at], &known, bytes);
     }
   }
-  const auto share = [](F8 part, F8 of) {
-    const float whole = sum_of(of);
-    return whole > 0 ? sum_of(part) / whole : 0.0F;
-  };
-  PlateSight sight;
-  sight.has_screen = sum_of(screen) > 0;
-  sight.screen = share(seen, screen);
-  sight.clipped = share(clipped, seen);
-  sight.shadowed = share(dark, all_known);
-  sight.mismatch = share(off, seen);
-  return sight;
+  return all.sight();
 }
 
 void PlateLight::check_size(int height, int width) const {
@@ -315,18 +263,26 @@ void PlateLight::check_size(int height, int width) const {
                               std::to_string(width) + "x" + std::to_string(height));
 }
 
-PlateSight PlateLight::update(const capture::Image& frame, bool follow) {
+void PlateLight::check(const capture::Image& frame) const {
   check_size(frame.height, frame.width);
   if (frame.channels != 3) throw std::invalid_argument("a frame to key has three channels");
+}
+
+PlateSight PlateLight::update(const capture::Image& frame, bool follow) {
+  check(frame);
   return update_from(LightRows(frame, channels_of(plate_.colour)), follow);
 }
 
-PlateSight PlateLight::update(const CodedFrame& frame, bool follow) {
+void PlateLight::check(const CodedFrame& frame) const {
   check_size(frame.height, frame.width);
   if (frame.rgba.size() !=
       4 * static_cast<std::size_t>(frame.height) * static_cast<std::size_t>(frame.width)) {
     throw std::invalid_argument("the codes of a frame to key do not fill it");
   }
+}
+
+PlateSight PlateLight::update(const CodedFrame& frame, bool follow) {
+  check(frame);
   return update_from(CodeRows(frame.rgba.data(), frame.width, channels_of(plate_.colour),
                               light_polynomial(frame.transfer)),
                      follow);
@@ -367,31 +323,12 @@ std::shared_ptr<LitPlate> PlateLight::renew() {
   return before;
 }
 
-// Smooths the gain and puts it on the plate.
+// Puts the smoothed gain on the plate.
 void PlateLight::light_up() {
   gained_ = true;
-  const int rows = filler_.rows(), columns = filler_.columns();
-  const auto width = static_cast<std::size_t>(columns);
-  for (int row = 0; row < rows; ++row) {
-    const float* from = filler_.value(row, 0);
-    float* to = &blurred_[static_cast<std::size_t>(row) * width];
-    if (columns == 1) {
-      to[0] = from[0];
-      continue;
-    }
-    to[0] = 0.75F * from[0] + 0.25F * from[1];
-    for (int i = 1; i + 1 < columns; ++i)
-      to[i] = 0.25F * (from[i - 1] + from[i + 1]) + 0.5F * from[i];
-    to[columns - 1] = 0.75F * from[columns - 1] + 0.25F * from[columns - 2];
-  }
-  for (int row = 0; row < rows; ++row) {
-    const auto blurred = [&](int at) {
-      return &blurred_[static_cast<std::size_t>(std::clamp(at, 0, rows - 1)) * width];
-    };
-    const float *above = blurred(row - 1), *here = blurred(row), *below = blurred(row + 1);
-    float* to = &gains_[static_cast<std::size_t>(row) * width];
-    for (int i = 0; i < columns; ++i) to[i] = 0.25F * (above[i] + below[i]) + 0.5F * here[i];
-  }
+  smooth_gains(filler_, blurred_, gains_);
+  const int rows = filler_.rows();
+  const auto width = static_cast<std::size_t>(filler_.columns());
   const float reach = static_cast<float>(cell / bare_.step);  // of a gain's cell, in plate cells
   const bool by_excess = bare_.use == PlateUse::screen;
   for (int row = 0; row < bare_.rows; ++row) {

@@ -106,6 +106,7 @@ KeySettings any_settings(Random& random) {
   settings.smoothing = random.below(4) == 0 ? 0 : 1;
   if (random.below(3) == 0) settings.core = 0.6F, settings.despill = 2, settings.edge = 0.4F;
   if (random.below(3) == 0) settings.despill = 0.5F;
+  if (random.below(2) == 0) settings.effort = KeyEffort::quick;
   return settings;
 }
 
@@ -127,6 +128,7 @@ TEST(KeyPass, IsTheFormulaOfEachPixelByItself) {
     const CleanPlate plate = any_plate(random, height, width);
     KeySettings settings = any_settings(random);
     settings.smoothing = 0;
+    settings.effort = KeyEffort::full;
     KeyMasks masks;
     masks.core.assign(static_cast<std::size_t>(height * width), 0);  // no glances
     Keyer keyer(plate, settings, masks);

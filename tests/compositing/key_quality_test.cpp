@@ -37,6 +37,23 @@ TEST(KeyQuality, HoldsOnAFewScenesOfOtherSeeds) {
   }
 }
 
+TEST(KeyQuality, HoldsForQuickKeysToo) {
+  std::vector<MadeScene> scenes;
+  for (const MadeScene& scene : made_scenes()) {
+    if (PLATELIGHT_FULL_TESTS || scenes.size() < 6) scenes.push_back(scene);
+  }
+  KeySettings settings;
+  settings.effort = KeyEffort::quick;
+  const TrialSize size{270, 480, PLATELIGHT_FULL_TESTS ? MadeClip::frames : 8, MadeClip::frames};
+  const auto trials =
+      judge_scenes(scenes, {judged_seeds, PLATELIGHT_FULL_TESTS ? 3U : 1U}, settings, size);
+  const KeyScore ours = mean_over(trials, &SceneTrial::ours);
+  EXPECT_LE(ours.error.composite, 0.55);
+  EXPECT_LE(ours.error.edge, 1.3);
+  EXPECT_LE(ours.error.alpha_mse, 1.3e-3);
+  EXPECT_LE(ours.flicker, 0.010);
+}
+
 TEST(KeyQuality, HoldsOverAllScenesSeedsAndFrames) {
   if (!PLATELIGHT_FULL_TESTS) GTEST_SKIP() << "takes minutes: tests/run.sh --full";
   const auto trials = judge_scenes(made_scenes(), judged_seeds, {});

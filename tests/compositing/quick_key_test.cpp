@@ -1,0 +1,175 @@
+// Quick keys against full ones, and what holds of both.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <string_view>
+#include <vector>
+
+#include "compositing/keyer.h"
+#include "compositing/made_clip.h"
+
+namespace compositing {
+namespace {
+
+using capture::HalfImage;
+using capture::Image;
+
+KeySettings quick_settings() {
+  KeySettings settings;
+  settings.effort = KeyEffort::quick;
+  return settings;
+}
+
+CleanPlate plate_of(const MadeClip& clip) {
+  const std::vector<Image> shots{light_of(clip.plate_shot(0)), light_of(clip.plate_shot(1))};
+  return average_plate(shots);
+}
+
+Image even_picture(int height, int width, std::array<float, 3> light) {
+  Image image = capture::make_image(height, width);
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = light[i % 3];
+  return image;
+}
+
+void expect_valid(const Image& keyed) {
+  for (std::size_t i = 0; i < keyed.pixels.size(); ++i) {
+    const float value = keyed.pixels[i];
+    ASSERT_TRUE(value >= 0 && value <= (i % 4 == 3 ? 1 : capture::half_max)) << i << ": " << value;
+  }
+}
+
+TEST(QuickKey, IsNearTheFullOneInAllScenesAndSizes) {
+  const std::array<std::array<int, 2>, 4> sizes{{{135, 240}, {131, 237}, {66, 129}, {100, 161}}};
+  std::size_t number = 0;
+  for (const MadeScene& scene : made_scenes()) {
+    const auto [height, width] = sizes[number++ % sizes.size()];
+    const MadeClip clip(scene, 21, height, width);
+    Keyer quick(plate_of(clip), quick_settings()), full(plate_of(clip), {});
+    HalfImage a, b;
+    double off = 0, count = 0;
+    for (int i = 0; i < 4; ++i) {
+      const Image light = light_of(clip.frame(i).seen);
+      const KeyReport of_quick = quick.key(light, a), of_full = full.key(light, b);
+      EXPECT_NEAR(of_quick.sight.gain, of_full.sight.gain, 0.03F * of_full.sight.gain)
+          << scene.name;
+      EXPECT_NEAR(of_quick.confidence, of_full.confidence, 0.35F) << scene.name;
+      const Image keyed = to_float(a), wanted = to_float(b);
+      expect_valid(keyed);
+      for (std::size_t p = 0; p < keyed.pixels.size(); ++p) {
+        off += std::abs(keyed.pixels[p] - wanted.pixels[p]);
+        count += 1;
+      }
+    }
+    EXPECT_LT(off / count, 0.008) << scene.name;
+  }
+}
+
+TEST(QuickKey, OfCodesIsTheOneOfTheirLight) {
+  const MadeClip clip(made_scene("plain"), 21, 135, 240);
+  const MadeFrame made = clip.frame(5);
+  std::vector<std::uint8_t> rgba;
+  for (std::size_t i = 0; i < made.seen.codes.size(); i += 3) {
+    rgba.insert(rgba.end(),
+                {made.seen.codes[i], made.seen.codes[i + 1], made.seen.codes[i + 2], 9});
+  }
+  Keyer a(plate_of(clip), quick_settings()), b(plate_of(clip), quick_settings());
+  HalfImage of_codes, of_light;
+  a.key(CodedFrame{135, 240, rgba, capture::Transfer::srgb}, of_codes);
+  b.key(light_of(made.seen), of_light);
+  const Image codes = to_float(of_codes), light = to_float(of_light);
+  double off = 0;
+  for (std::size_t i = 0; i < codes.pixels.size(); ++i)
+    off += std::abs(codes.pixels[i] - light.pixels[i]);
+  EXPECT_LT(off / static_cast<double>(codes.pixels.size()), 2e-3);
+}
+
+TEST(QuickKey, LeavesNothingOfAPersonWhoHasLeft) {
+  const Image screen = even_picture(48, 80, {0.035F, 0.4F, 0.06F});
+  Image person = screen;
+  for (int y = 5; y < 40; ++y) {
+    for (int x = 11; x < 67; ++x) {
+      for (int c = 0; c < 3; ++c) person.at(y, x, c) = 0.3F;
+    }
+  }
+  Keyer keyer(average_plate({&screen, 1}), quick_settings());
+  KeyedFrame keyed;
+  for (int i = 0; i < 3; ++i) keyer.key(person, keyed);
+  EXPECT_EQ(keyed.image().pixels[keyed.image().index(20, 40, 3)], 0x3C00);
+  for (int i = 0; i < 3; ++i) keyer.key(screen, keyed);
+  for (const capture::Half half : keyed.image().pixels) ASSERT_EQ(half, 0);
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 10; ++column) ASSERT_FALSE(keyed.has_any_in_block(row, column));
+  }
+}
+
+TEST(QuickKey, LeavesNoTrail) {
+  const MadeClip clip(made_scene("walking"), 21, 135, 240);
+  Keyer keyer(plate_of(clip), quick_settings());
+  HalfImage half;
+  double trail = 0, bare = 0;
+  for (int i = 0; i < 24; ++i) {
+    const MadeFrame made = clip.frame(i);
+    keyer.key(light_of(made.seen), half);
+    const Image keyed = to_float(half);
+    for (std::size_t p = 3; p < keyed.pixels.size(); p += 4) {
+      if (made.truth.pixels[p] > 0) continue;
+      trail += keyed.pixels[p];
+      bare += 1;
+    }
+  }
+  EXPECT_LT(trail / bare, 2e-3);
+}
+
+TEST(QuickKey, HoldsMasks) {
+  const Image screen = even_picture(40, 64, {0.035F, 0.4F, 0.06F});
+  const Image grey = even_picture(40, 64, {0.4F, 0.4F, 0.4F});
+  KeyMasks masks;
+  masks.garbage.assign(40 * 64, 0);
+  masks.core.assign(40 * 64, 0);
+  masks.garbage[20 * 64 + 30] = 255;
+  masks.core[9 * 64 + 50] = 255;
+  Keyer keyer(average_plate({&screen, 1}), quick_settings(), masks);
+  HalfImage keyed;
+  keyer.key(grey, keyed);
+  EXPECT_EQ(to_float(keyed).at(20, 30, 3), 0);
+  EXPECT_EQ(to_float(keyed).at(20, 31, 3), 1);
+  keyer.restart();
+  keyer.key(screen, keyed);
+  EXPECT_EQ(to_float(keyed).at(9, 50, 3), 1);
+  EXPECT_EQ(to_float(keyed).at(9, 51, 3), 0);
+}
+
+TEST(QuickKey, IsTheFullOneWhereItDoesNotApply) {
+  for (const std::string_view what : {"yellow screen", "difference", "plain ratio"}) {
+    const MadeClip clip(made_scene(what == "yellow screen" ? what : "plain"), 21, 66, 129);
+    KeySettings settings;
+    if (what == "difference") settings.method = KeyMethod::difference;
+    if (what == "plain ratio") settings.learned = false;
+    Keyer full(plate_of(clip), settings);
+    settings.effort = KeyEffort::quick;
+    Keyer quick(plate_of(clip), settings);
+    HalfImage a, b;
+    for (int i = 0; i < 3; ++i) {
+      const Image light = light_of(clip.frame(i).seen);
+      quick.key(light, a), full.key(light, b);
+      ASSERT_EQ(a.pixels, b.pixels) << what;
+    }
+  }
+}
+
+TEST(QuickKey, RefusesWhatTheFullOneRefuses) {
+  const Image screen = even_picture(16, 24, {0.035F, 0.4F, 0.06F});
+  Keyer keyer(average_plate({&screen, 1}), quick_settings());
+  HalfImage keyed;
+  EXPECT_THROW(keyer.key(even_picture(20, 30, {0, 0, 0}), keyed), std::invalid_argument);
+  EXPECT_THROW(keyer.key(capture::make_image(16, 24, 4), keyed), std::invalid_argument);
+  const std::vector<std::uint8_t> few(8);
+  EXPECT_THROW(keyer.key(CodedFrame{16, 24, few, capture::Transfer::srgb}, keyed),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace compositing
