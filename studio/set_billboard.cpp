@@ -46,6 +46,10 @@ KeyChoice read_key(Section table, const SetContext& context) {
   table.boolean("learned", settings.learned);
   table.boolean("follows_light", settings.follows_light);
   table.number("smoothing", settings.smoothing, {0, 4});
+  std::string effort = "full";
+  table.word("effort", effort, {"full", "quick"});
+  settings.effort =
+      effort == "quick" ? compositing::KeyEffort::quick : compositing::KeyEffort::full;
   table.file("garbage", context.base, key.masks.garbage);
   table.file("core_mask", context.base, key.masks.core);
   if (key.by_texel && !key.masks.empty()) {

@@ -37,6 +37,11 @@ std::vector<Setting> settings() {
   s.follows_light = false;
   all.push_back({"table", "plate as taken", s});
   s = {};
+  s.effort = compositing::KeyEffort::quick;
+  all.push_back({"table, quick", "quick", s});
+  s.smoothing = 0;
+  all.push_back({"table, quick", "no smoothing", s});
+  s = {};
   s.learned = false;
   all.push_back({"plain ratio", "all else", s});
   s.smoothing = 0;
@@ -141,7 +146,8 @@ class KeyChart {
       point.by_default = setting.by_default;
       point.settings = {{"learned", setting.settings.learned},
                         {"follows_light", setting.settings.follows_light},
-                        {"smoothing", double{setting.settings.smoothing}}};
+                        {"smoothing", double{setting.settings.smoothing}},
+                        {"quick", setting.settings.effort == compositing::KeyEffort::quick}};
       point.time_ms = least_ms(quick_ ? 2 : 9, [&] { keyer.key(coded, keyed); });
       add(chart, std::move(point), compositing::mean_over(trials, &SceneTrial::ours));
     }

@@ -30,7 +30,7 @@ constexpr std::int64_t plate_frames = 50;
 
 struct KeyOptions {
   std::vector<std::string> what;
-  std::string out, plate, colour = "Rec.1886", method = "screen";
+  std::string out, plate, colour = "Rec.1886", method = "screen", effort = "full";
   bool person = false;
   std::optional<std::int64_t> frames, first;
   std::optional<double> screen, core, edge, despill, smoothing;
@@ -85,6 +85,7 @@ compositing::KeySettings settings_of(const KeyOptions& options) {
   take(options.edge, settings.edge);
   take(options.despill, settings.despill);
   take(options.smoothing, settings.smoothing);
+  if (options.effort == "quick") settings.effort = compositing::KeyEffort::quick;
   return settings;
 }
 
@@ -192,6 +193,8 @@ Command key_command() {
         arguments.option("--edge", o->edge, -1, 1, "thinner to fuller");
         arguments.option("--despill", o->despill, 0, 2, "none, 1 all of the likely spill, up to 2");
         arguments.option("--smoothing", o->smoothing, 0, 4, "of alpha over frames");
+        arguments.choice("--effort", o->effort, {"full", "quick"},
+                         "for a frame; quick is for screens of one primary");
         return [o](Console& console) { key(*o, console); };
       }};
 }
