@@ -48,9 +48,10 @@ QuickLight::QuickLight(const LitPlate& bare, float tolerance, float spread)
     for (int column = 0; column < filler_.columns(); ++column) {
       std::array<Look, 2> looks;
       float all = 0, known = 0;
-      for (int i = 0; i < 2; ++i) {
+      const int count = cell_ > key_lanes ? 1 : 2;
+      for (int i = 0; i < count; ++i) {
         Look& look = looks[static_cast<std::size_t>(i)];
-        look.y = row * cell_ + cell_ / 4 + i * cell_ / 2;
+        look.y = row * cell_ + (2 * i + 1) * cell_ / (2 * count);
         look.x = column * cell_ + (cell_ - key_lanes) / 2;
         look.count = look.y < bare.height ? std::clamp(bare.width - look.x, 0, key_lanes) : 0;
         if (look.count == 0) continue;

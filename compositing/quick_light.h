@@ -15,8 +15,9 @@
 
 namespace compositing {
 
-// As PlateLight for screens of one primary, but of each 16x16 pixels (8x8 of small pictures) 16 are
-// looked at, each 8x8 pixels have one gain, and the plate is lit only where it is asked for.
+// As PlateLight for screens of one primary, but of each 16x16 pixels 8 are looked at, or in small
+// pictures 16 of each 8x8; each 8x8 pixels have one gain, and the plate is lit only where it is
+// asked for.
 class QuickLight {
  public:
   // The plate without gain, of PlateUse::screen. `tolerance` is of colour, against the primary,
@@ -58,7 +59,7 @@ class QuickLight {
   int rows_, columns_;  // of blocks
   std::array<int, 3> order_;
   float tolerance_, spread_;
-  std::vector<std::array<Look, 2>> looks_;  // of each cell of the gain
+  std::vector<std::array<Look, 2>> looks_;  // of each cell of the gain; may be of no pixels
   std::vector<float> pixels_;               // of each that are looked at, 0 = shows no screen
   GapFiller filler_;
   std::vector<float> shown_, blurred_, smoothed_;  // of the gain's cells
