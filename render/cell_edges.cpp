@@ -254,7 +254,7 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
   const Met here = met_at(index);
   const int px = f.pixel % cell_size, py = f.pixel / cell_size;
   const auto& offset = frame_->pattern[f.index];
-  const bool shares = edge_[f.pixel] == Edge::surface;  // all of its radiance
+  const bool shares_all = edge_[f.pixel] == Edge::surface && !smooths_;
   float best = 1e9F;
   int found = -1;
   for (int dy = -1; dy <= 1; ++dy) {
@@ -268,7 +268,7 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
       if (distance >= best) continue;
       const Met& there = met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)];
       if (!continuous(here, there, frame_->pixel_angle, frame_->camera)) continue;
-      if (shares && bent_mirror(static_cast<std::size_t>(k), here, there)) continue;
+      if (shares_all && bent_mirror(static_cast<std::size_t>(k), here, there)) continue;
       best = distance;
       found = k;
     }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <stdexcept>
 #include <string_view>
 #include <vector>
@@ -140,6 +141,27 @@ TEST(QuickKey, HoldsMasks) {
   keyer.key(screen, keyed);
   EXPECT_EQ(to_float(keyed).at(9, 50, 3), 1);
   EXPECT_EQ(to_float(keyed).at(9, 51, 3), 0);
+}
+
+TEST(QuickKey, StaysValidWhereThereIsNothingToGoBy) {
+  const Image screen = even_picture(40, 64, {0.035F, 0.4F, 0.06F});
+  const float nan = std::nanf(""), inf = std::numeric_limits<float>::infinity();
+  Keyer keyer(average_plate({&screen, 1}), quick_settings());
+  HalfImage keyed;
+  for (const std::array<float, 3> light : {std::array<float, 3>{0, 0, 0},
+                                           {1e-7F, 1e-6F, 1e-7F},
+                                           {1e6F, 1e7F, 1e6F},
+                                           {nan, nan, nan},
+                                           {inf, inf, inf},
+                                           {-1, -1, -1}}) {
+    const KeyReport report = keyer.key(even_picture(40, 64, light), keyed);
+    EXPECT_LT(report.confidence, 0.6F) << light[1];
+    expect_valid(to_float(keyed));
+  }
+  const Image black = even_picture(40, 64, {0, 0, 0});
+  Keyer of_nothing(average_plate({&black, 1}), quick_settings());
+  EXPECT_EQ(of_nothing.key(screen, keyed).status, KeyStatus::no_screen);
+  expect_valid(to_float(keyed));
 }
 
 TEST(QuickKey, IsTheFullOneWhereItDoesNotApply) {
