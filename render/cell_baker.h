@@ -223,7 +223,8 @@ class CellBaker final : public RaySink {
   Vec3f lamp_at(std::size_t place, std::size_t centre) const;
   template <class OfLight, class OfLamp>
   void for_each_doubt(std::size_t a, std::size_t b, OfLight&& light, OfLamp&& lamp) const;
-  Vec3f light_in_doubt(std::size_t a, std::size_t b) const;
+  bool lamp_shows(std::size_t place, std::size_t a, std::size_t b) const;
+  std::array<Vec3f, 2> light_in_doubt(std::size_t a, std::size_t b) const;
   void find_doubts(std::size_t pixel, std::size_t centre);
   void settle_doubts(int count);
   void ask_again(const ShadePoint& p, std::size_t receiver, std::size_t centre, const Doubt& doubt);
@@ -338,7 +339,8 @@ class CellBaker final : public RaySink {
   std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
   std::vector<PointLamp> reached_;
-  std::vector<Doubt> doubts_;  // about one pixel
+  std::vector<Doubt> doubts_;
+  std::array<std::size_t, 2> doubtful_{};  // pixel and centre whose doubts these are
   std::vector<AskedAgain> asked_;
   std::vector<CellTransport::LightTerm> lamp_terms_;  // many times the transport's
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
@@ -362,6 +364,7 @@ class CellBaker final : public RaySink {
       answers_light_;    // points around, before they were made not to
   CellTransport aside_;  // of the pixels around: it tells nothing of the cell
   std::array<Edge, cell_pixels> edge_;
+  CellMask mirrors_;  // centres whose surfaces sent rays on, or mirror lights
   std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_,
       batch_squares_;  // of further samples
   std::array<std::uint16_t, cell_pixels> counts_, batches_;

@@ -28,6 +28,17 @@ Vec3f CellBaker::lamp_at(std::size_t place, std::size_t centre) const {
   return passed * lamps.factors[place].at[centre];
 }
 
+// Whether a lamp that one of two centres sees shows enough there to be worth rays: it may be one of
+// many samples of a screen. Those that are not are other light, which samples share or find anew.
+bool CellBaker::lamp_shows(std::size_t place, std::size_t a, std::size_t b) const {
+  const CellTransport& t = *transport_;
+  const std::size_t seeing = t.lamps.factors[place].at[a] > 0 ? a : b;
+  const Vec3f irradiance =
+      lamp_at(place, seeing) * frame_->planned_table->lamps[t.lamps.numbers[place]].intensity;
+  return std::max(largest(t.diffuse[a] * irradiance), largest(t.diffuse[b] * irradiance)) >
+         least_doubt * effort_.glint_contrast;
+}
+
 // Calls light(number among the compact ones) and lamp(place in the cell's lamps) for each source
 // that casts sharp shadows and that one of two centres sees, the other not.
 template <class OfLight, class OfLamp>
@@ -41,41 +52,42 @@ void CellBaker::for_each_doubt(std::size_t a, std::size_t b, OfLight&& light, Of
   const CellLamps& lamps = transport_->lamps;
   for (std::size_t i = 0; i < lamps.numbers.size(); ++i) {
     if ((lamps.factors[i].at[a] > 0) == (lamps.factors[i].at[b] > 0)) continue;
-    if (!shadow_rays_.is_caustic(lamps.numbers[i])) lamp(i);
+    if (!shadow_rays_.is_caustic(lamps.numbers[i]) && lamp_shows(i, a, b)) lamp(i);
   }
 }
 
-// Irradiance at the first of two centres of those sources, less that at the second.
-Vec3f CellBaker::light_in_doubt(std::size_t a, std::size_t b) const {
+// Irradiance of those sources at either of two centres.
+std::array<Vec3f, 2> CellBaker::light_in_doubt(std::size_t a, std::size_t b) const {
   const CellTransport& t = *transport_;
   const LightTable& planned = *frame_->planned_table;
-  Vec3f sum{};
+  std::array<Vec3f, 2> sums{};
+  const std::array<std::size_t, 2> centres{a, b};
   for_each_doubt(
       a, b,
       [&](std::size_t c) {
         const DirectionalLight& l = planned.lights[frame_->compact[c]];
-        sum += l.irradiance * (compact_at(c, a) * dot({t.nx[a], t.ny[a], t.nz[a]}, l.direction) -
-                               compact_at(c, b) * dot({t.nx[b], t.ny[b], t.nz[b]}, l.direction));
+        for (std::size_t i = 0; i < 2; ++i) {
+          const std::size_t k = centres[i];
+          const float cosine = dot({t.nx[k], t.ny[k], t.nz[k]}, l.direction);
+          sums[i] += l.irradiance * compact_at(c, k) * cosine;
+        }
       },
-      [&](std::size_t i) {
-        sum += planned.lamps[t.lamps.numbers[i]].intensity * (lamp_at(i, a) - lamp_at(i, b));
+      [&](std::size_t place) {
+        const Vec3f intensity = planned.lamps[t.lamps.numbers[place]].intensity;
+        for (std::size_t i = 0; i < 2; ++i) sums[i] += intensity * lamp_at(place, centres[i]);
       });
-  return sum;
+  return sums;
 }
 
 // Sources that a centre sees otherwise than others about a pixel do that show the same surface.
+// Points come pixel by pixel, and nearly always with one lender.
 void CellBaker::find_doubts(std::size_t pixel, std::size_t centre) {
+  if (doubtful_ == std::array{pixel, centre}) return;
+  doubtful_ = {pixel, centre};
   doubts_.clear();
   const auto note = [&](std::size_t number, bool is_lamp) {
     const Doubt doubt{static_cast<std::uint16_t>(number), is_lamp};
     if (std::ranges::find(doubts_, doubt) == doubts_.end()) doubts_.push_back(doubt);
-  };
-  // A lamp may be one of many samples of a screen.
-  const auto shows = [&](std::size_t i, std::size_t other) {
-    const Vec3f seen = lamp_at(i, centre) + lamp_at(i, other);  // one of them is nothing
-    const Vec3f intensity = frame_->planned_table->lamps[transport_->lamps.numbers[i]].intensity;
-    return largest(transport_->diffuse[centre] * seen * intensity) >
-           least_doubt * effort_.glint_contrast;
   };
   const int px = static_cast<int>(pixel % cell_size), py = static_cast<int>(pixel / cell_size);
   for (int y = std::max(py - 1, 0); y <= std::min(py + 1, cell_size - 1); ++y) {
@@ -85,9 +97,7 @@ void CellBaker::find_doubts(std::size_t pixel, std::size_t centre) {
       if (!continuous(met_by(centre), met_by(other), frame_->pixel_angle, frame_->camera)) continue;
       for_each_doubt(
           centre, other, [&](std::size_t c) { note(c, false); },
-          [&](std::size_t i) {
-            if (shows(i, other)) note(i, true);
-          });
+          [&](std::size_t i) { note(i, true); });
     }
   }
 }
@@ -95,8 +105,12 @@ void CellBaker::find_doubts(std::size_t pixel, std::size_t centre) {
 // Of the first points, those that have a centre's light ask for what is in doubt about their pixel.
 void CellBaker::settle_doubts(int count) {
   asked_.clear();
+  doubtful_.fill(nowhere);
   clear_receivers();
   Receivers& r = receivers_;
+  std::array<bool, stream_rays> has_lobe{};
+  for (const Lobe& lobe : lobes_)
+    has_lobe[static_cast<std::size_t>(lobe.point - points_.data())] = true;
   std::array<std::uint32_t, stream_rays + 1> first_of_point{};
   const auto& instances = frame_->inputs.scene->description().instances;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -104,7 +118,7 @@ void CellBaker::settle_doubts(int count) {
     const ShadePoint& p = points_[i];
     if (lender_[i] < 0 || instances[p.hit.instance].kind == ObjectKind::stand_in) continue;
     const auto centre = static_cast<std::size_t>(lender_[i]);
-    if (!in(transport_->receiving, centre)) continue;
+    if (!in(transport_->receiving, centre) || (p.diffuse == Vec3f{} && !has_lobe[i])) continue;
     find_doubts(p.pixel, centre);
     if (doubts_.empty()) continue;
     const auto k = static_cast<std::size_t>(r.count++);

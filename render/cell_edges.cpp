@@ -234,8 +234,8 @@ bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
     return t.diffuse[k] * (light.arriving + light.lamps - in_doubt) +
            t.shadow[k] * passing(light.open, light.open - light.arriving) * plate_contrast;
   };
-  const auto differ = [&](Vec3f in_doubt) {
-    return largest(abs(clipped(shown(a, in_doubt)) - clipped(shown(b, {})))) >
+  const auto differ = [&](const std::array<Vec3f, 2>& in_doubt) {
+    return largest(abs(clipped(shown(a, in_doubt[0])) - clipped(shown(b, in_doubt[1])))) >
            effort_.glint_contrast;
   };
   if (!differ({})) return false;
@@ -245,8 +245,7 @@ bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
 
 // Whether a pixel's centre, which shows the same surface, mirrors another part of what is about.
 bool CellBaker::bent_mirror(std::size_t k, const Met& here, const Met& there) const {
-  const bool mirrors = sent_[k] > 0 || samples_[k].added != first_[k];
-  return mirrors && dot(here.normal, there.normal) < alike_mirrors;
+  return in(mirrors_, k) && dot(here.normal, there.normal) < alike_mirrors;
 }
 
 // The nearest pixel whose centre shows the same surface as a further_ ray met_, or -1.
@@ -276,7 +275,7 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
   return found;
 }
 
-// The camera rays of `further_`.
+// The camera rays of `further_`. Cut-outs are filtered over a sample's share of the pixel's area.
 void CellBaker::trace_further(int count) {
   trace(count, true, RayKind::camera,
         frame_->pixel_angle / std::sqrt(static_cast<float>(samples_each_)));
@@ -372,7 +371,10 @@ void CellBaker::end_batch() {
 // middle. Pixels that are still uncertain take more, three times as many as they have, and again.
 void CellBaker::sample_edges() {
   const bool takes_centre = effort_.aa_samples <= few_samples;
+  mirrors_ = {};
   for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const bool mirrors = sent_[k] > 0 || samples_[k].added != first_[k];
+    mirrors_[k / 64] |= std::uint64_t{mirrors} << (k % 64);
     if (!takes_rays(k)) continue;
     clear_further(k);
     if (!takes_centre) continue;
@@ -443,7 +445,8 @@ CellMask CellBaker::edges() const {
 // from the picture's squared error. That is the variance of a sample over n, and falls by an n-th
 // of itself with one more; so of more samples a larger error is allowed, by the root of their
 // number. A pixel counts as varied as the mean of those around it, or as it is itself, if that is
-// more: what one of them saw of a small bright thing the next one may have missed.
+// more: what one of them saw of a small bright thing the next one may have missed. (Of samples that
+// are spread well the variance falls with n itself; then more of them are worth even less.)
 CellMask CellBaker::uncertain(int n) const {
   std::array<float, cell_pixels> variances{};
   for (std::size_t k = 0; k < cell_pixels; ++k) {

@@ -29,7 +29,7 @@ constexpr std::array<Classes, ray_views> all_classes{
     // A table's lights at one point are 64 by default, and the blocks of a smooth surface test a
     // sixteenth of them.
     make_classes({0, 16, 64, 256, 1024}),
-    // Beyond Effort::aa_tolerance by default: what is red took all samples that it may.
+    // Beyond Effort::aa_tolerance by default: what is red took many samples and is unsure still.
     make_classes({0, 0.01F, 0.02F, 0.05F, 0.1F})};
 
 // Glyphs of 3x5 pixels, each row three bits, the left one first.

@@ -42,7 +42,7 @@ struct Effort {
   bool chance_cuts = false;
   bool dark_cuts = false;  // cut rays see nothing, instead of the environment: for charts
   int max_depth = 64;      // safety net; counted when hit
-  int max_rays = 65536;    // that surfaces send on for a pixel; another safety net
+  int max_rays = 262144;   // that surfaces send on for a pixel; another safety net
   int tile_size = 32;      // pixels, a multiple of 16
   friend bool operator==(const Effort&, const Effort&) = default;
 };

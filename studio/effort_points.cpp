@@ -1,5 +1,6 @@
 // Points of effort, to and from files.
 #include "studio/effort_points.h"
+#include "render/kernel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,7 +38,7 @@ double as_written(float value) { return std::round(static_cast<double>(value) * 
 
 EffortPoint point_of(const Json& point, render::Effort effort) {
   const Json& settings = point.at("settings");
-  effort.aa_samples = whole(settings, "aa_samples", 1, 256);
+  effort.aa_samples = whole(settings, "aa_samples", 1, render::samples_max);
   effort.aa_tolerance = settings.at("aa_tolerance").get<float>();
   effort.glint_contrast = settings.at("glint_contrast").get<float>();
   effort.light_samples = whole(settings, "light_samples", 1, 4096);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "render/caustics.h"
+#include "render/kernel.h"
 #include "studio/set_sections.h"
 
 namespace studio {
@@ -125,7 +126,7 @@ SetError::SetError(std::vector<Diagnostic> diagnostics)
 
 render::Effort read_effort_section(Section section) {
   render::Effort effort;
-  section.integer("aa_samples", effort.aa_samples, 1, 256);
+  section.integer("aa_samples", effort.aa_samples, 1, render::samples_max);
   section.number("aa_tolerance", effort.aa_tolerance, {0, 1000});
   section.number("glint_contrast", effort.glint_contrast, {0, 1000});
   section.integer("light_samples", effort.light_samples, 1, 4096);
