@@ -17,6 +17,8 @@ constexpr float plate_contrast =
     0.4F;                         // by which virtual things are taken to differ from the plate
 constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
 constexpr Scene::Surface no_hit{~0U, ~0U};
+// Where each sample sends on so many rays, as behind ribbed glass, a pixel takes no more samples.
+constexpr int many_rays = 6, most_samples_of_many_rays = 256;
 constexpr float alike_mirrors = 0.99F;  // cosine between normals: what they mirror is alike
 // Of so few further samples, the one in the middle of the pattern would be the centre's once more.
 constexpr int few_samples = 4;
@@ -461,6 +463,8 @@ CellMask CellBaker::uncertain(int n) const {
   for (int k = 0; k < cell_pixels; ++k) {
     const auto own = static_cast<std::size_t>(k);
     if (!takes_rays(own) || counts_[own] != n) continue;
+    // A cell that is being found keeps a live frame waiting.
+    if (n >= most_samples_of_many_rays && sent_[own] > many_rays * n) continue;
     float around = 0, pixels = 0;
     for (int y = std::max(0, k / cell_size - 1); y <= std::min(cell_size - 1, k / cell_size + 1);
          ++y) {
