@@ -1,9 +1,11 @@
 // What cells of a frame show of the plate's light: for the files that follow it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
+#include <cstring>
 #include <vector>
 
 #include "compositing/clean_plate.h"
@@ -128,5 +130,38 @@ class SightSums {
 
 // Gains of cells, filled, made smooth. Both are of the filler's size.
 void smooth_gains(const GapFiller& filler, std::vector<float>& blurred, std::vector<float>& gains);
+
+// Gain of each cell whose pixels have the plate's colour, all about equally bright, by eight cells
+// of a row at a time: look(sums, cell, row, column) adds up what one shows. `pixels` tells of each
+// cell how many are looked at, 0 = it shows no screen; `shown` is which are known.
+template <class Look>
+PlateSight measure_cells(GapFiller& filler,
+                         const std::vector<float>& pixels,
+                         float spread,
+                         std::vector<float>& shown,
+                         const Look& look) {
+  SightSums all;
+  for (int row = 0; row < filler.rows(); ++row) {
+    for (int first = 0; first < filler.columns(); first += key_lanes) {
+      const int cells = std::min(key_lanes, filler.columns() - first);
+      const std::size_t at =
+          static_cast<std::size_t>(row) * static_cast<std::size_t>(filler.columns()) +
+          static_cast<std::size_t>(first);
+      const auto bytes = static_cast<std::size_t>(cells) * sizeof(float);
+      F8 count{};
+      std::memcpy(&count, &pixels[at], bytes);
+      std::array<CellSums, key_lanes> sums;
+      for (int i = 0; i < cells; ++i) {
+        const auto lane = static_cast<std::size_t>(i);
+        if (pixels[at + lane] > 0) look(sums[lane], at + lane, row, first + i);
+      }
+      const auto [gain, known] = all.add(sums, count, spread);
+      std::memcpy(filler.value(row, first), &gain, bytes);
+      std::memcpy(&filler.weight(row, first), &known, bytes);
+      std::memcpy(&shown[at], &known, bytes);
+    }
+  }
+  return all.sight();
+}
 
 }  // namespace compositing

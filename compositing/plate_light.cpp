@@ -230,30 +230,12 @@ template <class Rows>
   return sums;
 }
 
-// Gain of each cell whose pixels have the plate's colour, all about equally bright.
 template <class Rows>
 PlateSight PlateLight::measure(const Rows& source) {
-  SightSums all;
-  for (int row = 0; row < filler_.rows(); ++row) {
-    for (int first = 0; first < filler_.columns(); first += key_lanes) {
-      const int cells = std::min(key_lanes, filler_.columns() - first);
-      const std::size_t at =
-          static_cast<std::size_t>(row) * static_cast<std::size_t>(filler_.columns()) +
-          static_cast<std::size_t>(first);
-      const auto bytes = static_cast<std::size_t>(cells) * sizeof(float);
-      F8 pixels{};
-      std::memcpy(&pixels, &pixels_[at], bytes);
-      std::array<CellSums, key_lanes> sums;
-      for (int i = 0; i < cells; ++i) {
-        if (pixels[i] > 0) sums[static_cast<std::size_t>(i)] = look_at(source, row, first + i);
-      }
-      const auto [gain, known] = all.add(sums, pixels, spread_);
-      std::memcpy(filler_.value(row, first), &gain, bytes);
-      std::memcpy(&filler_.weight(row, first), &known, bytes);
-      std::memcpy(&shown_[at], &known, bytes);
-    }
-  }
-  return all.sight();
+  return measure_cells(filler_, pixels_, spread_, shown_,
+                       [&](CellSums& sums, std::size_t, int row, int column) {
+                         sums = look_at(source, row, column);
+                       });
 }
 
 void PlateLight::check_size(int height, int width) const {

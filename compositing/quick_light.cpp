@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "compositing/key_glance.h"
 #include "compositing/plate_cells.h"
@@ -86,38 +85,20 @@ QuickLight::QuickLight(const LitPlate& bare, float tolerance, float spread)
 
 template <class Rows>
 PlateSight QuickLight::measure(const Rows& source) {
-  SightSums all;
-  for (int row = 0; row < filler_.rows(); ++row) {
-    for (int first = 0; first < filler_.columns(); first += key_lanes) {
-      const int cells = std::min(key_lanes, filler_.columns() - first);
-      const std::size_t at =
-          static_cast<std::size_t>(row) * static_cast<std::size_t>(filler_.columns()) +
-          static_cast<std::size_t>(first);
-      const auto bytes = static_cast<std::size_t>(cells) * sizeof(float);
-      F8 pixels{};
-      std::memcpy(&pixels, &pixels_[at], bytes);
-      std::array<CellSums, key_lanes> sums;
-      for (std::size_t i = 0; i < static_cast<std::size_t>(cells); ++i) {
-        if (!(pixels_[at + i] > 0)) continue;
-        for (const Look& look : looks_[at + i]) {
-          if (look.count == 0) continue;
-          const F8 r = look.ratios;
-          std::array<F8, 3> c;
-          source.load(look.y, look.x, look.count, c);
-          sums[i].add(c,
-                      {__builtin_shufflevector(r, r, 0, 0, 0, 0, 4, 4, 4, 4),
-                       __builtin_shufflevector(r, r, 1, 1, 1, 1, 5, 5, 5, 5),
-                       __builtin_shufflevector(r, r, 2, 2, 2, 2, 6, 6, 6, 6)},
-                      look.count == key_lanes ? ~I8{} : lanes_below(look.count) > 0.0F, tolerance_);
-        }
-      }
-      const auto [gain, known] = all.add(sums, pixels, spread_);
-      std::memcpy(filler_.value(row, first), &gain, bytes);
-      std::memcpy(&filler_.weight(row, first), &known, bytes);
-      std::memcpy(&shown_[at], &known, bytes);
+  const auto look_at = [&](CellSums& sums, std::size_t cell, int, int) {
+    for (const Look& look : looks_[cell]) {
+      if (look.count == 0) continue;
+      const F8 r = look.ratios;
+      std::array<F8, 3> c;
+      source.load(look.y, look.x, look.count, c);
+      sums.add(c,
+               {__builtin_shufflevector(r, r, 0, 0, 0, 0, 4, 4, 4, 4),
+                __builtin_shufflevector(r, r, 1, 1, 1, 1, 5, 5, 5, 5),
+                __builtin_shufflevector(r, r, 2, 2, 2, 2, 6, 6, 6, 6)},
+               look.count == key_lanes ? ~I8{} : lanes_below(look.count) > 0.0F, tolerance_);
     }
-  }
-  return all.sight();
+  };
+  return measure_cells(filler_, pixels_, spread_, shown_, look_at);
 }
 
 template <class Rows>
