@@ -78,6 +78,8 @@ void CellBaker::bake(const FrameContext& frame,
   lender_.fill(-1);
   queue_.clear();
   lamp_terms_.clear();
+  places_.clear();
+  most_places_ = std::size_t{1} << 17;
   compact_shares_.clear();
   lamps_apart_.fill(0);
   is_first_.fill(0);

@@ -250,7 +250,7 @@ class CellBaker final : public RaySink {
   void pack();
   void pack_lights(const std::vector<CellTransport::LightTerm>& from,
                    std::vector<CellTransport::LightTerm>& to);
-  void pack_environment();
+  void join_places();
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;
@@ -331,10 +331,10 @@ class CellBaker final : public RaySink {
   std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
-  std::vector<CellTransport::EnvironmentTerm> sorted_places_;
+  std::vector<EnvironmentTerm> sorted_places_;
   struct KeyedPlace {
     std::uint64_t texels;  // that it lies between
-    CellTransport::EnvironmentTerm term;
+    EnvironmentTerm term;
   };
   std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
@@ -342,7 +342,10 @@ class CellBaker final : public RaySink {
   std::vector<Doubt> doubts_;
   std::array<std::size_t, 2> doubtful_{};  // pixel and centre whose doubts these are
   std::vector<AskedAgain> asked_;
-  std::vector<CellTransport::LightTerm> lamp_terms_;  // many times the transport's
+  // Many times the transport's.
+  std::vector<CellTransport::LightTerm> lamp_terms_;
+  std::vector<EnvironmentTerm> places_;
+  std::size_t most_places_ = 0;  // when they are joined
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;

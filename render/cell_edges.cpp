@@ -121,13 +121,14 @@ void CellBaker::shade_ring() {
   aside_.mirrored_receiving = own.mirrored_receiving;
   std::swap(aside_.reach, own.reach);
   transport_ = &aside_;
-  const std::size_t lamp_terms = lamp_terms_.size();
+  const std::size_t lamp_terms = lamp_terms_.size(), places = places_.size();
   const auto sent = sent_;
   shades_ring_ = true;
   shade_points(count, false);
   bounce();
   shades_ring_ = false;
   lamp_terms_.resize(lamp_terms);
+  places_.resize(places);
   sent_ = sent;
   transport_ = &own;
   std::swap(aside_.reach, own.reach);

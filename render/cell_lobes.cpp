@@ -232,8 +232,12 @@ void CellBaker::add_environment(std::size_t slot,
                                 Vec3f weight) {
   LookUp& l = look_up(direction, roughness, spread, one_of_many);
   for (const auto& [x, y, share, level] : std::span(l.places).first(l.count)) {
-    transport_->environment.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
-                                       static_cast<std::uint16_t>(level)});
+    places_.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
+                       static_cast<std::uint16_t>(level)});
+  }
+  if (places_.size() > most_places_ && !shades_ring_) {
+    join_places();
+    most_places_ = std::max(most_places_, 2 * places_.size());
   }
   const bool decides = is_further(slot) ? compares_further_ : compares_centres_;
   if (decides) samples_[slot].added += weight * planned_radiance(l);

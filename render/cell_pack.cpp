@@ -52,7 +52,7 @@ void CellBaker::pack() {
   CellTransport& t = *transport_;
   std::copy_n(base_.begin(), cell_pixels, t.base.begin());
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
-  t.empty = t.receiving == CellMask{} && t.mirrored.empty() && t.environment.empty() &&
+  t.empty = t.receiving == CellMask{} && t.mirrored.empty() && places_.empty() &&
             t.lights.empty() && t.bent.empty() && t.video.empty() && lamp_terms_.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
@@ -68,7 +68,8 @@ void CellBaker::pack() {
   }
   pack_lights(t.lights, t.lights);
   pack_lights(lamp_terms_, t.lamp_terms);
-  pack_environment();
+  join_places();
+  t.environment.pack(places_, frame_->planned_levels);
   std::ranges::sort(t.shared, {}, [](const CellTransport::SharedTerm& s) {
     return key_of(s);
   });  // in place: nothing is allocated
@@ -87,19 +88,18 @@ void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
 
 // Places of a slot that lie between the same four texels of a level become one, in their middle:
 // many rays through glass, or of many samples, look nearly the same way. Between four texels a
-// picture is all but linear, so hardly anything is lost.
-void CellBaker::pack_environment() {
-  auto& terms = transport_->environment;
-  using Term = CellTransport::EnvironmentTerm;
-  const auto key = [](const Term& e) {
+// picture is all but linear, so hardly anything is lost. Done at the end of a cell, and before that
+// when it has very many.
+void CellBaker::join_places() {
+  const auto key = [](const EnvironmentTerm& e) {
     // Texels are fewer than 2^15 a side; left of and above the first ones there is one more.
     const auto column = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.x)) + 1);
     const auto row = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.y)) + 1);
     return std::uint64_t{e.slot} << 48 | std::uint64_t{e.level} << 40 | row << 20 | column;
   };
-  sort_by_slot(terms, sorted_places_, [&](auto of_slot) {
+  sort_by_slot(places_, sorted_places_, [&](auto of_slot) {
     keyed_places_.clear();
-    for (const Term& e : of_slot) keyed_places_.push_back({key(e), e});
+    for (const EnvironmentTerm& e : of_slot) keyed_places_.push_back({key(e), e});
     std::ranges::sort(keyed_places_, [](const KeyedPlace& a, const KeyedPlace& b) {
       return a.texels != b.texels   ? a.texels < b.texels
              : a.term.x != b.term.x ? a.term.x < b.term.x
@@ -108,22 +108,19 @@ void CellBaker::pack_environment() {
     std::ranges::transform(keyed_places_, of_slot.begin(), &KeyedPlace::term);
   });
   std::size_t kept = 0;
-  float share = 0;  // how much the last one stands for
-  for (const Term& e : sorted_places_) {
-    const float weight = mean(e.weight);
-    if (kept > 0 && key(terms[kept - 1]) == key(e) && weight > 0 && share > 0) {
-      Term& to = terms[kept - 1];
+  for (const EnvironmentTerm& e : sorted_places_) {
+    const float weight = mean(e.weight), share = kept > 0 ? mean(places_[kept - 1].weight) : 0;
+    if (weight > 0 && share > 0 && key(places_[kept - 1]) == key(e)) {
+      EnvironmentTerm& to = places_[kept - 1];
       const float part = weight / (share + weight);
       to.weight += e.weight;
       to.x += (e.x - to.x) * part;
       to.y += (e.y - to.y) * part;
-      share += weight;
     } else {
-      share = weight;
-      terms[kept++] = e;
+      places_[kept++] = e;
     }
   }
-  terms.resize(kept);
+  places_.resize(kept);
 }
 
 }  // namespace render

@@ -43,21 +43,21 @@ void light_mirrored(const CellTransport& cell, const FrameLight& light, RelightW
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!in(cell.mirrored_receiving, k)) continue;
     w.mirrored_arriving[k] = w.mirrored.open(k) - w.mirrored.lost(k);
-    w.added[k] += m.diffuse[k] * w.mirrored_arriving[k];
+    w.added[k] += four_of(m.diffuse[k] * w.mirrored_arriving[k]);
   }
 }
 
 void light_centres(const CellTransport& cell, RelightWorkspace& w) {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     const CellTransport::Base& base = cell.base[k];
-    w.added[k] = base.radiance;
+    w.added[k] = four_of(base.radiance);
     w.share[k] = base.plate;
     w.passed[k] = base.passed;
     if (!(cell.receiving[k / 64] >> (k % 64) & 1)) continue;
     const Vec3f open = w.light.open(k), lost = w.light.lost(k);
     w.arriving[k] = open - lost + Vec3f{w.lamps_r[k], w.lamps_g[k], w.lamps_b[k]};
     w.passing[k] = passing(open, lost);
-    w.added[k] += cell.diffuse[k] * w.arriving[k];
+    w.added[k] += four_of(cell.diffuse[k] * w.arriving[k]);
     const Vec3f share = cell.shadow[k] * w.passing[k];
     w.share[k] += share;
     w.passed[k] += mean(share);
@@ -87,7 +87,7 @@ void light_catchers(const CellTransport& cell,
       w.share[c.slot] +=
           c.share * Vec3f{irradiance.x / open.x, irradiance.y / open.y, irradiance.z / open.z};
     } else {
-      w.added[c.slot] += c.share * c.albedo * irradiance * (1 / std::numbers::pi_v<float>);
+      w.added[c.slot] += four_of(c.share * c.albedo * irradiance * (1 / std::numbers::pi_v<float>));
     }
   }
 }
@@ -172,7 +172,7 @@ std::size_t CellTransport::bytes() const {
     return of(v.lit) + of(v.seen) + of(v.tints) + of(v.near) + of(v.windows);
   };
   return sizeof *this + of_sight(visibility) + of_sight(mirrored_visibility) + of(mirrored) +
-         of(shared) + of(lights) + of(environment) + of(shadow_points) + of(shadow_lights) +
+         of(shared) + of(lights) + environment.bytes() + of(shadow_points) + of(shadow_lights) +
          of(lamps.numbers) + of(lamps.factors) + of(lamps.tints) + of(lamp_terms) + of(catchers) +
          of(caught) + of(bent) + of(bent_caustics) + of(video) + of(borrowed) + of(further) +
          of(counts);
@@ -193,7 +193,7 @@ void relight(const CellTransport& cell,
   light_mirrored(cell, light, w);
   for (const CellTransport::Further& f : cell.further) {
     const std::size_t slot = cell_pixels + f.pixel;
-    w.added[slot] = f.base.radiance;
+    w.added[slot] = four_of(f.base.radiance);
     w.share[slot] = f.base.plate;
     w.passed[slot] = f.base.passed;
   }
@@ -206,28 +206,27 @@ void relight(const CellTransport& cell,
       w.passed[s.slot] += mean(share);
     } else {
       const bool mirrored = s.of == CellTransport::SharedTerm::Of::mirrored_light;
-      w.added[s.slot] += s.weight * (mirrored ? w.mirrored_arriving : w.arriving)[s.centre];
+      w.added[s.slot] +=
+          four_of(s.weight * (mirrored ? w.mirrored_arriving : w.arriving)[s.centre]);
     }
   }
   for (const CellTransport::LightTerm& l : cell.lights) {
-    w.added[l.slot] += l.weight * light.lights[l.light].irradiance;
+    w.added[l.slot] += four_of(l.weight * light.lights[l.light].irradiance);
   }
   for (const CellTransport::LightTerm& l : cell.lamp_terms) {
-    w.added[l.slot] += l.weight * light.lamps[l.light].intensity;
+    w.added[l.slot] += four_of(l.weight * light.lamps[l.light].intensity);
   }
-  for (const CellTransport::EnvironmentTerm& e : cell.environment) {
-    w.added[e.slot] += e.weight * radiance_at(*light.levels[e.level], e.x, e.y);
-  }
+  cell.environment.add_light(light.levels, w.added);
   for (const CellTransport::BentPlate& b : cell.bent) {
     const Vec3f share =
         b.point == CellTransport::BentPlate::lit ? Vec3f{1, 1, 1} : w.passing_at_points[b.point];
-    w.added[b.slot] += b.weight * share * plate_at(*light.levels[b.level], b.x, b.y);
+    w.added[b.slot] += four_of(b.weight * share * plate_at(*light.levels[b.level], b.x, b.y));
   }
   for (const CellTransport::VideoTerm& v : cell.video) {
-    w.added[v.slot] += v.weight * plate_at(*light.levels[v.level], v.x, v.y);
+    w.added[v.slot] += four_of(v.weight * plate_at(*light.levels[v.level], v.x, v.y));
   }
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    picture.added[k] = w.added[k];
+    picture.added[k] = three_of(w.added[k]);
     picture.share[k] = w.share[k];
     picture.passed[k] = w.passed[k];
     picture.seen[k] = cell.base[k].seen;
@@ -235,14 +234,14 @@ void relight(const CellTransport& cell,
   // Pixels of further samples: their own sums, and what they share of centres.
   for (const CellTransport::Further& f : cell.further) {
     const std::size_t k = f.pixel;
-    picture.added[k] = w.added[cell_pixels + k];
+    picture.added[k] = three_of(w.added[cell_pixels + k]);
     picture.share[k] = w.share[cell_pixels + k];
     picture.passed[k] = w.passed[cell_pixels + k];
     picture.seen[k] = f.base.seen;
   }
   for (const CellTransport::Borrowed& b : cell.borrowed) {
     const auto n = static_cast<float>(b.count);
-    picture.added[b.pixel] += w.added[b.centre] * n;
+    picture.added[b.pixel] += three_of(w.added[b.centre]) * n;
     picture.share[b.pixel] += w.share[b.centre] * n;
     picture.passed[b.pixel] += w.passed[b.centre] * n;
     picture.seen[b.pixel] += cell.base[b.centre].seen * n;

@@ -10,6 +10,7 @@
 
 #include "render/cell_reach.h"
 #include "render/environment.h"
+#include "render/environment_terms.h"
 #include "render/frame_job.h"
 #include "render/light_gather.h"
 
@@ -18,6 +19,7 @@ namespace render {
 // Where a sample's light is added up: 0..255 the centre of a pixel, 256..511 all further samples of
 // a pixel together.
 inline constexpr std::size_t slots = 2 * cell_pixels;
+static_assert(slots <= EnvironmentTerms::slots);
 
 // What rays found out about a cell, as sums over the light: pixel = plate * share + light from the
 // environment, from the table's lights, and of the surfaces themselves. It holds while scene,
@@ -38,12 +40,6 @@ struct CellTransport {
   struct LightTerm {
     std::uint16_t slot, light;
     Vec3f weight;
-  };
-  // Slot += weight * a level of the environment at a place.
-  struct EnvironmentTerm {
-    Vec3f weight;
-    float x, y;
-    std::uint16_t slot, level;
   };
   // Slot += weight * irradiance of a centre, or of what it mirrors; or the plate's share, as far as
   // the centre sees light.
@@ -140,7 +136,7 @@ struct CellTransport {
   CellVisibility mirrored_visibility;
   std::vector<SharedTerm> shared;
   std::vector<LightTerm> lights;
-  std::vector<EnvironmentTerm> environment;
+  EnvironmentTerms environment;
   std::vector<ShadowPoint> shadow_points;
   std::vector<ShadowLight> shadow_lights;
   CellLamps lamps;  // that centres see
@@ -193,7 +189,8 @@ Vec3f plate_at(const capture::Image& level, float x, float y);
 struct RelightWorkspace {
   LightSums light, mirrored, soft;
   alignas(64) std::array<float, cell_pixels> lamps_r, lamps_g, lamps_b;
-  std::array<Vec3f, slots> added, share;
+  std::array<Four, slots> added;
+  std::array<Vec3f, slots> share;
   std::array<float, slots> passed;
   // Irradiance, lamps' too; share that is seen of what is not lamps'.
   std::array<Vec3f, cell_pixels> arriving, passing, mirrored_arriving;

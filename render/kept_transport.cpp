@@ -15,7 +15,7 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
   auto moved = Scene::moved(places_, scene.places());
   const bool same_transport = keys.transport == keys_.transport;
   light_stays_ = keys.light.all == keys_.light.all;
-  scarce_ = bytes_ > max_bytes / 2;
+  scarce_ = bytes_ > max_bytes_ / 2;
   keys_ = keys;
   const auto caustics_before = std::exchange(shown_caustics_, frame.caustics);
   if (same_transport && same_size && moved) {
@@ -35,6 +35,7 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
       cells_.clear();
       cells_.resize(static_cast<std::size_t>(frame.columns) * static_cast<std::size_t>(frame.rows));
       bytes_ = 0;
+      max_bytes_ = max_bytes(cells_.size());
     }
     forget_all(scene);
   }
@@ -95,7 +96,7 @@ CellTransport* KeptTransport::place(int column, int row) {
     cell = {};
   }
   if (!cell.transport) {
-    if (bytes_ >= max_bytes) {
+    if (bytes_ >= max_bytes_) {
       full_ = true;
       return nullptr;
     }
@@ -112,7 +113,7 @@ void KeptTransport::keep(int column, int row, int stage) {
   cell.bytes = bytes;
   cell.stage = stage;
   if (!cell.transport->bent.empty()) bends_plate_ = true;
-  if (before + bytes <= max_bytes) return;
+  if (before + bytes <= max_bytes_) return;
   // Too much: this cell's is given back.
   full_ = true;
   bytes_ -= cell.bytes;
@@ -123,7 +124,7 @@ LitCell* KeptTransport::place_lit(int column, int row) {
   Cell& cell = cells_[index(column, row)];
   if (!light_stays_ || cell.stage == none) return nullptr;
   if (!cell.lit) {
-    if (bytes_ + sizeof(LitCell) > max_bytes) return nullptr;
+    if (bytes_ + sizeof(LitCell) > max_bytes_) return nullptr;
     cell.lit = std::make_unique<LitCell>();
     cell.bytes += sizeof(LitCell);
     bytes_ += sizeof(LitCell);

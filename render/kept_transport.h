@@ -1,6 +1,7 @@
 // The cells' transport, kept from frame to frame while nothing moves there: a pure cache.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -73,7 +74,10 @@ class KeptTransport {
   // What cells mark where they reach in; stays while any cell is kept.
   const SpaceGrid& grid() const { return grid_; }
 
-  static constexpr std::size_t max_bytes = std::size_t{512} << 20;
+  // Of so many cells: half a kilobyte a pixel, but at least 128 and at most 512 MB.
+  static constexpr std::size_t max_bytes(std::size_t cells) {
+    return std::clamp(cells * cell_pixels * 512, std::size_t{128} << 20, std::size_t{512} << 20);
+  }
   // Taken so far.
   std::size_t bytes() const { return bytes_; }
   // Whether a cell could not be kept, of late.
@@ -103,6 +107,7 @@ class KeptTransport {
   SpaceGrid grid_;
   int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
+  std::size_t max_bytes_ = 0;
   std::vector<CellCone> cones_;  // once anything has moved
   std::atomic<std::size_t> bytes_ = 0;
   std::atomic<bool> full_ = false, bends_plate_ = false;

@@ -1,8 +1,10 @@
-// Eight floats at a time, or one where there is no AVX2.
+// Eight floats at a time, or one where there is no AVX2; and four.
 #pragma once
 
 #include <bit>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 
 #if defined(__AVX2__)
 #include <immintrin.h>
@@ -47,6 +49,21 @@ inline Lanes both(Lanes a, Lanes b) {
 inline unsigned bits_of(Lanes mask) { return std::bit_cast<unsigned>(mask.v) >> 31; }
 inline Lanes mask_of(unsigned bits) { return {std::bit_cast<float>(bits & 1 ? ~0U : 0U)}; }
 #endif
+
+// A colour in four lanes, of which the last is idle.
+using Four = float __attribute__((vector_size(16)));
+inline Four load_four(const float* at) {
+  Four v;
+  std::memcpy(&v, at, sizeof v);
+  return v;
+}
+// Those after the first.
+inline Four after_first(Four v) {
+  using Order = std::int32_t __attribute__((vector_size(16)));
+  return __builtin_shuffle(v, Order{1, 2, 3, 3});
+}
+inline Four four_of(calibrate::Vec3f v) { return Four{v.x, v.y, v.z, 0}; }
+inline calibrate::Vec3f three_of(Four v) { return {v[0], v[1], v[2]}; }
 
 inline Lanes dot(Lanes ax, Lanes ay, Lanes az, calibrate::Vec3f b) {
   return add(add(multiply(ax, all(b.x)), multiply(ay, all(b.y))), multiply(az, all(b.z)));

@@ -16,7 +16,7 @@ namespace render {
 namespace {
 
 using calibrate::degree;
-constexpr capture::Rational plate_rate{25, 1};
+constexpr capture::Rational walk_rate{25, 1};
 
 // What is brighter than this (in plate radiance) is the sun and the glow about it.
 constexpr float brightest_sky = 16;
@@ -126,12 +126,12 @@ calibrate::Track pan(const MadeStudioSettings& settings) {
     const calibrate::Pose cam_from_set = calibrate::look_at(
         lens, lens + ahead * std::cos(tilt) + calibrate::Vec3{0, 0, -std::sin(tilt)}, roll);
     track.keys.push_back(
-        {n / plate_rate.value(), lens, calibrate::quaternion_of(cam_from_set.R.transposed())});
+        {n / walk_rate.value(), lens, calibrate::quaternion_of(cam_from_set.R.transposed())});
   }
   return track;
 }
 
-MadeCamera make_plate_camera(const MadeStudioSettings& settings) {
+MadeCamera make_walking_camera(const MadeStudioSettings& settings) {
   MadeCamera camera;
   const double scale = settings.width / 1280.0;
   camera.lens.model = "LENSMODEL_OPENCV4";
@@ -155,7 +155,7 @@ MadeCamera make_plate_camera(const MadeStudioSettings& settings) {
                    .transfer = capture::Transfer::rec1886,
                    .seed = settings.seed * 2 + 1};
   camera.exposures_s = {exposure_s};
-  camera.rate = plate_rate;
+  camera.rate = walk_rate;
   return camera;
 }
 
@@ -175,11 +175,11 @@ MadeStudio make_park(const capture::Image& map, const MadeStudioSettings& settin
   add_kerbs(park, settings.texture_size, settings.seed);
   studio.place = park.take();
   studio.car_yaw_deg = -24;
-  studio.plate = make_plate_camera(settings);
+  studio.plate = make_walking_camera(settings);
   studio.probe =
       make_fisheye(settings.probe_size, {1.0 / 100, 1.0 / 2500, 1.0 / 62500, 1.0 / 1562500},
                    settings.seed * 2 + 2);
-  studio.period = capture::time_of_frame(settings.frames, plate_rate);
+  studio.period = capture::time_of_frame(settings.frames, walk_rate);
   return studio;
 }
 

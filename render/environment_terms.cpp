@@ -1,0 +1,135 @@
+// Light from places in the environment.
+#include "render/environment_terms.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "render/environment.h"
+
+namespace render {
+namespace {
+
+using calibrate::Vec3f;
+
+using Eight = float __attribute__((vector_size(32)));
+using EightWords = std::int32_t __attribute__((vector_size(32)));
+
+constexpr int bias = 127 - 14;      // a float's, of the last of a colour's 15 bits
+constexpr float least = 0x1p-110F;  // below it that bit would be no normal number
+
+// Places count from -1 on in these, of a level so many pixels wide or high.
+float step_of(int size) {
+  return static_cast<float>(std::bit_ceil(static_cast<std::uint32_t>(size) + 1)) / 65536;
+}
+
+std::uint32_t packed_place(float at, int size) {
+  const float steps = (at + 1) / step_of(size) + 0.5F;
+  return static_cast<std::uint32_t>(std::min(std::max(0.0F, steps), 65535.0F));
+}
+
+std::array<std::uint32_t, 3> packed(const EnvironmentTerm& term, const capture::Image& level) {
+  std::array<std::uint32_t, 3> words{term.slot, packed_place(term.x, level.width),
+                                     packed_place(term.y, level.height)};
+  const Vec3f w = term.weight;
+  const float most = std::max({std::fabs(w.x), std::fabs(w.y), std::fabs(w.z)});
+  if (!(std::isfinite(w.x) && std::isfinite(w.y) && std::isfinite(w.z) && most >= least))
+    return words;
+  int exponent = 0;
+  // One more where the greatest would be rounded beyond what 15 bits hold.
+  if (std::frexp(most, &exponent) > 16383.0F / 16384) ++exponent;
+  const auto bits = [&](float colour) {
+    return static_cast<std::uint32_t>(std::lround(std::ldexp(colour, 14 - exponent))) << 17;
+  };
+  words[0] |= bits(w.x) | static_cast<std::uint32_t>(exponent + bias) << 9;
+  words[1] |= bits(w.y);
+  words[2] |= bits(w.z);
+  return words;
+}
+
+Eight to_floats(EightWords v) { return __builtin_convertvector(v, Eight); }
+
+EightWords load_eight(const std::array<std::uint32_t, 8>& words) {
+  return std::bit_cast<EightWords>(words);
+}
+
+// What one term does, when all eight are worked out.
+struct Unpacked {
+  alignas(32) Eight red, green, blue;  // weights
+  Eight top_left, top_right, bottom_left, bottom_right;
+  EightWords slot, texel, outside;
+};
+
+}  // namespace
+
+void EnvironmentTerms::pack(std::span<const EnvironmentTerm> terms,
+                            std::span<const capture::Image* const> levels) {
+  clear();
+  std::array<std::uint32_t, most_levels> counts{};
+  for (const EnvironmentTerm& term : terms) ++counts[term.level];
+  std::array<std::size_t, most_levels> next{};  // places of terms, eight a block
+  std::size_t blocks = 0;
+  for (std::uint32_t level = 0; level < levels.size(); ++level) {
+    next[level] = blocks * 8;
+    if (counts[level] == 0) continue;
+    levels_.push_back({level, (counts[level] + 7) / 8});
+    blocks += levels_.back().blocks;
+  }
+  blocks_.resize(blocks);
+  const auto put = [&](const EnvironmentTerm& term) {
+    const std::size_t at = next[term.level]++;
+    const auto words = packed(term, *levels[term.level]);
+    for (std::size_t k = 0; k < words.size(); ++k) blocks_[at / 8].words[k][at % 8] = words[k];
+  };
+  for (const EnvironmentTerm& term : terms) put(term);
+  for (const Level& level : levels_) {
+    const auto number = static_cast<std::uint16_t>(level.number);
+    while (next[number] % 8 != 0) put({{}, 0, 0, 0, number});
+  }
+}
+
+void EnvironmentTerms::add_light(std::span<const capture::Image* const> levels,
+                                 std::span<Four, slots> added) const {
+  const Block* block = blocks_.data();
+  for (const Level& of : levels_) {
+    const capture::Image& level = *levels[of.number];
+    const float* pixels = level.pixels.data();
+    const std::ptrdiff_t row = std::ptrdiff_t{level.width} * 3;
+    const float step_x = step_of(level.width), step_y = step_of(level.height);
+    for (const Block* end = block + of.blocks; block != end; ++block) {
+      const EightWords a = load_eight(block->words[0]), b = load_eight(block->words[1]),
+                       c = load_eight(block->words[2]);
+      Unpacked u;
+      const auto scale = std::bit_cast<Eight>((a >> 9 & 255) << 23);
+      u.red = to_floats(a >> 17) * scale;
+      u.green = to_floats(b >> 17) * scale;
+      u.blue = to_floats(c >> 17) * scale;
+      u.slot = a & 511;
+      const Eight x = to_floats(b & 0xFFFF) * step_x, y = to_floats(c & 0xFFFF) * step_y;
+      const EightWords column = __builtin_convertvector(x, EightWords),
+                       line = __builtin_convertvector(y, EightWords);
+      const Eight fx = x - to_floats(column), fy = y - to_floats(line);
+      u.top_left = (1 - fx) * (1 - fy), u.top_right = fx * (1 - fy);
+      u.bottom_left = (1 - fx) * fy, u.bottom_right = fx * fy;
+      u.texel = ((line - 1) * level.width + column - 1) * 3;
+      u.outside = (column < 1) | (line < 1) | (column >= level.width) | (line >= level.height);
+      for (std::size_t i = 0; i < 8; ++i) {
+        Four light;
+        if (u.outside[i]) {  // across a pole or the seam
+          light = four_of(radiance_at(level, x[i] - 1, y[i] - 1));
+        } else {
+          const float* top = pixels + u.texel[i];
+          const float* bottom = top + row;
+          // The last texel's fourth value may be beyond the picture.
+          light = load_four(top) * u.top_left[i] + load_four(top + 3) * u.top_right[i] +
+                  load_four(bottom) * u.bottom_left[i] +
+                  after_first(load_four(bottom + 2)) * u.bottom_right[i];
+        }
+        added[static_cast<std::size_t>(u.slot[i])] +=
+            Four{u.red[i], u.green[i], u.blue[i], 0} * light;
+      }
+    }
+  }
+}
+
+}  // namespace render
