@@ -79,7 +79,7 @@ void CellBaker::bake(const FrameContext& frame,
   queue_.clear();
   lamp_terms_.clear();
   places_.clear();
-  most_places_ = std::size_t{1} << 17;
+  most_lights_ = most_places_ = enough_terms;
   compact_shares_.clear();
   lamps_apart_.fill(0);
   is_first_.fill(0);
@@ -460,7 +460,7 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
     const ShadePoint& p = points_[point_at[l.point]];
     const Vec3f weight = p.throughput * p.diffuse * l.passed * l.weight;
     if (weight != Vec3f{}) {
-      t.lights.push_back({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
+      add_light({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
     }
   }
   for (std::size_t k = 0; k < point_at.size(); ++k) {

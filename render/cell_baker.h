@@ -250,7 +250,11 @@ class CellBaker final : public RaySink {
   void pack();
   void pack_lights(const std::vector<CellTransport::LightTerm>& from,
                    std::vector<CellTransport::LightTerm>& to);
+  void add_light(const CellTransport::LightTerm& term);
+  void add_place(const EnvironmentTerm& term);
   void join_places();
+  void join_places_of_slot();
+  bool halve_faint_places();
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;
@@ -345,7 +349,9 @@ class CellBaker final : public RaySink {
   // Many times the transport's.
   std::vector<CellTransport::LightTerm> lamp_terms_;
   std::vector<EnvironmentTerm> places_;
-  std::size_t most_places_ = 0;  // when they are joined
+  // Beyond so many terms they are joined, and may then be twice as many, and `enough_terms` more.
+  static constexpr std::size_t enough_terms = std::size_t{1} << 15;
+  std::size_t most_lights_ = 0, most_places_ = 0;
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;

@@ -232,12 +232,8 @@ void CellBaker::add_environment(std::size_t slot,
                                 Vec3f weight) {
   LookUp& l = look_up(direction, roughness, spread, one_of_many);
   for (const auto& [x, y, share, level] : std::span(l.places).first(l.count)) {
-    places_.push_back({weight * share, x, y, static_cast<std::uint16_t>(target),
-                       static_cast<std::uint16_t>(level)});
-  }
-  if (places_.size() > most_places_ && !shades_ring_) {
-    join_places();
-    most_places_ = std::max(most_places_, 2 * places_.size());
+    add_place({weight * share, x, y, static_cast<std::uint16_t>(target),
+               static_cast<std::uint16_t>(level)});
   }
   const bool decides = is_further(slot) ? compares_further_ : compares_centres_;
   if (decides) samples_[slot].added += weight * planned_radiance(l);
@@ -314,8 +310,7 @@ void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share)
   if (!(density > 0)) return;
   const ShadePoint& p = *lobe.point;
   const Vec3f weight = lobe.throughput * share * density;
-  transport_->lights.push_back(
-      {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
+  add_light({static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
   samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;
 }
 

@@ -15,6 +15,20 @@ std::uint32_t key_of(const CellTransport::SharedTerm& s) {
   return (s.slot * 65536U + s.centre) * 4U + static_cast<std::uint32_t>(s.of);
 }
 
+// Slots that look at more places than this have faint ones looked up less sharply, each time that
+// they are joined.
+constexpr std::size_t most_places_of_slot = 256;
+// By how much a slot may then change for one of them at a time, under the planned light.
+constexpr float least_change = 3e-4F;
+
+// A number for the four texels that a term's place lies between.
+std::uint64_t texels_of(const EnvironmentTerm& e) {
+  // Texels are fewer than 2^15 a side; left of and above the first ones there is one more.
+  const auto column = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.x)) + 1);
+  const auto row = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.y)) + 1);
+  return std::uint64_t{e.level} << 40 | row << 20 | column;
+}
+
 // Joins neighbouring terms of the same key, from one vector to another or within one. Returns how
 // many are left.
 template <class Term>
@@ -76,6 +90,23 @@ void CellBaker::pack() {
   t.shared.resize(join(t.shared, t.shared));
 }
 
+// A cell that samples glass a thousand times a pixel finds millions of terms: they are joined time
+// and again. Those of the pixels around it are few, and are dropped by their number.
+void CellBaker::add_light(const CellTransport::LightTerm& term) {
+  auto& terms = transport_->lights;
+  terms.push_back(term);
+  if (terms.size() <= most_lights_ || shades_ring_) return;
+  pack_lights(terms, terms);
+  most_lights_ = 2 * terms.size() + enough_terms;
+}
+
+void CellBaker::add_place(const EnvironmentTerm& term) {
+  places_.push_back(term);
+  if (places_.size() <= most_places_ || shades_ring_) return;
+  join_places();
+  most_places_ = 2 * places_.size() + enough_terms;
+}
+
 // One term for each light of a slot: by slots first, of which there are few.
 void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
                             std::vector<CellTransport::LightTerm>& to) {
@@ -88,39 +119,72 @@ void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
 
 // Places of a slot that lie between the same four texels of a level become one, in their middle:
 // many rays through glass, or of many samples, look nearly the same way. Between four texels a
-// picture is all but linear, so hardly anything is lost. Done at the end of a cell, and before that
-// when it has very many.
+// picture is all but linear, so hardly anything is lost.
 void CellBaker::join_places() {
-  const auto key = [](const EnvironmentTerm& e) {
-    // Texels are fewer than 2^15 a side; left of and above the first ones there is one more.
-    const auto column = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.x)) + 1);
-    const auto row = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.y)) + 1);
-    return std::uint64_t{e.slot} << 48 | std::uint64_t{e.level} << 40 | row << 20 | column;
-  };
-  sort_by_slot(places_, sorted_places_, [&](auto of_slot) {
+  sort_by_slot(places_, sorted_places_, [](auto) {});
+  places_.clear();
+  for (std::size_t i = 0; i < sorted_places_.size();) {
     keyed_places_.clear();
-    for (const EnvironmentTerm& e : of_slot) keyed_places_.push_back({key(e), e});
-    std::ranges::sort(keyed_places_, [](const KeyedPlace& a, const KeyedPlace& b) {
-      return a.texels != b.texels   ? a.texels < b.texels
-             : a.term.x != b.term.x ? a.term.x < b.term.x
-                                    : a.term.y < b.term.y;
-    });
-    std::ranges::transform(keyed_places_, of_slot.begin(), &KeyedPlace::term);
+    const std::uint16_t slot = sorted_places_[i].slot;
+    for (; i < sorted_places_.size() && sorted_places_[i].slot == slot; ++i) {
+      keyed_places_.push_back({texels_of(sorted_places_[i]), sorted_places_[i]});
+    }
+    join_places_of_slot();
+    if (keyed_places_.size() > most_places_of_slot && halve_faint_places()) {
+      join_places_of_slot();
+    }
+    for (const KeyedPlace& place : keyed_places_) places_.push_back(place.term);
+  }
+}
+
+void CellBaker::join_places_of_slot() {
+  std::ranges::sort(keyed_places_, [](const KeyedPlace& a, const KeyedPlace& b) {
+    return a.texels != b.texels   ? a.texels < b.texels
+           : a.term.x != b.term.x ? a.term.x < b.term.x
+                                  : a.term.y < b.term.y;
   });
   std::size_t kept = 0;
-  for (const EnvironmentTerm& e : sorted_places_) {
-    const float weight = mean(e.weight), share = kept > 0 ? mean(places_[kept - 1].weight) : 0;
-    if (weight > 0 && share > 0 && key(places_[kept - 1]) == key(e)) {
-      EnvironmentTerm& to = places_[kept - 1];
+  for (const KeyedPlace& from : keyed_places_) {
+    const float weight = mean(from.term.weight);
+    const float share = kept > 0 ? mean(keyed_places_[kept - 1].term.weight) : 0;
+    if (weight > 0 && share > 0 && keyed_places_[kept - 1].texels == from.texels) {
+      EnvironmentTerm& to = keyed_places_[kept - 1].term;
       const float part = weight / (share + weight);
-      to.weight += e.weight;
-      to.x += (e.x - to.x) * part;
-      to.y += (e.y - to.y) * part;
+      to.weight += from.term.weight;
+      to.x += (from.term.x - to.x) * part;
+      to.y += (from.term.y - to.y) * part;
     } else {
-      places_[kept++] = e;
+      keyed_places_[kept++] = from;
     }
   }
-  places_.resize(kept);
+  keyed_places_.resize(kept);
+}
+
+// Where a slot looks at very many places, those that give it least, and show about the same in
+// texels twice as wide, are looked up there, so that they can be joined. False if there are none.
+bool CellBaker::halve_faint_places() {
+  float all = 0;
+  for (const KeyedPlace& place : keyed_places_) all += std::abs(mean(place.term.weight));
+  const float least = all / static_cast<float>(most_places_of_slot);
+  bool halved = false;
+  for (KeyedPlace& place : keyed_places_) {
+    EnvironmentTerm& e = place.term;
+    const std::size_t level = halved_level(*frame_->planned, e.level);
+    const float weight = mean(e.weight);  // only those above 0 are joined
+    if (level == e.level || !(weight > 0) || weight >= least) continue;
+    const capture::Image &fine = *frame_->planned_levels[e.level],
+                         &coarse = *frame_->planned_levels[level];
+    if (coarse.width * 2 != fine.width || coarse.height * 2 != fine.height) continue;
+    const float x = (e.x - 0.5F) / 2, y = (e.y - 0.5F) / 2;
+    const Vec3f change = e.weight * (radiance_at(coarse, x, y) - radiance_at(fine, e.x, e.y));
+    if (std::max({std::abs(change.x), std::abs(change.y), std::abs(change.z)}) > least_change)
+      continue;
+    e.level = static_cast<std::uint16_t>(level);
+    e.x = x, e.y = y;
+    place.texels = texels_of(e);
+    halved = true;
+  }
+  return halved;
 }
 
 }  // namespace render

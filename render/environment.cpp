@@ -303,6 +303,14 @@ std::vector<const capture::Image*> levels_of(const Environment& env) {
   return levels;
 }
 
+std::size_t halved_level(const Environment& env, std::size_t level) {
+  if (env.smoothed.empty()) return level;
+  const std::size_t diffused = env.halved.size() + env.smoothed.size();
+  const bool has_one = level < env.halved.size() ||
+                       (level >= diffused && level + 1 < diffused + env.diffused.size());
+  return has_one ? level + 1 : level;
+}
+
 Vec3f radiance_at(const capture::Image& level, float x, float y) {
   const int w = level.width;
   const int h = level.height;

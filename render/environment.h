@@ -92,6 +92,9 @@ std::size_t find_diffused_samples(const Environment& env,
                                   std::span<MapSample, most_map_samples> samples);
 // All levels in the order that MapSample counts them.
 std::vector<const capture::Image*> levels_of(const Environment& env);
+// Of these the number of the level of half the width that shows the same; `level` itself where
+// there is none.
+std::size_t halved_level(const Environment& env, std::size_t level);
 // A level's radiance at a place, bilinear. Poles and the seam are passed as on the sphere.
 Vec3f radiance_at(const capture::Image& level, float x, float y);
 

@@ -16,7 +16,7 @@ using Eight = float __attribute__((vector_size(32)));
 using EightWords = std::int32_t __attribute__((vector_size(32)));
 
 constexpr int bias = 127 - 14;      // a float's, of the last of a colour's 15 bits
-constexpr float least = 0x1p-110F;  // below it that bit would be no normal number
+constexpr float least = 0x1p-110F;  // above what would make that bit no normal number
 
 // Places count from -1 on in these, of a level so many pixels wide or high.
 float step_of(int size) {
@@ -76,15 +76,20 @@ void EnvironmentTerms::pack(std::span<const EnvironmentTerm> terms,
     blocks += levels_.back().blocks;
   }
   blocks_.resize(blocks);
-  const auto put = [&](const EnvironmentTerm& term) {
+  for (const EnvironmentTerm& term : terms) {
     const std::size_t at = next[term.level]++;
     const auto words = packed(term, *levels[term.level]);
     for (std::size_t k = 0; k < words.size(); ++k) blocks_[at / 8].words[k][at % 8] = words[k];
-  };
-  for (const EnvironmentTerm& term : terms) put(term);
+  }
+  // Filled up with the last term of the level, but without weight: it reads nothing else.
   for (const Level& level : levels_) {
-    const auto number = static_cast<std::uint16_t>(level.number);
-    while (next[number] % 8 != 0) put({{}, 0, 0, 0, number});
+    const std::size_t last = next[level.number] - 1;
+    auto& words = blocks_[last / 8].words;
+    for (std::size_t i = last % 8 + 1; i < 8; ++i) {
+      words[0][i] = words[0][last % 8] & 511;
+      words[1][i] = words[1][last % 8] & 0xFFFF;
+      words[2][i] = words[2][last % 8] & 0xFFFF;
+    }
   }
 }
 

@@ -24,7 +24,7 @@ struct EnvironmentTerm {
 // Many of them in half the room, for they are most of what is kept, and in the order in which they
 // are lit: by levels, and by slots within each. A weight's colours have one exponent, and each is
 // within 1/16384 of the greatest; places are within 1/65536 of the level. A weight that is not
-// finite, or beyond floats' normal range, counts as 0.
+// finite, or below 2^-110, counts as 0.
 class EnvironmentTerms {
  public:
   static constexpr std::size_t slots = 512, most_levels = 128;

@@ -296,6 +296,9 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
                         : inputs.environment;
   context.planned_levels = levels_of(*context.planned);
   context.first_plate_level = context.planned_levels.size();
+  if (context.first_plate_level > EnvironmentTerms::most_levels) {
+    throw std::invalid_argument("an environment has more than 128 levels");
+  }
   context.levels = levels_of(*inputs.environment);
   auto planned_table = std::make_shared<LightTable>(job.lights);
   for (std::size_t i = 0; i < planned_table->lights.size(); ++i) {

@@ -51,7 +51,7 @@ TEST(EnvironmentTerms, LightSlotsAsTermsOneByOneDo) {
       const float x = unit(random) * static_cast<float>(image.width) - 0.5F;
       const float y = unit(random) * static_cast<float>(image.height) - 0.5F;
       const float size = std::pow(10.0F, 12 * unit(random) - 6);
-      const Vec3f weight = Vec3f{unit(random) - 0.2F, unit(random), unit(random) * 0.01F} * size;
+      const Vec3f weight = Vec3f{unit(random) - 0.2F, unit(random), unit(random)} * size;
       terms.push_back({weight, x, y, slot, level});
       expected[slot] += weight * radiance_at(image, x, y);
       scale[slot] = std::max(scale[slot], 2 * size);
@@ -101,6 +101,19 @@ TEST(EnvironmentTerms, KeepPowersOfTwoExactly) {
       lit({{{1, 0.5F, 0.25F}, 3, 5, 0, 0}, {{0x1p-90F, 0, -0x1p-90F}, 9, 9, 511, 0}}, sky);
   EXPECT_EQ(three_of(added[0]), (Vec3f{1, 0.5F, 0.25F}));
   EXPECT_EQ(three_of(added[511]), (Vec3f{0x1p-90F, 0, -0x1p-90F}));
+}
+
+TEST(EnvironmentTerms, LeaveSlotsAloneThatLookNowhere) {
+  Sky sky;
+  std::ranges::fill(sky.images[0].pixels, std::numeric_limits<float>::quiet_NaN());
+  for (int y = 20; y < 30; ++y) {
+    for (int x = 20; x < 30; ++x) {
+      for (int c = 0; c < 3; ++c) sky.images[0].at(y, x, c) = 1;
+    }
+  }
+  const Slots added = lit({{{1, 1, 1}, 25, 25, 9, 0}}, sky);
+  EXPECT_EQ(three_of(added[0]), Vec3f{});
+  EXPECT_EQ(three_of(added[9]), (Vec3f{1, 1, 1}));
 }
 
 TEST(EnvironmentTerms, CountNothingThatIsNoNumber) {

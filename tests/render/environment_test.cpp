@@ -303,6 +303,24 @@ TEST(SmoothForReflections, LeavesCompactSourcesForTheLightsThatStandForThem) {
   EXPECT_EQ(mirrored_compact(sun, sun, 0.05F), Vec3f{});
 }
 
+TEST(HalvedLevel, ShowsTheSameInTexelsTwiceAsWide) {
+  Environment env = make_sun_and_sky({}, 128);
+  EXPECT_EQ(halved_level(env, 0), 0U);  // as long as nothing is smoothed
+  LightFollower follower;
+  follower.follow(env, {});
+  smooth_for_reflections(env, follower.compact_texels());
+  const std::vector<const capture::Image*> levels = levels_of(env);
+  std::size_t with_one = 0;
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    const std::size_t halved = halved_level(env, level);
+    if (halved == level) continue;
+    ++with_one;
+    ASSERT_EQ(levels[halved]->height, levels[level]->height / 2) << level;
+    EXPECT_NEAR(power(*levels[halved], 1) / power(*levels[level], 1), 1, 0.1) << level;
+  }
+  EXPECT_EQ(with_one, env.halved.size() + env.diffused.size() - 1);
+}
+
 TEST(SmoothForReflections, RefusesCompactTexelsOfAnotherGrid) {
   Environment env = make_even_environment(1, 64);
   EXPECT_THROW(smooth_for_reflections(env, CompactTexels{48, std::vector<std::uint8_t>(48 * 96)}),

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "capture/image.h"
+#include "render/kept_transport.h"
 #include "render/load_mesh.h"
 #include "render/made_model_file.h"
 #include "render/paper_scenes.h"
@@ -71,23 +72,26 @@ SceneDescription made_sheet(int n) {
   return scene;
 }
 
-// Renders with nothing kept; true if anything virtual is to be seen.
+// Renders, with nothing kept from frame to frame unless told; true if anything virtual is to be
+// seen.
 bool shows(const Scene& scene,
            const Environment& environment,
            const LightTable& lights,
            const calibrate::Pose& cam_from_set,
-           double focal_px) {
+           double focal_px,
+           const Effort& effort = {.aa_samples = 1, .accuracy = 0.95F},
+           KeptTransport* kept = nullptr) {
   const calibrate::DirectionTable directions = calibrate::make_direction_table(
       {"pinhole", width, height, {focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0}});
   const capture::HalfImage plate = capture::to_half(capture::make_image(height, width, 3));
   FrameJob job;
   job.cam_from_set = cam_from_set;
   job.lights = lights;
-  job.effort.aa_samples = 1;
-  job.effort.accuracy = 0.95F;
+  job.effort = effort;
+  FrameInputs inputs{.scene = &scene, .directions = &directions, .environment = &environment};
+  inputs.kept = kept;
   FrameResult result;
-  render_frame({.scene = &scene, .directions = &directions, .environment = &environment}, job,
-               plate, result);
+  render_frame(inputs, job, plate, result);
   return result.statistics.virtual_pixels > 1000;
 }
 
@@ -157,6 +161,16 @@ TEST(ModelMemory, OfTheHeadlightIsBelow400MegabytesInAll) {
   const double peak = take_peak_mb();
   RecordProperty("peak_mb", static_cast<int>(peak));
   EXPECT_LT(peak, 400);
+
+  // And with all of it kept from frame to frame, at a few rays along edges.
+  const Effort edges{.aa_samples = 4, .aa_tolerance = 0, .glint_contrast = 0.4F, .accuracy = 0.95F};
+  KeptTransport kept;
+  EXPECT_TRUE(shows(scene, paper.environment, lights, paper.cam_from_set, focal_px, edges, &kept));
+  const double kept_peak = take_peak_mb();
+  EXPECT_FALSE(kept.is_full());
+  RecordProperty("kept_mb", static_cast<int>(kept.bytes() >> 20));
+  RecordProperty("peak_with_kept_mb", static_cast<int>(kept_peak));
+  EXPECT_LT(kept_peak, 400);
 }
 
 }  // namespace

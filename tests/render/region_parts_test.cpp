@@ -138,7 +138,7 @@ TEST(RegionParts, AreSoundWhateverTheMap) {
 
 TEST(RegionParts, OfARegionWithoutTexelsAreItsMiddle) {
   LightRegions regions{1, {0, 0}, 2, {0, 0}};
-  const std::vector<DirectionalLight> lights{{.direction = {0, 0, 1}}, {.direction = {0, 1, 0}}};
+  const std::vector<DirectionalLight> lights{{{0, 0, 1}, {}, 0}, {{0, 1, 0}, {}, 0}};
   const std::vector<RegionParts> parts =
       part_regions(regions, capture::make_image(1, 2, 3), lights);
   ASSERT_EQ(parts.size(), 2U);
