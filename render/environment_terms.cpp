@@ -35,11 +35,16 @@ std::array<std::uint32_t, 3> packed(const EnvironmentTerm& term, const capture::
   const float most = std::max({std::fabs(w.x), std::fabs(w.y), std::fabs(w.z)});
   if (!(std::isfinite(w.x) && std::isfinite(w.y) && std::isfinite(w.z) && most >= least))
     return words;
-  int exponent = 0;
-  // One more where the greatest would be rounded beyond what 15 bits hold.
-  if (std::frexp(most, &exponent) > 16383.0F / 16384) ++exponent;
+  // A float's exponent is such that most / 2^exponent is from 0.5 to 1; one more where the greatest
+  // would be rounded beyond what 15 bits hold.
+  const auto scale_by = [](int power) {
+    return std::bit_cast<float>(static_cast<std::uint32_t>(power + 127) << 23);
+  };
+  int exponent = static_cast<int>(std::bit_cast<std::uint32_t>(most) >> 23) - 126;
+  if (most * scale_by(14 - exponent) > 16383.0F) ++exponent;
+  const float scale = scale_by(14 - exponent);
   const auto bits = [&](float colour) {
-    return static_cast<std::uint32_t>(std::lround(std::ldexp(colour, 14 - exponent))) << 17;
+    return static_cast<std::uint32_t>(std::lrint(colour * scale)) << 17;
   };
   words[0] |= bits(w.x) | static_cast<std::uint32_t>(exponent + bias) << 9;
   words[1] |= bits(w.y);
