@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <string>
 
 #include "calibrate/angles.h"
 #include "render/lobe_filter.h"
@@ -119,11 +120,19 @@ struct ConeSteps {
   Vec3f step{};
 };
 ConeSteps cone_steps(const Environment& env, float alpha, const Spread& spread) {
+  const float texel_rad = pi_f / static_cast<float>(env.smoothed[0].height);
+  const float squares = dot(spread.a, spread.a) + dot(spread.b, spread.b);  // of axes, too
+  if (!(squares > 0) || !std::isfinite(squares)) return {};
+  if (alpha < mirror_alpha) {
+    // Nearly all mirrors and all that is behind: as one ray, whatever its axes.
+    const auto intervals = static_cast<float>(env.smoothed.size() - 1);
+    const float of_smoothed = lobe_width / (4 * intervals * intervals);
+    const float narrow = std::min(blur_texels * texel_rad, of_smoothed);
+    if (squares < narrow * narrow) return {};
+  }
   const auto [a, b] = axes_of(spread);
   const float aa = dot(a, a), bb = dot(b, b);
-  if (!(aa + bb > 0) || !std::isfinite(aa + bb)) return {};
   const float longer = std::sqrt(std::max(aa, bb)), shorter = std::sqrt(std::min(aa, bb));
-  const float texel_rad = pi_f / static_cast<float>(env.smoothed[0].height);
   // No finer than what the lobe or the map blurs.
   const float narrow = std::max({shorter, lobe_width * alpha, blur_texels * texel_rad});
   const float count = std::clamp(std::ceil(0.99F * longer / narrow), 1.0F, most_steps);
@@ -232,14 +241,48 @@ std::size_t halvings_of(int height) {
   return count;
 }
 
+bool is_whole(const capture::Image& map) {
+  return map.height >= 1 && map.width == 2 * map.height && map.channels == 3 &&
+         map.pixels.size() == map.index(map.height, 0);
+}
+
 }  // namespace
 
 void check(const Environment& env) {
-  const capture::Image& map = env.radiance;
-  if (map.height < 1 || map.width != 2 * map.height || map.channels != 3 ||
-      map.pixels.size() != map.index(map.height, 0)) {
+  if (!is_whole(env.radiance))
     throw std::invalid_argument("an environment must be twice as wide as high, with 3 channels");
+}
+
+void check_levels(const Environment& env) {
+  const auto fail = [](const std::string& what) {
+    throw std::invalid_argument("an environment's levels: " + what);
+  };
+  const auto check_all = [&fail](const std::vector<capture::Image>& levels, const char* name) {
+    const auto at = std::ranges::find_if_not(levels, is_whole);
+    if (at != levels.end())
+      fail(std::string(name) + " " + std::to_string(at - levels.begin()) +
+           " is not twice as wide as high, with 3 channels");
+  };
+  check_all(env.smoothed, "smoothed"), check_all(env.halved, "halved");
+  check_all(env.diffused, "diffused");
+  if (env.smoothed.empty()) {  // then the map is the only one
+    if (!env.radiance.empty()) check(env);
+    if (!env.halved.empty() || !env.diffused.empty() || env.compact_apart)
+      fail("there are others, or lights apart, but none smoothed");
+    return;
   }
+  if (levels_of(env).size() > most_environment_levels)
+    fail("more than " + std::to_string(most_environment_levels));
+  std::vector<int> heights{env.smoothed[0].height};
+  if (heights[0] != env.radiance.height) fail("smoothed 0 is of another size than the map");
+  for (const capture::Image& level : env.halved) {
+    if (2 * level.height != heights.back())
+      fail("halved " + std::to_string(heights.size() - 1) + " is not half as high as before");
+    heights.push_back(level.height);
+  }
+  if (!env.diffused.empty() &&
+      !std::ranges::equal(env.diffused, heights, {}, &capture::Image::height))
+    fail("those diffused are of other sizes than its own");
 }
 
 Vec3f direction_of_texel(float x, float y, int width, int height) {

@@ -39,6 +39,14 @@ struct Environment {
 // Throws std::invalid_argument if `radiance` is not (height, 2 * height, 3).
 void check(const Environment& env);
 
+// Of the rest of it: places are found by the sizes of the levels and looked up without a check.
+inline constexpr std::size_t most_environment_levels = 128;
+// Throws std::invalid_argument, saying which, unless every level is twice as wide as high, with 3
+// channels, `smoothed[0]` is of the size of `radiance`, each of `halved` half as high as the one
+// before, `diffused` of the sizes of these, or empty; or if all are more than
+// most_environment_levels. Without `smoothed`, there may be `radiance` alone.
+void check_levels(const Environment& env);
+
 // The brightest radiance that counts; brighter ones, and infinity, are taken as this.
 inline constexpr float brightest_radiance = 1e9F;
 

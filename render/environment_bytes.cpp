@@ -2,6 +2,8 @@
 #include "render/environment_bytes.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "render/bytes.h"
@@ -29,6 +31,9 @@ capture::Image get_image(ByteReader& in) {
   }
   return image;
 }
+
+// Levels are added up as they are; rounding may pass the brightest by a little.
+bool is_counted(float radiance) { return radiance >= 0 && radiance <= 1.01F * brightest_radiance; }
 
 }  // namespace
 
@@ -64,14 +69,21 @@ Environment parse_environment(std::span<const std::byte> bytes) {
     }
   }
   in.expect_end();
-  // Places are found by the sizes of the one and looked up in the other.
-  if (!environment.diffused.empty()) {
-    if (environment.smoothed.empty()) in.fail("has diffused levels alone");
-    std::vector<int> heights{environment.smoothed[0].height};
-    for (const capture::Image& level : environment.halved) heights.push_back(level.height);
-    if (!std::ranges::equal(environment.diffused, heights, {}, &capture::Image::height)) {
-      in.fail("has diffused levels of other sizes than its own");
+  for (const capture::Image* level : levels_of(environment)) {
+    if (!std::ranges::all_of(level->pixels, is_counted)) {
+      in.fail("holds radiance in its levels that is negative or not finite");
     }
+  }
+  if (!(environment.unseen_share >= 0 && environment.unseen_share <= 1)) {
+    in.fail("says that a share was filled that is not from 0 to 1");
+  }
+  if (environment.compact_apart && environment.diffused.empty()) {
+    in.fail("has lights apart, but no level without them");
+  }
+  try {
+    check(environment), check_levels(environment);
+  } catch (const std::invalid_argument& error) {
+    in.fail("holds what cannot be: " + std::string(error.what()));
   }
   return environment;
 }

@@ -10,6 +10,7 @@
 
 #include "calibrate/vec.h"
 #include "capture/image.h"
+#include "render/environment.h"
 #include "render/lanes.h"
 
 namespace render {
@@ -27,7 +28,7 @@ struct EnvironmentTerm {
 // finite, or below 2^-110, counts as 0.
 class EnvironmentTerms {
  public:
-  static constexpr std::size_t slots = 512, most_levels = 128;
+  static constexpr std::size_t slots = 512, most_levels = most_environment_levels;
 
   void clear() { blocks_.clear(), levels_.clear(); }
   bool empty() const { return blocks_.empty(); }

@@ -1,7 +1,9 @@
 // Jobs, scenes and environments survive as bytes, and refuse bytes that are not theirs.
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
+#include <string>
 
 #include "render/environment_bytes.h"
 #include "render/frame_job.h"
@@ -103,6 +105,50 @@ TEST(Serialize, KeepsAnEnvironment) {
   ASSERT_EQ(b.diffused.size(), 2U);
   EXPECT_EQ(b.diffused[1].pixels, a.diffused[1].pixels);
   EXPECT_TRUE(b.compact_apart);
+}
+
+TEST(ParseEnvironment, RefusesLevelsThatPlacesDoNotFit) {
+  const auto refuses = [](auto change, const std::string& words) {
+    Environment env = made_environment();
+    change(env);
+    try {
+      parse_environment(serialize(env));
+      ADD_FAILURE() << "taken: " << words;
+    } catch (const std::runtime_error& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  };
+  const capture::Image square = capture::make_image(2, 2, 3), high = capture::make_image(4, 8, 3);
+  refuses([&](Environment& env) { env.radiance = square, env.seen.assign(4, 1); }, "twice as wide");
+  refuses([&](Environment& env) { env.smoothed.push_back(square); }, "smoothed 1");
+  refuses([&](Environment& env) { env.smoothed[0] = high; }, "another size than the map");
+  refuses([&](Environment& env) { env.halved[0] = high; }, "halved 0");
+  refuses([&](Environment& env) { env.halved.assign(2, env.halved[0]); }, "halved 1");
+  refuses([&](Environment& env) { env.diffused[0] = square; }, "diffused 0");
+  refuses([&](Environment& env) { env.smoothed.resize(200, env.smoothed[0]); }, "more than 128");
+  const auto clear = [](Environment& env) {
+    env.smoothed.clear(), env.halved.clear(), env.diffused.clear();
+  };
+  refuses([&](Environment& env) { env.smoothed.clear(), env.diffused.clear(); }, "none smoothed");
+  refuses([&](Environment& env) { clear(env); }, "no level without");
+  refuses([&](Environment& env) { env.diffused.clear(); }, "no level without");
+}
+
+TEST(ParseEnvironment, RefusesValuesThatWouldSpoilThePicture) {
+  const float inf = std::numeric_limits<float>::infinity();
+  for (const float value : {-1.0F, inf, -inf, std::numeric_limits<float>::quiet_NaN()}) {
+    Environment level = made_environment();
+    level.halved[0].at(0, 1, 2) = value;
+    EXPECT_THROW(parse_environment(serialize(level)), std::runtime_error) << value;
+    Environment share = made_environment();
+    share.unseen_share = value;
+    EXPECT_THROW(parse_environment(serialize(share)), std::runtime_error) << value;
+    Environment map = made_environment();  // a probe's map may: it is counted where it is read
+    map.radiance.at(0, 0, 0) = value;
+    EXPECT_NO_THROW(parse_environment(serialize(map))) << value;
+    map.smoothed.clear(), map.halved.clear(), map.diffused.clear(), map.compact_apart = false;
+    EXPECT_THROW(parse_environment(serialize(map)), std::runtime_error) << "the only level";
+  }
 }
 
 TEST(ParseEnvironment, RefusesDiffusedLevelsOfOtherSizes) {

@@ -84,6 +84,32 @@ TEST(EnvironmentTerms, KeepWeightsToAFourteenThousandthOfTheGreatest) {
   }
 }
 
+TEST(EnvironmentTerms, KeepPlacesToHalfAStepEitherWay) {
+  Sky sky;
+  capture::Image& ramp = sky.images[0];
+  for (int y = 0; y < ramp.height; ++y) {
+    for (int x = 0; x < ramp.width; ++x) {
+      ramp.at(y, x, 0) = static_cast<float>(x), ramp.at(y, x, 1) = static_cast<float>(y);
+    }
+  }
+  // 128 columns take 256 of 65536 steps each, 64 rows 512.
+  constexpr float half_column = 1.0F / 512, half_row = 1.0F / 1024, rounding = 3e-5F;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> unit(0, 1);
+  double off_x = 0, off_y = 0;
+  constexpr int count = 4000;
+  for (int i = 0; i < count; ++i) {
+    const float x = unit(random) * static_cast<float>(ramp.width - 1);
+    const float y = unit(random) * static_cast<float>(ramp.height - 1);
+    const Vec3f got = three_of(lit({{{1, 1, 1}, x, y, 2, 0}}, sky)[2]);
+    EXPECT_NEAR(got.x, x, half_column + rounding);
+    EXPECT_NEAR(got.y, y, half_row + rounding);
+    off_x += got.x - x, off_y += got.y - y;
+  }
+  EXPECT_NEAR(off_x / count, 0, half_column / 20);
+  EXPECT_NEAR(off_y / count, 0, half_row / 20);
+}
+
 TEST(EnvironmentTerms, KeepGreyGrey) {
   Sky sky;
   std::ranges::fill(sky.images[0].pixels, 0.7F);
