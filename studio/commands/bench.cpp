@@ -73,6 +73,7 @@ struct BenchOptions {
   std::optional<std::int64_t> runs = 5;
   std::optional<std::int64_t> check = 64;
   std::optional<std::int64_t> converged = 1024;
+  std::optional<std::int64_t> width = 640, height = 480;
 };
 
 }  // namespace
@@ -103,6 +104,8 @@ Command bench_command() {
                          "papers, cycles: paths a pixel of the reference; 0 = none");
         arguments.option("--converged", o->converged, 2, 65536,
                          "cycles: samples a pixel of Cycles' own converged picture");
+        arguments.option("--width", o->width, 16, 7680, "papers: of the pictures, in pixels");
+        arguments.option("--height", o->height, 16, 4320, "papers: of the pictures, in pixels");
         arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
         return [o](Console& console) {
           const int runs = static_cast<int>(*o->runs);
@@ -112,7 +115,8 @@ Command bench_command() {
           if (o->what == "deform") return bench_deform(runs, console);
           if (o->what == "drag") return bench_drag(o->scene, o->pictures, console);
           if (o->what == "papers") {
-            return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene},
+            return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene,
+                                 static_cast<int>(*o->width), static_cast<int>(*o->height)},
                                 console);
           }
           if (o->what == "load") return bench_load(o->files, runs, console);

@@ -24,7 +24,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int width = 640, height = 480;
 constexpr double very_slow_ms = 10000;  // frames that take longer are timed once
 
 // As the papers did while anything moved: one ray a pixel, and the contribution cut at 95 %.
@@ -66,6 +65,7 @@ void write_views(const std::string& path_start,
   std::vector<std::uint8_t> codes(result.rays.pixels.size() * 3);
   for (const render::RayView view : {render::RayView::depth, render::RayView::rays}) {
     draw_false_colour(result.rays, view, codes);
+    const int width = result.rays.width, height = result.rays.height;
     draw_legend(view, width, height, codes);
     const std::string& name = render::ray_view_names()[static_cast<std::size_t>(view)];
     capture::write_png(fmt::format("{}_{}.png", path_start, name), width, height, 3, codes);
@@ -73,6 +73,7 @@ void write_views(const std::string& path_start,
 }
 
 Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
+  const int width = bench.width, height = bench.height;
   const auto [shot, compile_ms] = make_paper_shot(name, width, height);
   render::FrameJob fast = shot.job;
   fast.effort = papers_effort();

@@ -16,8 +16,9 @@ struct PapersBench {
   int check = 64;        // paths a pixel of the reference; 0 = no error
   std::string pictures;  // directory, or none
   std::string scene;     // this one only; "" = all
+  int width = 640, height = 480;
 };
-// Both papers' scenes at 640x480: the papers' table with ours beside it.
+// Both papers' scenes: the papers' table with ours beside it.
 void bench_papers(const PapersBench& bench, Console& console);
 
 // A part of each scene of the papers, or of one, dragged for a second of frames at 25 a second and
