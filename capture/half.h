@@ -45,4 +45,16 @@ inline void halves_from_floats(std::span<const float> floats, Half* halves) {
   for (; i < floats.size(); ++i) halves[i] = half_from_float(floats[i]);
 }
 
+// As many floats as there are halves, each by float_from_half.
+inline void floats_from_halves(std::span<const Half> halves, float* floats) {
+  std::size_t i = 0;
+#if defined(__F16C__)
+  for (; i + 8 <= halves.size(); i += 8) {
+    const __m128i eight = _mm_loadu_si128(reinterpret_cast<const __m128i*>(&halves[i]));
+    _mm256_storeu_ps(floats + i, _mm256_cvtph_ps(eight));
+  }
+#endif
+  for (; i < halves.size(); ++i) floats[i] = float_from_half(halves[i]);
+}
+
 }  // namespace capture

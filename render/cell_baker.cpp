@@ -426,7 +426,7 @@ void CellBaker::receive(int count, bool grid) {
     const std::size_t k = place[i];
     if (k == nowhere) continue;
     const Vec3f open = r.light.open(k);
-    light_of_point_[i] = {open, open - r.light.lost(k), {}};
+    light_of_point_[i] = {open, r.light.arriving(k), {}};
     if (!grid) continue;
     light_[k] = light_of_point_[i];
     add_centre(points_[i]);
@@ -446,11 +446,11 @@ void CellBaker::receive(int count, bool grid) {
 }
 
 void CellBaker::add_centre(const ShadePoint& p) {
-  CellTransport& t = *transport_;
+  CellTransport::Centres& c = transport_->centres.front();
   const std::size_t k = p.pixel;
-  t.nx[k] = receivers_.nx[k], t.ny[k] = receivers_.ny[k], t.nz[k] = receivers_.nz[k];
-  t.diffuse[k] = p.throughput * p.diffuse;
-  if (p.catches_shadow) t.shadow[k] = p.throughput * p.plate_share;
+  c.nx[k] = receivers_.nx[k], c.ny[k] = receivers_.ny[k], c.nz[k] = receivers_.nz[k];
+  c.diffuse.put(k, p.throughput * p.diffuse);
+  if (p.catches_shadow) c.shadow.put(k, p.throughput * p.plate_share);
 }
 
 // Lights of points that are no centres, in the order of `tested_`.

@@ -247,14 +247,23 @@ class CellBaker final : public RaySink {
                  std::uint32_t shadow_point);
 
   // cell_pack.cpp
+  struct KeyedPlace {
+    std::uint64_t texels;  // that it lies between
+    EnvironmentTerm term;
+  };
   void pack();
+  void pack_bases();
   void pack_lights(const std::vector<CellTransport::LightTerm>& from,
                    std::vector<CellTransport::LightTerm>& to);
   void add_light(const CellTransport::LightTerm& term);
   void add_place(const EnvironmentTerm& term);
-  void join_places();
+  void join_places(bool joins_wider);
   void join_places_of_slot();
+  std::optional<EnvironmentTerm> wider(const EnvironmentTerm& e) const;
+  float change(const EnvironmentTerm& from, const EnvironmentTerm& to) const;
+  bool is_alone(std::vector<KeyedPlace>::const_iterator place) const;
   bool halve_faint_places();
+  void join_wider_places();
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;
@@ -336,10 +345,6 @@ class CellBaker final : public RaySink {
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<EnvironmentTerm> sorted_places_;
-  struct KeyedPlace {
-    std::uint64_t texels;  // that it lies between
-    EnvironmentTerm term;
-  };
   std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
   std::vector<PointLamp> reached_;

@@ -35,7 +35,8 @@ bool CellBaker::lamp_shows(std::size_t place, std::size_t a, std::size_t b) cons
   const std::size_t seeing = t.lamps.factors[place].at[a] > 0 ? a : b;
   const Vec3f irradiance =
       lamp_at(place, seeing) * frame_->planned_table->lamps[t.lamps.numbers[place]].intensity;
-  return std::max(largest(t.diffuse[a] * irradiance), largest(t.diffuse[b] * irradiance)) >
+  const ColourPlanes& diffuse = t.centres.front().diffuse;
+  return std::max(largest(diffuse.at(a) * irradiance), largest(diffuse.at(b) * irradiance)) >
          least_doubt * effort_.glint_contrast;
 }
 
@@ -68,7 +69,7 @@ std::array<Vec3f, 2> CellBaker::light_in_doubt(std::size_t a, std::size_t b) con
         const DirectionalLight& l = planned.lights[frame_->compact[c]];
         for (std::size_t i = 0; i < 2; ++i) {
           const std::size_t k = centres[i];
-          const float cosine = dot({t.nx[k], t.ny[k], t.nz[k]}, l.direction);
+          const float cosine = dot(t.centres.front().normal(k), l.direction);
           sums[i] += l.irradiance * compact_at(c, k) * cosine;
         }
       },
@@ -176,7 +177,7 @@ void CellBaker::ask_again(const ShadePoint& p,
     asked.number = static_cast<std::uint16_t>(frame_->compact[doubt.number]);
     direction = frame_->job->lights.lights[asked.number].direction;
     asked.passed_centre = compact_at(doubt.number, centre);
-    asked.per_source_centre = dot({t.nx[centre], t.ny[centre], t.nz[centre]}, direction);
+    asked.per_source_centre = dot(t.centres.front().normal(centre), direction);
     const float cosine = dot({r.nx[receiver], r.ny[receiver], r.nz[receiver]}, direction);
     if (cosine > 0 && dot(p.hit.geometric_normal, direction) > 0) {
       asked.per_source = cosine, far_m = ray_far;

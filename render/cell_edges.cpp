@@ -232,17 +232,18 @@ bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
   if (!in(t.receiving, a) || !in(t.receiving, b) ||
       !continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera))
     return false;
+  const CellTransport::Centres& c = t.centres.front();
   const auto shown = [&](std::size_t k, Vec3f in_doubt) {
     const Light& light = light_[k];
-    return t.diffuse[k] * (light.arriving + light.lamps - in_doubt) +
-           t.shadow[k] * passing(light.open, light.open - light.arriving) * plate_contrast;
+    return c.diffuse.at(k) * (light.arriving + light.lamps - in_doubt) +
+           c.shadow.at(k) * passing(light.open, light.open - light.arriving) * plate_contrast;
   };
   const auto differ = [&](const std::array<Vec3f, 2>& in_doubt) {
     return largest(abs(clipped(shown(a, in_doubt[0])) - clipped(shown(b, in_doubt[1])))) >
            effort_.glint_contrast;
   };
   if (!differ({})) return false;
-  const bool catches = t.shadow[a] != Vec3f{} || t.shadow[b] != Vec3f{};
+  const bool catches = c.shadow.at(a) != Vec3f{} || c.shadow.at(b) != Vec3f{};
   return catches || differ(light_in_doubt(a, b));
 }
 

@@ -107,13 +107,13 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
   t.mirrored_receiving = mirrored;
   CellTransport::Mirrored& to = t.mirrored.emplace_back();
   to.nx = r.nx, to.ny = r.ny, to.nz = r.nz;
-  to.diffuse = {};
+  to.diffuse.r.fill(0), to.diffuse.g.fill(0), to.diffuse.b.fill(0);
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!in(mirrored, k)) continue;
     const ShadePoint& p = points_[mirrored_at_[k]];
     const Vec3f open = r.light.open(k);
-    light_of_point_[mirrored_at_[k]] = {open, open - r.light.lost(k), {}};
-    to.diffuse[k] = p.throughput * p.diffuse;
+    light_of_point_[mirrored_at_[k]] = {open, r.light.arriving(k), {}};
+    to.diffuse.put(k, p.throughput * p.diffuse);
     const float reach_m = reach_of_neighbours * (length(p.steps.a) + length(p.steps.b));
     mirrored_hits_[k] = {p.hit.instance, p.hit.material, reach_m,
                          p.light_normal, p.hit.position, light_of_point_[mirrored_at_[k]].arriving};

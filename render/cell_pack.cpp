@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numeric>
+#include <optional>
 #include <span>
 
 #include "render/cell_baker.h"
@@ -20,6 +22,8 @@ std::uint32_t key_of(const CellTransport::SharedTerm& s) {
 constexpr std::size_t most_places_of_slot = 256;
 // By how much a slot may then change for one of them at a time, under the planned light.
 constexpr float least_change = 3e-4F;
+// And by how much for all of them that join wider ones at the end, each sample of it.
+constexpr float most_change = 1e-3F;
 
 // A number for the four texels that a term's place lies between.
 std::uint64_t texels_of(const EnvironmentTerm& e) {
@@ -44,6 +48,14 @@ std::size_t join(const std::vector<Term>& from, std::vector<Term>& to) {
   return kept;
 }
 
+// One place in the middle of two that lie between the same texels, both of some weight.
+void join_into(EnvironmentTerm& to, const EnvironmentTerm& from) {
+  const float share = mean(to.weight), weight = mean(from.weight), part = weight / (share + weight);
+  to.weight += from.weight;
+  to.x += (from.x - to.x) * part;
+  to.y += (from.y - to.y) * part;
+}
+
 // Terms in the order of their slots, of which there are few; sort_slot orders those of one.
 template <class Term, class F>
 void sort_by_slot(const std::vector<Term>& terms, std::vector<Term>& sorted, F&& sort_slot) {
@@ -64,7 +76,7 @@ void sort_by_slot(const std::vector<Term>& terms, std::vector<Term>& sorted, F&&
 // Tells what came of the cell's slots, and joins what is many times the same.
 void CellBaker::pack() {
   CellTransport& t = *transport_;
-  std::copy_n(base_.begin(), cell_pixels, t.base.begin());
+  pack_bases();
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
   t.empty = t.receiving == CellMask{} && t.mirrored.empty() && places_.empty() &&
             t.lights.empty() && t.bent.empty() && t.video.empty() && lamp_terms_.empty();
@@ -82,12 +94,29 @@ void CellBaker::pack() {
   }
   pack_lights(t.lights, t.lights);
   pack_lights(lamp_terms_, t.lamp_terms);
-  join_places();
+  join_places(effort_.aa_samples > 1);  // a picture of one ray a pixel is hardly kept
   t.environment.pack(places_, frame_->planned_levels);
   std::ranges::sort(t.shared, {}, [](const CellTransport::SharedTerm& s) {
     return key_of(s);
   });  // in place: nothing is allocated
   t.shared.resize(join(t.shared, t.shared));
+  if (none(t.receiving)) t.centres.clear();
+}
+
+void CellBaker::pack_bases() {
+  CellTransport& t = *transport_;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    // Likely the latest, or one of the first.
+    const std::size_t latest = t.bases.size() - 1;
+    std::size_t i = 0;
+    if (!t.bases.empty() && t.bases[latest] == base_[k]) {
+      i = latest;
+    } else {
+      while (i < t.bases.size() && !(t.bases[i] == base_[k])) ++i;
+      if (i == t.bases.size()) t.bases.push_back(base_[k]);
+    }
+    t.base_of[k] = static_cast<std::uint8_t>(i);
+  }
 }
 
 // A cell that samples glass a thousand times a pixel finds millions of terms: they are joined time
@@ -101,9 +130,10 @@ void CellBaker::add_light(const CellTransport::LightTerm& term) {
 }
 
 void CellBaker::add_place(const EnvironmentTerm& term) {
+  if (!is_finite(term.weight)) return;  // nothing could be joined with it
   places_.push_back(term);
   if (places_.size() <= most_places_ || shades_ring_) return;
-  join_places();
+  join_places(false);
   most_places_ = 2 * places_.size() + enough_terms;
 }
 
@@ -120,7 +150,7 @@ void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
 // Places of a slot that lie between the same four texels of a level become one, in their middle:
 // many rays through glass, or of many samples, look nearly the same way. Between four texels a
 // picture is all but linear, so hardly anything is lost.
-void CellBaker::join_places() {
+void CellBaker::join_places(bool joins_wider) {
   sort_by_slot(places_, sorted_places_, [](auto) {});
   places_.clear();
   for (std::size_t i = 0; i < sorted_places_.size();) {
@@ -133,6 +163,7 @@ void CellBaker::join_places() {
     if (keyed_places_.size() > most_places_of_slot && halve_faint_places()) {
       join_places_of_slot();
     }
+    if (joins_wider) join_wider_places();
     for (const KeyedPlace& place : keyed_places_) places_.push_back(place.term);
   }
 }
@@ -148,16 +179,39 @@ void CellBaker::join_places_of_slot() {
     const float weight = mean(from.term.weight);
     const float share = kept > 0 ? mean(keyed_places_[kept - 1].term.weight) : 0;
     if (weight > 0 && share > 0 && keyed_places_[kept - 1].texels == from.texels) {
-      EnvironmentTerm& to = keyed_places_[kept - 1].term;
-      const float part = weight / (share + weight);
-      to.weight += from.term.weight;
-      to.x += (from.term.x - to.x) * part;
-      to.y += (from.term.y - to.y) * part;
+      join_into(keyed_places_[kept - 1].term, from.term);
     } else {
       keyed_places_[kept++] = from;
     }
   }
   keyed_places_.resize(kept);
+}
+
+// The same place in texels twice as wide, if there are any. Only those of some weight are joined.
+std::optional<EnvironmentTerm> CellBaker::wider(const EnvironmentTerm& e) const {
+  const std::size_t level = halved_level(*frame_->planned, e.level);
+  if (level == e.level || !(mean(e.weight) > 0)) return {};
+  const capture::Image &fine = *frame_->planned_levels[e.level],
+                       &coarse = *frame_->planned_levels[level];
+  if (coarse.width * 2 != fine.width || coarse.height * 2 != fine.height) return {};
+  return EnvironmentTerm{e.weight, (e.x - 0.5F) / 2, (e.y - 0.5F) / 2, e.slot,
+                         static_cast<std::uint16_t>(level)};
+}
+
+// By how much its slot changes under the planned light.
+float CellBaker::change(const EnvironmentTerm& from, const EnvironmentTerm& to) const {
+  const auto& levels = frame_->planned_levels;
+  const Vec3f by = from.weight * (radiance_at(*levels[to.level], to.x, to.y) -
+                                  radiance_at(*levels[from.level], from.x, from.y));
+  return std::max({std::abs(by.x), std::abs(by.y), std::abs(by.z)});
+}
+
+// Where two places of the same texels were not joined, one takes away what the other gives (rays
+// cut by chance): they stay together.
+bool CellBaker::is_alone(std::vector<KeyedPlace>::const_iterator place) const {
+  const bool first = place == keyed_places_.begin() || std::prev(place)->texels != place->texels;
+  const auto next = std::next(place);
+  return first && (next == keyed_places_.end() || next->texels != place->texels);
 }
 
 // Where a slot looks at very many places, those that give it least, and show about the same in
@@ -167,24 +221,40 @@ bool CellBaker::halve_faint_places() {
   for (const KeyedPlace& place : keyed_places_) all += std::abs(mean(place.term.weight));
   const float least = all / static_cast<float>(most_places_of_slot);
   bool halved = false;
-  for (KeyedPlace& place : keyed_places_) {
-    EnvironmentTerm& e = place.term;
-    const std::size_t level = halved_level(*frame_->planned, e.level);
-    const float weight = mean(e.weight);  // only those above 0 are joined
-    if (level == e.level || !(weight > 0) || weight >= least) continue;
-    const capture::Image &fine = *frame_->planned_levels[e.level],
-                         &coarse = *frame_->planned_levels[level];
-    if (coarse.width * 2 != fine.width || coarse.height * 2 != fine.height) continue;
-    const float x = (e.x - 0.5F) / 2, y = (e.y - 0.5F) / 2;
-    const Vec3f change = e.weight * (radiance_at(coarse, x, y) - radiance_at(fine, e.x, e.y));
-    if (std::max({std::abs(change.x), std::abs(change.y), std::abs(change.z)}) > least_change)
-      continue;
-    e.level = static_cast<std::uint16_t>(level);
-    e.x = x, e.y = y;
-    place.texels = texels_of(e);
+  for (auto place = keyed_places_.begin(); place != keyed_places_.end(); ++place) {
+    if (mean(place->term.weight) >= least || !is_alone(place)) continue;
+    const auto to = wider(place->term);
+    if (!to || change(place->term, *to) > least_change) continue;
+    *place = {texels_of(*to), *to};
     halved = true;
   }
   return halved;
+}
+
+// A cone looks at the two levels that it lies between, and lobes at cones beside and within each
+// other: places join those that they would be in texels twice as wide, where next to nothing
+// changes.
+void CellBaker::join_wider_places() {
+  const std::uint16_t slot = keyed_places_.front().term.slot;
+  const auto samples = slot < cell_pixels ? 1.0F : static_cast<float>(counts_[slot - cell_pixels]);
+  float left = most_change * samples;
+  // They are in order of levels, and wider ones have higher numbers.
+  for (auto place = keyed_places_.begin(); place != keyed_places_.end(); ++place) {
+    const auto to = is_alone(place) ? wider(place->term) : std::nullopt;
+    if (!to) continue;
+    const auto other = std::ranges::lower_bound(place, keyed_places_.end(), texels_of(*to), {},
+                                                &KeyedPlace::texels);
+    if (other == keyed_places_.end() || other->texels != texels_of(*to) || !is_alone(other) ||
+        !(mean(other->term.weight) > 0))
+      continue;
+    const float by = change(place->term, *to);
+    if (by > std::min(least_change * samples, left)) continue;
+    left -= by;
+    join_into(other->term, *to);
+    place->term.weight = {};
+  }
+  std::erase_if(keyed_places_,
+                [](const KeyedPlace& place) { return place.term.weight == Vec3f{}; });
 }
 
 }  // namespace render

@@ -25,50 +25,91 @@ void add_lamps(const CellTransport& cell, const FrameLight& light, RelightWorksp
         b = add(b, multiply(factor, all(intensity.z)));
       }
     }
-    store(&w.lamps_r[k], r), store(&w.lamps_g[k], g), store(&w.lamps_b[k], b);
+    store(&w.lamps.r[k], r), store(&w.lamps.g[k], g), store(&w.lamps.b[k], b);
   }
   for (const TintedLight& tint : lamps.tints) {
     const std::size_t k = tint.centre;
     const Vec3f lost = light.lamps[lamps.numbers[tint.light]].intensity * tint.lost_share *
                        lamps.factors[tint.light].at[k];
-    w.lamps_r[k] -= lost.x, w.lamps_g[k] -= lost.y, w.lamps_b[k] -= lost.z;
+    w.lamps.r[k] -= lost.x, w.lamps.g[k] -= lost.y, w.lamps.b[k] -= lost.z;
   }
 }
 
-void light_mirrored(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
+void light_mirrored(const CellTransport& cell,
+                    const FrameLight& light,
+                    RelightWorkspace& w,
+                    CellPicture& picture) {
   if (cell.mirrored.empty()) return;
   const CellTransport::Mirrored& m = cell.mirrored.front();
   add_up_light({cell.mirrored_receiving, m.nx, m.ny, m.nz}, light.lights, cell.mirrored_visibility,
                w.mirrored, w.soft);
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!in(cell.mirrored_receiving, k)) continue;
-    w.mirrored_arriving[k] = w.mirrored.open(k) - w.mirrored.lost(k);
-    w.added[k] += four_of(m.diffuse[k] * w.mirrored_arriving[k]);
+    const Vec3f arriving = w.mirrored.arriving(k);
+    w.mirrored_arriving.put(k, arriving);
+    picture.added[k] += four_of(m.diffuse.at(k) * arriving);
   }
 }
 
-void light_centres(const CellTransport& cell, RelightWorkspace& w) {
-  for (std::size_t k = 0; k < cell_pixels; ++k) {
-    const CellTransport::Base& base = cell.base[k];
-    w.added[k] = four_of(base.radiance);
-    w.share[k] = base.plate;
-    w.passed[k] = base.passed;
-    if (!(cell.receiving[k / 64] >> (k % 64) & 1)) continue;
-    const Vec3f open = w.light.open(k), lost = w.light.lost(k);
-    w.arriving[k] = open - lost + Vec3f{w.lamps_r[k], w.lamps_g[k], w.lamps_b[k]};
-    w.passing[k] = passing(open, lost);
-    w.added[k] += four_of(cell.diffuse[k] * w.arriving[k]);
-    const Vec3f share = cell.shadow[k] * w.passing[k];
-    w.share[k] += share;
-    w.passed[k] += mean(share);
+Four with_mean(Vec3f share) { return Four{share.x, share.y, share.z, mean(share)}; }
+
+void show_base(const CellTransport::Base& base, std::size_t slot, CellPicture& picture) {
+  picture.added[slot] = four_of(base.radiance);
+  picture.share[slot] = Four{base.plate.x, base.plate.y, base.plate.z, base.passed};
+  picture.seen[slot] = base.seen;
+}
+
+// Of eight centres, in one colour.
+struct Arrived {
+  Eight arriving, passing;  // irradiance; share that is seen
+};
+Arrived arrived(const float* open_at, const float* lost_at, const float* lamps_at) {
+  const Eight open = load_eight(open_at), lost = load_eight(lost_at), none{};
+  const Eight left = open - lost, share = 1 - lost / open;
+  return {(left > 0 ? left : none) + load_eight(lamps_at),
+          (lost > 0) & (open > 0) ? (share > 0 ? share : none) : none + 1};
+}
+
+void light_centres(const CellTransport& cell, RelightWorkspace& w, CellPicture& picture) {
+  if (cell.bases.size() == 1) {
+    show_base(cell.bases.front(), 0, picture);
+    std::fill_n(picture.added.begin() + 1, cell_pixels - 1, picture.added[0]);
+    std::fill_n(picture.share.begin() + 1, cell_pixels - 1, picture.share[0]);
+    std::fill_n(picture.seen.begin() + 1, cell_pixels - 1, picture.seen[0]);
+  } else {
+    for (std::size_t k = 0; k < cell_pixels; ++k) show_base(cell.base(k), k, picture);
+  }
+  if (none(cell.receiving)) return;
+  const CellTransport::Centres& c = cell.centres.front();
+  for (std::size_t k = 0; k < cell_pixels; k += 8) {
+    if ((cell.receiving[k / 64] >> (k % 64) & 255) == 0) continue;
+    const Arrived r = arrived(&w.light.open_r[k], &w.light.lost_r[k], &w.lamps.r[k]);
+    const Arrived g = arrived(&w.light.open_g[k], &w.light.lost_g[k], &w.lamps.g[k]);
+    const Arrived b = arrived(&w.light.open_b[k], &w.light.lost_b[k], &w.lamps.b[k]);
+    store_eight(&w.arriving.r[k], r.arriving), store_eight(&w.passing.r[k], r.passing);
+    store_eight(&w.arriving.g[k], g.arriving), store_eight(&w.passing.g[k], g.passing);
+    store_eight(&w.arriving.b[k], b.arriving), store_eight(&w.passing.b[k], b.passing);
+    const auto added =
+        fours_of(load_eight(&c.diffuse.r[k]) * r.arriving, load_eight(&c.diffuse.g[k]) * g.arriving,
+                 load_eight(&c.diffuse.b[k]) * b.arriving, Eight{});
+    const Eight share_r = load_eight(&c.shadow.r[k]) * r.passing,
+                share_g = load_eight(&c.shadow.g[k]) * g.passing,
+                share_b = load_eight(&c.shadow.b[k]) * b.passing;
+    const auto share =
+        fours_of(share_r, share_g, share_b, (share_r + share_g + share_b) * (1.0F / 3));
+    for (std::size_t i = 0; i < 8; ++i) {
+      picture.added[k + i] += added[i];
+      picture.share[k + i] += share[i];
+    }
   }
 }
 
 // What lamps add on a stand-in. Where the plate tells its albedo, they brighten the plate.
 void light_catchers(const CellTransport& cell,
                     const FrameLight& light,
-                    std::span<const Vec3f, cell_pixels> plate,
+                    std::span<const Four, cell_pixels> plate,
                     RelightWorkspace& w,
+                    CellPicture& picture,
                     RenderStatistics& statistics) {
   w.caught.assign(cell.catchers.size(), {});
   for (const CellTransport::CaughtLamp& c : cell.caught) {
@@ -78,22 +119,27 @@ void light_catchers(const CellTransport& cell,
     const CellTransport::LampCatcher& c = cell.catchers[i];
     const std::size_t k = c.point;
     const bool centre = k < cell_pixels;
-    const Vec3f irradiance = centre ? Vec3f{w.lamps_r[k], w.lamps_g[k], w.lamps_b[k]} : w.caught[i];
+    const Vec3f irradiance = centre ? w.lamps.at(k) : w.caught[i];
     if (irradiance == Vec3f{}) continue;
     const Vec3f open = centre ? w.light.open(k) : w.open_at_points[k - cell_pixels];
-    const Vec3f behind = plate[c.slot % cell_pixels];
+    const Vec3f behind = three_of(plate[c.slot % cell_pixels]);
     if (std::max({behind.x, behind.y, behind.z}) >= clipped_plate) ++statistics.clipped_plate;
     if (plate_tells_albedo(behind, open) && open.x > 0 && open.y > 0 && open.z > 0) {
-      w.share[c.slot] +=
-          c.share * Vec3f{irradiance.x / open.x, irradiance.y / open.y, irradiance.z / open.z};
+      // It brightens what is there, and hides nothing.
+      picture.share[c.slot] += four_of(
+          c.share * Vec3f{irradiance.x / open.x, irradiance.y / open.y, irradiance.z / open.z});
     } else {
-      w.added[c.slot] += four_of(c.share * c.albedo * irradiance * (1 / std::numbers::pi_v<float>));
+      picture.added[c.slot] +=
+          four_of(c.share * c.albedo * irradiance * (1 / std::numbers::pi_v<float>));
     }
   }
 }
 
 // Shadows on points that are no centres.
-void light_shadow_points(const CellTransport& cell, const FrameLight& light, RelightWorkspace& w) {
+void light_shadow_points(const CellTransport& cell,
+                         const FrameLight& light,
+                         RelightWorkspace& w,
+                         CellPicture& picture) {
   w.open_at_points.clear();
   w.passing_at_points.clear();
   for (const CellTransport::ShadowPoint& point : cell.shadow_points) {
@@ -105,9 +151,7 @@ void light_shadow_points(const CellTransport& cell, const FrameLight& light, Rel
       lost += e * s.lost;
     }
     w.passing_at_points.push_back(passing(open, lost));
-    const Vec3f share = point.share * w.passing_at_points.back();
-    w.share[point.slot] += share;
-    w.passed[point.slot] += mean(share);
+    picture.share[point.slot] += with_mean(point.share * w.passing_at_points.back());
     w.open_at_points.push_back(open);
   }
   for (const CellTransport::BentCaustic& c : cell.bent_caustics) {
@@ -125,7 +169,6 @@ void fill_blocks(const CellTransport::Blocks& blocks, CellPicture& picture) {
                                                  blocks.middle(x, blocks.columns));
       picture.added[to] = picture.added[from];
       picture.share[to] = picture.share[from];
-      picture.passed[to] = picture.passed[from];
       picture.seen[to] = picture.seen[from];
     }
   }
@@ -150,10 +193,8 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
 void CellTransport::clear() {
   empty = true;
   blocks = {};
-  base.fill({});
-  nx.fill(0), ny.fill(0), nz.fill(0);
-  diffuse.fill({});
-  shadow.fill({});
+  bases.clear();
+  centres.assign(1, Centres{});
   receiving = mirrored_receiving = {};
   visibility.clear(), mirrored_visibility.clear(), mirrored.clear();
   shared.clear(), lights.clear();
@@ -172,88 +213,76 @@ std::size_t CellTransport::bytes() const {
     return of(v.lit) + of(v.seen) + of(v.tints) + of(v.near) + of(v.windows);
   };
   return sizeof *this + of_sight(visibility) + of_sight(mirrored_visibility) + of(mirrored) +
-         of(shared) + of(lights) + environment.bytes() + of(shadow_points) + of(shadow_lights) +
-         of(lamps.numbers) + of(lamps.factors) + of(lamps.tints) + of(lamp_terms) + of(catchers) +
-         of(caught) + of(bent) + of(bent_caustics) + of(video) + of(borrowed) + of(further) +
-         of(counts);
+         of(bases) + of(centres) + of(shared) + of(lights) + environment.bytes() +
+         of(shadow_points) + of(shadow_lights) + of(lamps.numbers) + of(lamps.factors) +
+         of(lamps.tints) + of(lamp_terms) + of(catchers) + of(caught) + of(bent) +
+         of(bent_caustics) + of(video) + of(borrowed) + of(further) + of(counts);
 }
 
 void relight(const CellTransport& cell,
              const FrameLight& light,
-             std::span<const Vec3f, cell_pixels> plate,
+             std::span<const Four, cell_pixels> plate,
              RelightWorkspace& w,
              CellPicture& picture,
              RenderStatistics& statistics) {
-  if (cell.receiving != CellMask{}) {
-    add_up_light({cell.receiving, cell.nx, cell.ny, cell.nz}, light.lights, cell.visibility,
-                 w.light, w.soft);
+  if (!none(cell.receiving)) {
+    const CellTransport::Centres& c = cell.centres.front();
+    add_up_light({cell.receiving, c.nx, c.ny, c.nz}, light.lights, cell.visibility, w.light,
+                 w.soft);
     add_lamps(cell, light, w);
   }
-  light_centres(cell, w);
-  light_mirrored(cell, light, w);
+  light_centres(cell, w, picture);
+  light_mirrored(cell, light, w, picture);
   for (const CellTransport::Further& f : cell.further) {
-    const std::size_t slot = cell_pixels + f.pixel;
-    w.added[slot] = four_of(f.base.radiance);
-    w.share[slot] = f.base.plate;
-    w.passed[slot] = f.base.passed;
+    show_base(f.base, cell_pixels + f.pixel, picture);
   }
-  light_shadow_points(cell, light, w);
-  light_catchers(cell, light, plate, w, statistics);
+  light_shadow_points(cell, light, w, picture);
+  light_catchers(cell, light, plate, w, picture, statistics);
   for (const CellTransport::SharedTerm& s : cell.shared) {
     if (s.of == CellTransport::SharedTerm::Of::shadow) {
-      const Vec3f share = s.weight * w.passing[s.centre];
-      w.share[s.slot] += share;
-      w.passed[s.slot] += mean(share);
+      picture.share[s.slot] += with_mean(s.weight * w.passing.at(s.centre));
     } else {
       const bool mirrored = s.of == CellTransport::SharedTerm::Of::mirrored_light;
-      w.added[s.slot] +=
-          four_of(s.weight * (mirrored ? w.mirrored_arriving : w.arriving)[s.centre]);
+      picture.added[s.slot] +=
+          four_of(s.weight * (mirrored ? w.mirrored_arriving : w.arriving).at(s.centre));
     }
   }
-  for (const CellTransport::LightTerm& l : cell.lights) {
-    w.added[l.slot] += four_of(l.weight * light.lights[l.light].irradiance);
+  // In the order of slots: each is fetched once, for a sum waits for what was put there last.
+  for (auto l = cell.lights.begin(); l != cell.lights.end();) {
+    const std::uint16_t slot = l->slot;
+    Four sum = picture.added[slot];
+    for (; l != cell.lights.end() && l->slot == slot; ++l) {
+      sum += four_of(l->weight) * four_of(light.lights[l->light].irradiance);
+    }
+    picture.added[slot] = sum;
   }
   for (const CellTransport::LightTerm& l : cell.lamp_terms) {
-    w.added[l.slot] += four_of(l.weight * light.lamps[l.light].intensity);
+    picture.added[l.slot] += four_of(l.weight * light.lamps[l.light].intensity);
   }
-  cell.environment.add_light(light.levels, w.added);
+  cell.environment.add_light(light.levels, picture.added);
   for (const CellTransport::BentPlate& b : cell.bent) {
     const Vec3f share =
         b.point == CellTransport::BentPlate::lit ? Vec3f{1, 1, 1} : w.passing_at_points[b.point];
-    w.added[b.slot] += four_of(b.weight * share * plate_at(*light.levels[b.level], b.x, b.y));
+    picture.added[b.slot] += four_of(b.weight * share * plate_at(*light.levels[b.level], b.x, b.y));
   }
   for (const CellTransport::VideoTerm& v : cell.video) {
-    w.added[v.slot] += four_of(v.weight * plate_at(*light.levels[v.level], v.x, v.y));
+    picture.added[v.slot] += four_of(v.weight * plate_at(*light.levels[v.level], v.x, v.y));
   }
-  for (std::size_t k = 0; k < cell_pixels; ++k) {
-    picture.added[k] = three_of(w.added[k]);
-    picture.share[k] = w.share[k];
-    picture.passed[k] = w.passed[k];
-    picture.seen[k] = cell.base[k].seen;
-  }
-  // Pixels of further samples: their own sums, and what they share of centres.
-  for (const CellTransport::Further& f : cell.further) {
-    const std::size_t k = f.pixel;
-    picture.added[k] = three_of(w.added[cell_pixels + k]);
-    picture.share[k] = w.share[cell_pixels + k];
-    picture.passed[k] = w.passed[cell_pixels + k];
-    picture.seen[k] = f.base.seen;
-  }
+  // Pixels of further samples: their own sums, and what they share of centres, of their own too.
   for (const CellTransport::Borrowed& b : cell.borrowed) {
     const auto n = static_cast<float>(b.count);
-    picture.added[b.pixel] += three_of(w.added[b.centre]) * n;
-    picture.share[b.pixel] += w.share[b.centre] * n;
-    picture.passed[b.pixel] += w.passed[b.centre] * n;
-    picture.seen[b.pixel] += cell.base[b.centre].seen * n;
+    const std::size_t to = cell_pixels + b.pixel;
+    picture.added[to] += picture.added[b.centre] * n;
+    picture.share[to] += picture.share[b.centre] * n;
+    picture.seen[to] += cell.base(b.centre).seen * n;
   }
   for (const CellTransport::Further& f : cell.further) {
     const auto n = static_cast<float>(f.count);
-    const std::size_t k = f.pixel;
+    const std::size_t k = f.pixel, from = cell_pixels + k;
     // Divided, not multiplied by 1 / n: n equal shares of the plate give it back exactly.
-    picture.added[k] = picture.added[k] / n;
-    picture.share[k] = picture.share[k] / n;
-    picture.passed[k] /= n;
-    picture.seen[k] /= n;
+    picture.added[k] = picture.added[from] / n;
+    picture.share[k] = picture.share[from] / n;
+    picture.seen[k] = picture.seen[from] / n;
   }
   if (cell.blocks.size > 1) fill_blocks(cell.blocks, picture);
 }

@@ -30,8 +30,8 @@ static_assert(slots <= EnvironmentTerms::slots);
 // basis, and with mirrored light as places in the environment.
 struct CellTransport {
   struct Base {
-    Vec3f radiance;    // whatever the light
-    Vec3f plate;       // share of the plate
+    Vec3f radiance{};  // whatever the light
+    Vec3f plate{};     // share of the plate
     float passed = 0;  // the same in the mean
     float seen = 0;    // 1 - coverage by virtual objects
     friend bool operator==(const Base&, const Base&) = default;
@@ -53,7 +53,15 @@ struct CellTransport {
   // gets its light as centres do. 0 where there is none.
   struct Mirrored {
     alignas(64) std::array<float, cell_pixels> nx, ny, nz;
-    std::array<Vec3f, cell_pixels> diffuse;  // radiance per irradiance, times its share
+    ColourPlanes diffuse;  // radiance per irradiance, times its share
+  };
+  // Centres that receive light: normals and answers; 0 elsewhere.
+  struct Centres {
+    alignas(64) std::array<float, cell_pixels> nx, ny, nz;
+    ColourPlanes diffuse;  // radiance per irradiance
+    ColourPlanes shadow;   // plate's share, as far as light is seen
+
+    Vec3f normal(std::size_t k) const { return {nx[k], ny[k], nz[k]}; }
   };
   // A point of a stand-in that is no centre: the plate passes as far as it sees light.
   struct ShadowPoint {
@@ -124,11 +132,9 @@ struct CellTransport {
 
   bool empty = true;  // nothing but plate
   Blocks blocks;
-  std::array<Base, cell_pixels> base;
-  // Centres that receive light: normals and answers; masks say which.
-  alignas(64) std::array<float, cell_pixels> nx, ny, nz;
-  std::array<Vec3f, cell_pixels> diffuse;  // radiance per irradiance
-  std::array<Vec3f, cell_pixels> shadow;   // plate's share, as far as light is seen
+  std::vector<Base> bases;  // most cells have one or two of them
+  std::array<std::uint8_t, cell_pixels> base_of{};
+  std::vector<Centres> centres;  // one; or none, where no centre receives light
   CellMask receiving{};
   CellVisibility visibility;
   std::vector<Mirrored> mirrored;  // one, or none
@@ -153,6 +159,8 @@ struct CellTransport {
   // By pixel, or empty if nobody has asked: a cell that is kept without them is found anew, once.
   std::vector<RayCount> counts;
 
+  const Base& base(std::size_t k) const { return bases[base_of[k]]; }
+  // For a cell to be found: with centres, and without bases.
   void clear();
   std::size_t bytes() const;
 };
@@ -188,28 +196,27 @@ Vec3f plate_at(const capture::Image& level, float x, float y);
 // What relight() works in.
 struct RelightWorkspace {
   LightSums light, mirrored, soft;
-  alignas(64) std::array<float, cell_pixels> lamps_r, lamps_g, lamps_b;
-  std::array<Four, slots> added;
-  std::array<Vec3f, slots> share;
-  std::array<float, slots> passed;
+  ColourPlanes lamps;
   // Irradiance, lamps' too; share that is seen of what is not lamps'.
-  std::array<Vec3f, cell_pixels> arriving, passing, mirrored_arriving;
+  ColourPlanes arriving, passing, mirrored_arriving;
   std::vector<Vec3f> caught;  // irradiance of lamps at catchers
   // At shadow points: irradiance, where nothing virtual is in the way; share of it that arrives.
   std::vector<Vec3f> open_at_points, passing_at_points;
 };
 
-// What a pixel shows: plate * share + added.
+// What a pixel shows: plate * share + added. The first 256 are the pixels; after them, while they
+// are lit, their further samples' sums.
 struct CellPicture {
-  std::array<Vec3f, cell_pixels> added, share;
-  std::array<float, cell_pixels> passed, seen;
+  std::array<Four, slots> added;
+  std::array<Four, slots> share;  // the last of the four: their mean
+  std::array<float, slots> seen;
 };
 
 // A cell under the light of a frame. `plate` in scene-linear light decides where lamps on stand-ins
 // find their albedo.
 void relight(const CellTransport& cell,
              const FrameLight& light,
-             std::span<const Vec3f, cell_pixels> plate,
+             std::span<const Four, cell_pixels> plate,
              RelightWorkspace& workspace,
              CellPicture& picture,
              RenderStatistics& statistics);

@@ -18,64 +18,134 @@ unsigned bits_at(const CellMask& mask, std::size_t k) {
   return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
 }
 
+// Light of many directions together, on surfaces that all of it shines on: each colour's irradiance
+// is the cosine to a vector.
+struct LightVectors {
+  Vec3f r{}, g{}, b{};
+  bool any = false;
+
+  void add(const DirectionalLight& l) {
+    r += l.direction * l.irradiance.x;
+    g += l.direction * l.irradiance.y;
+    b += l.direction * l.irradiance.z;
+    any = true;
+  }
+};
+
+// Lights by what a cell's centres see of them. On most cells most lights shine on all centres or on
+// none, and are hidden from all or from none: they cost nothing a pixel.
+struct LightGroup {
+  struct List {
+    std::array<std::uint16_t, most_lights> lights;
+    std::size_t count = 0;
+
+    void add(std::size_t i) { lights[count++] = static_cast<std::uint16_t>(i); }
+    std::span<const std::uint16_t> span() const { return std::span(lights).first(count); }
+  };
+  LightVectors open, lost;  // that shine on all, and are hidden from all
+  List partly_hidden;       // that shine on all
+  List partly_lit;
+};
+
 // The lights that shine on any of a cell's centres: those that no window shares, those that are
 // shared, and those that are hidden near some centres and shared by the others.
 class LightsOfCell {
  public:
-  LightsOfCell(std::span<const DirectionalLight> lights, const CellVisibility& visibility) {
+  LightsOfCell(std::span<const DirectionalLight> lights,
+               const CellMask& receiving,
+               const CellVisibility& visibility) {
     const bool shares = !visibility.windows.empty();
     const std::size_t count =
         std::min({lights.size(), visibility.lit.size(), std::size_t{most_lights}});
     for (std::size_t i = 0; i < count; ++i) {
-      if (visibility.lit[i] == CellMask{}) continue;
+      if (none(visibility.lit[i])) continue;
       const bool soft = shares && SoftLights::has_parts(lights[i]);
-      List& list = !soft ? own_ : visibility.near[i] == CellMask{} ? shared_ : both_;
-      list.lights[list.count++] = static_cast<std::uint16_t>(i);
+      if (soft && !none(visibility.near[i])) {
+        both_.add(i);
+      } else {
+        sort_in(soft ? shared_ : own_, lights[i], i, receiving, visibility);
+      }
     }
   }
-  std::span<const std::uint16_t> own() const { return own_.span(); }
-  std::span<const std::uint16_t> shared() const { return shared_.span(); }
+  const LightGroup& own() const { return own_; }
+  const LightGroup& shared() const { return shared_; }
   std::span<const std::uint16_t> both() const { return both_.span(); }
 
  private:
-  struct List {
-    std::array<std::uint16_t, most_lights> lights;
-    std::size_t count = 0;
-    std::span<const std::uint16_t> span() const { return std::span(lights).first(count); }
-  };
-  List own_, shared_, both_;
+  static void sort_in(LightGroup& group,
+                      const DirectionalLight& light,
+                      std::size_t i,
+                      const CellMask& receiving,
+                      const CellVisibility& visibility) {
+    bool all_lit = true, all_seen = true, all_hidden = true;
+    for (std::size_t word = 0; word < receiving.size(); ++word) {
+      all_lit &= (receiving[word] & ~visibility.lit[i][word]) == 0;
+      all_seen &= (receiving[word] & ~visibility.seen[i][word]) == 0;
+      all_hidden &= (receiving[word] & visibility.seen[i][word]) == 0;
+    }
+    if (!all_lit) return group.partly_lit.add(i);
+    group.open.add(light);
+    if (all_seen) return;
+    all_hidden ? group.lost.add(light) : group.partly_hidden.add(i);
+  }
+
+  LightGroup own_, shared_;
+  LightGroup::List both_;
 };
 
 struct LaneNormals {
   Lanes x, y, z;
 };
 
-// Of some centres beside each other.
+// Irradiance of some centres beside each other.
+struct LaneColour {
+  Lanes r = all(0), g = all(0), b = all(0);
+
+  void add_light(Lanes cosine, Vec3f irradiance) {
+    r = add(r, multiply(cosine, all(irradiance.x)));
+    g = add(g, multiply(cosine, all(irradiance.y)));
+    b = add(b, multiply(cosine, all(irradiance.z)));
+  }
+  void add_all(const LaneNormals& n, const LightVectors& v) {
+    if (!v.any) return;
+    r = add(r, dot(n.x, n.y, n.z, v.r));
+    g = add(g, dot(n.x, n.y, n.z, v.g));
+    b = add(b, dot(n.x, n.y, n.z, v.b));
+  }
+  void add_sums(const LaneColour& o) { r = add(r, o.r), g = add(g, o.g), b = add(b, o.b); }
+};
+
 struct LaneSums {
-  Lanes open_r = all(0), open_g = all(0), open_b = all(0);
-  Lanes lost_r = all(0), lost_g = all(0), lost_b = all(0);
+  LaneColour open, lost;
 
   // A light that shines on these centres, and from which of them it is hidden.
   void add_light(const LaneNormals& n, const DirectionalLight& l, unsigned lit, unsigned hidden) {
     if (!lit) return;
     const Lanes cosine = both(dot(n.x, n.y, n.z, l.direction), mask_of(lit));
-    const Lanes r = multiply(cosine, all(l.irradiance.x));
-    const Lanes g = multiply(cosine, all(l.irradiance.y));
-    const Lanes b = multiply(cosine, all(l.irradiance.z));
-    open_r = add(open_r, r), open_g = add(open_g, g), open_b = add(open_b, b);
-    if (!(lit & hidden)) return;
-    const Lanes mask = mask_of(hidden);
-    lost_r = add(lost_r, both(r, mask));
-    lost_g = add(lost_g, both(g, mask));
-    lost_b = add(lost_b, both(b, mask));
+    open.add_light(cosine, l.irradiance);
+    if (lit & hidden) lost.add_light(both(cosine, mask_of(hidden)), l.irradiance);
   }
-  void add_sums(const LaneSums& o) {
-    open_r = add(open_r, o.open_r), open_g = add(open_g, o.open_g), open_b = add(open_b, o.open_b);
-    lost_r = add(lost_r, o.lost_r), lost_g = add(lost_g, o.lost_g), lost_b = add(lost_b, o.lost_b);
+  void add_group(const LaneNormals& n,
+                 std::span<const DirectionalLight> lights,
+                 const LightGroup& group,
+                 const CellVisibility& visibility,
+                 std::size_t k) {
+    open.add_all(n, group.open);
+    lost.add_all(n, group.lost);
+    for (const std::uint16_t i : group.partly_hidden.span()) {
+      const unsigned hidden = bits_at(visibility.lit[i], k) & ~bits_at(visibility.seen[i], k);
+      if (!hidden) continue;
+      const DirectionalLight& l = lights[i];
+      lost.add_light(both(dot(n.x, n.y, n.z, l.direction), mask_of(hidden)), l.irradiance);
+    }
+    for (const std::uint16_t i : group.partly_lit.span()) {
+      add_light(n, lights[i], bits_at(visibility.lit[i], k), ~bits_at(visibility.seen[i], k));
+    }
   }
+  void add_sums(const LaneSums& o) { open.add_sums(o.open), lost.add_sums(o.lost); }
   void store_at(std::size_t k, LightSums& to) const {
-    store(&to.open_r[k], open_r), store(&to.open_g[k], open_g), store(&to.open_b[k], open_b);
-    store(&to.lost_r[k], lost_r), store(&to.lost_g[k], lost_g), store(&to.lost_b[k], lost_b);
+    store(&to.open_r[k], open.r), store(&to.open_g[k], open.g), store(&to.open_b[k], open.b);
+    store(&to.lost_r[k], lost.r), store(&to.lost_g[k], lost.g), store(&to.lost_b[k], lost.b);
   }
 };
 
@@ -91,16 +161,6 @@ void add_up_windows(const Plane& of, Plane& sums) {
   }
 }
 
-float sum_of_members(const ShadowWindow& window, const Plane& of) {
-  constexpr std::size_t side = SoftLights::side;
-  float sum = 0;
-  for (unsigned left = window.members; left != 0; left &= left - 1) {
-    const auto i = static_cast<std::size_t>(std::countr_zero(left));
-    sum += of[window.first + i / side * cell_size + i % side];
-  }
-  return sum;
-}
-
 // What pixels have between whole windows, `of` at their top left, along lines of a cell that are
 // `stride` apart in places that are `step` apart: half way between the two about them, and at the
 // border of the cell, beyond the last one, by how that differs from the next that shares no pixel
@@ -112,10 +172,18 @@ void put_between_windows(const Plane& of, Plane& between) {
   const auto each = [](auto&& put) {
     for (std::size_t k = 0; k < cell_size * stride; k += stride) put(k);
   };
-  for (std::size_t place = 2; place < last + 2; ++place) {
+  const auto put_half_way = [&](std::size_t k, std::size_t place) {
+    between[k + line(place)] = 0.5F * (of[k + line(place - 2)] + of[k + line(place - 1)]);
+  };
+  // What lies side by side in memory, one after the other.
+  if constexpr (step == 1) {
     each([&](std::size_t k) {
-      between[k + line(place)] = 0.5F * (of[k + line(place - 2)] + of[k + line(place - 1)]);
+      for (std::size_t place = 2; place < last + 2; ++place) put_half_way(k, place);
     });
+  } else {
+    for (std::size_t place = 2; place < last + 2; ++place) {
+      each([&](std::size_t k) { put_half_way(k, place); });
+    }
   }
   const auto beyond = [&](std::size_t place, std::size_t window, std::size_t next, float by) {
     each([&](std::size_t k) {
@@ -127,31 +195,58 @@ void put_between_windows(const Plane& of, Plane& between) {
   beyond(last + 2, last, last - side, 0.5F), beyond(last + 3, last, last - side, 1.5F);
 }
 
-// In one colour.
-void share_lost(std::span<const ShadowWindow> windows,
-                const Plane& open,
-                const Plane& own_lost,
-                Plane& lost) {
-  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
-  alignas(64) Plane open_sums, lost_sums, shares, rows, between;
-  add_up_windows(open, open_sums);
-  add_up_windows(own_lost, lost_sums);
-  shares.fill(unknown);
-  for (const ShadowWindow& window : windows) {
-    const std::size_t first = window.first;
-    if (window.members == whole_window) shares[first] = lost_sums[first] / open_sums[first];
+constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+
+// The share that whole windows lose, in one colour: at their top left, and between them.
+struct WindowShares {
+  alignas(64) Plane at, between;
+
+  void find(std::span<const ShadowWindow> windows, const Plane& open, const Plane& own_lost) {
+    alignas(64) Plane open_sums, lost_sums, rows;
+    add_up_windows(open, open_sums);
+    add_up_windows(own_lost, lost_sums);
+    at.fill(unknown);
+    for (const ShadowWindow& window : windows) {
+      const std::size_t first = window.first;
+      if (window.members == whole_window) at[first] = lost_sums[first] / open_sums[first];
+    }
+    put_between_windows<1, cell_size>(at, rows);
+    put_between_windows<cell_size, 1>(rows, between);
   }
-  put_between_windows<1, cell_size>(shares, rows);
-  put_between_windows<cell_size, 1>(rows, between);
+};
+
+void share_lost(std::span<const ShadowWindow> windows, const LightSums& soft, LightSums& sums) {
+  constexpr std::size_t colours = 3, side = SoftLights::side;
+  const std::array<const Plane*, colours> open{&soft.open_r, &soft.open_g, &soft.open_b};
+  const std::array<const Plane*, colours> own_lost{&soft.lost_r, &soft.lost_g, &soft.lost_b};
+  const std::array<Plane*, colours> lost{&sums.lost_r, &sums.lost_g, &sums.lost_b};
+  std::array<WindowShares, colours> shares;
+  for (std::size_t c = 0; c < colours; ++c) shares[c].find(windows, *open[c], *own_lost[c]);
   for (const ShadowWindow& window : windows) {
     const std::size_t k = window.centre;
-    float share = unknown;
+    std::array<float, colours> share;
     if (window.members == whole_window) {
-      share = between[k] == between[k] ? std::clamp(between[k], 0.0F, 1.0F) : shares[window.first];
+      for (std::size_t c = 0; c < colours; ++c) {
+        const float between = shares[c].between[k];
+        share[c] =
+            between == between ? std::clamp(between, 0.0F, 1.0F) : shares[c].at[window.first];
+      }
     } else {
-      share = sum_of_members(window, own_lost) / sum_of_members(window, open);
+      std::array<float, colours> open_sum{}, lost_sum{};
+      for (unsigned left = window.members; left != 0; left &= left - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(left));
+        const std::size_t member = window.first + i / side * cell_size + i % side;
+        for (std::size_t c = 0; c < colours; ++c) {
+          open_sum[c] += (*open[c])[member];
+          lost_sum[c] += (*own_lost[c])[member];
+        }
+      }
+      for (std::size_t c = 0; c < colours; ++c) share[c] = lost_sum[c] / open_sum[c];
     }
-    if (share == share) lost[k] += open[k] * share - own_lost[k];  // some of it is open
+    for (std::size_t c = 0; c < colours; ++c) {
+      const bool any_open = share[c] == share[c];
+      if (any_open) (*lost[c])[k] += (*open[c])[k] * share[c] - (*own_lost[c])[k];
+    }
   }
 }
 
@@ -168,19 +263,13 @@ void add_up_light(const LitCentres& centres,
                   LightSums& sums,
                   LightSums& soft) {
   const bool shares = !visibility.windows.empty();
-  const LightsOfCell of_cell(lights, visibility);
+  const LightsOfCell of_cell(lights, centres.receiving, visibility);
   for (std::size_t k = 0; k < cell_pixels; k += lanes) {
     LaneSums own, shared;
     if (bits_at(centres.receiving, k)) {
       const LaneNormals normals{load(&centres.nx[k]), load(&centres.ny[k]), load(&centres.nz[k])};
-      for (const std::uint16_t i : of_cell.own()) {
-        own.add_light(normals, lights[i], bits_at(visibility.lit[i], k),
-                      ~bits_at(visibility.seen[i], k));
-      }
-      for (const std::uint16_t i : of_cell.shared()) {
-        shared.add_light(normals, lights[i], bits_at(visibility.lit[i], k),
-                         ~bits_at(visibility.seen[i], k));
-      }
+      own.add_group(normals, lights, of_cell.own(), visibility, k);
+      if (shares) shared.add_group(normals, lights, of_cell.shared(), visibility, k);
       for (const std::uint16_t i : of_cell.both()) {
         const unsigned lit = bits_at(visibility.lit[i], k), near = bits_at(visibility.near[i], k);
         const unsigned hidden = ~bits_at(visibility.seen[i], k);
@@ -204,9 +293,7 @@ void add_up_light(const LitCentres& centres,
     if (soft_one) soft.add_lost(k, lost);
   }
   if (!shares) return;
-  share_lost(visibility.windows, soft.open_r, soft.lost_r, sums.lost_r);
-  share_lost(visibility.windows, soft.open_g, soft.lost_g, sums.lost_g);
-  share_lost(visibility.windows, soft.open_b, soft.lost_b, sums.lost_b);
+  share_lost(visibility.windows, soft, sums);
 }
 
 }  // namespace render

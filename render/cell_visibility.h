@@ -19,7 +19,16 @@ using CellMask = std::array<std::uint64_t, 4>;
 
 inline constexpr std::uint64_t block4 = 0x000F000F000F000FULL;  // columns 0-3 of a word's four rows
 
+inline bool none(const CellMask& mask) { return (mask[0] | mask[1] | mask[2] | mask[3]) == 0; }
 inline bool in(const CellMask& mask, std::size_t k) { return (mask[k / 64] >> (k % 64) & 1) != 0; }
+
+// A colour at each of a cell's pixels.
+struct ColourPlanes {
+  alignas(64) std::array<float, cell_pixels> r, g, b;
+
+  Vec3f at(std::size_t k) const { return {r[k], g[k], b[k]}; }
+  void put(std::size_t k, Vec3f v) { r[k] = v.x, g[k] = v.y, b[k] = v.z; }
+};
 
 // Light that glass weakens on its way to a pixel's centre.
 struct TintedLight {
@@ -55,6 +64,12 @@ struct LightSums {
 
   Vec3f open(std::size_t k) const { return {open_r[k], open_g[k], open_b[k]}; }
   Vec3f lost(std::size_t k) const { return {lost_r[k], lost_g[k], lost_b[k]}; }
+  // What is left. Both are sums in orders of their own: where all is lost, they are equal but for
+  // rounding.
+  Vec3f arriving(std::size_t k) const {
+    const Vec3f left = open(k) - lost(k);
+    return {left.x > 0 ? left.x : 0.0F, left.y > 0 ? left.y : 0.0F, left.z > 0 ? left.z : 0.0F};
+  }
   void add_open(std::size_t k, Vec3f e) { open_r[k] += e.x, open_g[k] += e.y, open_b[k] += e.z; }
   void add_lost(std::size_t k, Vec3f e) { lost_r[k] += e.x, lost_g[k] += e.y, lost_b[k] += e.z; }
 };

@@ -12,7 +12,6 @@ namespace {
 
 using calibrate::Vec3f;
 
-using Eight = float __attribute__((vector_size(32)));
 using EightWords = std::int32_t __attribute__((vector_size(32)));
 
 constexpr int bias = 127 - 14;      // a float's, of the last of a colour's 15 bits

@@ -1,10 +1,13 @@
 // What all tiles of a frame share.
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <string>
 
+#include "capture/parallel_loop.h"
 #include "render/caustics.h"
 #include "render/kept_transport.h"
 #include "render/kernel.h"
@@ -25,7 +28,7 @@ class Key {
   void mix(int value) { mix(static_cast<std::uint64_t>(value)); }
   void mix(Vec3f v) { mix(v.x), mix(v.y), mix(v.z); }
   // In several chains, for each step waits for the one before.
-  void mix(const std::vector<float>& values) {
+  void mix(std::span<const float> values) {
     constexpr std::size_t chains = 4, step = 2 * chains;
     std::array<Key, chains> parts;
     std::size_t i = 0;
@@ -44,6 +47,18 @@ class Key {
   std::uint64_t value_ = 0x9E3779B97F4A7C15ULL;
 };
 
+// Many numbers in parts, by all threads: a large picture's directions are more than a frame has
+// time for.
+void mix_at_once(std::span<const float> values, Key& key) {
+  std::array<Key, 16> parts;
+  const std::size_t length = values.size() / parts.size() + 1;
+  capture::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+    const std::size_t first = std::min(i * length, values.size());
+    parts[i].mix(values.subspan(first, std::min(length, values.size() - first)));
+  });
+  for (const Key& part : parts) key.mix(part.value());
+}
+
 // Changes whenever the cells' transport may, but for things that move.
 std::uint64_t transport_key(const FrameContext& context) {
   Key key;
@@ -51,8 +66,8 @@ std::uint64_t transport_key(const FrameContext& context) {
   for (const double value : job.cam_from_set.R.m) key.mix(value);
   const calibrate::Vec3& t = job.cam_from_set.t;
   key.mix(t.x), key.mix(t.y), key.mix(t.z);
-  key.mix(context.inputs.directions->x);
-  key.mix(context.inputs.directions->y);
+  mix_at_once(context.inputs.directions->x, key);
+  mix_at_once(context.inputs.directions->y, key);
   for (const DirectionalLight& light : context.planned_table->lights) {
     key.mix(light.direction), key.mix(light.irradiance);
     key.mix(light.spread), key.mix(std::uint64_t{light.compact});
@@ -129,7 +144,7 @@ FrameKeys keys_of(const FrameContext& context, const KeptTransport& kept) {
   return keys;
 }
 
-// Whether places in one are places in the other.
+// Whether places in one are places in the other. Levels are twice as wide as high (check_levels).
 bool alike(const Environment& a, const Environment& b) {
   const auto same_sizes = [](const auto& x, const auto& y) {
     return std::ranges::equal(x, y, {}, &capture::Image::height, &capture::Image::height);
@@ -290,15 +305,14 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
       throw std::invalid_argument("a lamp is not finite");
     }
   }
+  check_levels(*inputs.environment);
+  if (inputs.planned) check_levels(*inputs.planned);
   FrameContext context;
   context.planned = inputs.planned && alike(*inputs.planned, *inputs.environment)
                         ? inputs.planned
                         : inputs.environment;
   context.planned_levels = levels_of(*context.planned);
   context.first_plate_level = context.planned_levels.size();
-  if (context.first_plate_level > EnvironmentTerms::most_levels) {
-    throw std::invalid_argument("an environment has more than 128 levels");
-  }
   context.levels = levels_of(*inputs.environment);
   auto planned_table = std::make_shared<LightTable>(job.lights);
   for (std::size_t i = 0; i < planned_table->lights.size(); ++i) {

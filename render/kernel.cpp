@@ -2,12 +2,14 @@
 #include "render/kernel.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <utility>
 
 #include "render/cell_baker.h"
 #include "render/kept_transport.h"
+#include "render/lanes.h"
 #include "render/stand_in_parameters.h"
 #include "render/trace.h"
 
@@ -18,22 +20,14 @@ struct TileWorkspace::Impl {
   CellTransport transport;
   RelightWorkspace relight;
   CellPicture picture;
-  std::array<Vec3f, cell_pixels> plate;
+  std::array<Four, cell_pixels> plate;
 
-  void render_cell(
-      const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result);
-  void load_plate(const TileJob& tile, int x0, int y0);
+  void render_cell(const FrameContext& frame, const TileView& tile, int x0, int y0);
+  void load_plate(const TileView& tile, int x0, int y0);
   void light(const FrameContext& frame, const CellTransport& cell, RenderStatistics& statistics);
-  void write(
-      const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) const;
-  void write_kept(const FrameContext& frame,
-                  const CellTransport& cell,
-                  const TileJob& tile,
-                  int x0,
-                  int y0,
-                  TileResult& result);
-  static void write_counts(
-      const CellTransport& cell, const TileJob& tile, int x0, int y0, TileResult& result);
+  void write(const FrameContext& frame, const TileView& tile, int x0, int y0) const;
+  void write_kept(
+      const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0);
 };
 
 TileWorkspace::TileWorkspace() : impl_(std::make_unique<Impl>()) {}
@@ -43,33 +37,50 @@ TileWorkspace& TileWorkspace::operator=(TileWorkspace&&) noexcept = default;
 
 void TileWorkspace::log_rays(RayLog* log) { impl_->baker.log_rays(log); }
 
-void TileWorkspace::Impl::load_plate(const TileJob& tile, int x0, int y0) {
-  const Rect& b = tile.background_rect;
-  for (int y = 0; y < cell_size; ++y) {
-    for (int x = 0; x < cell_size; ++x) {
-      const int row = y0 + y - b.y, column = x0 + x - b.x;
-      Vec3f& to = plate[static_cast<std::size_t>(y * cell_size + x)];
-      if (row >= b.height || column >= b.width) {
-        to = {};
-        continue;
-      }
-      const std::size_t at = (static_cast<std::size_t>(row) * static_cast<std::size_t>(b.width) +
-                              static_cast<std::size_t>(column)) *
-                             3;
-      to = {capture::float_from_half(tile.background[at]),
-            capture::float_from_half(tile.background[at + 1]),
-            capture::float_from_half(tile.background[at + 2])};
-    }
+// A row of a cell, as far as it lies in the tile: its first pixel in images of some stride that
+// begin at the tile's top left, in the cell, and how many there are.
+struct CellRow {
+  std::ptrdiff_t in_image;
+  std::size_t in_cell, length;
+};
+template <class Visit>
+void for_rows(const TileView& tile, std::ptrdiff_t stride, int x0, int y0, Visit visit) {
+  const int columns = std::min(cell_size, tile.rect.x + tile.rect.width - x0);
+  const int rows = std::min(cell_size, tile.rect.y + tile.rect.height - y0);
+  for (int y = 0; y < rows; ++y) {
+    visit(CellRow{(y0 + y - tile.rect.y) * stride + x0 - tile.rect.x,
+                  static_cast<std::size_t>(y * cell_size), static_cast<std::size_t>(columns)});
   }
+}
+
+// Calls values into the cache, to be read or, `written`, to be put there: the next cell's row,
+// while this one's is at work. No machine foresees sixteen rows by itself.
+template <int written = 0>
+void call_for(const capture::Half* at, std::size_t count) {
+  constexpr std::size_t line = 32;
+  for (std::size_t i = 0; i < count; i += line) __builtin_prefetch(at + i, written);
+  __builtin_prefetch(at + count - 1, written);
+}
+
+void TileWorkspace::Impl::load_plate(const TileView& tile, int x0, int y0) {
+  if (x0 + cell_size > tile.rect.x + tile.rect.width ||
+      y0 + cell_size > tile.rect.y + tile.rect.height)
+    plate.fill(Four{});
+  std::array<float, 3 * cell_size + 1> floats{};  // the last of a pixel's four is the next one's
+  for_rows(tile, tile.plate_stride, x0, y0, [&](const CellRow& row) {
+    const capture::Half* from = tile.plate + 3 * row.in_image;
+    call_for(from + 3 * cell_size, 3 * cell_size);
+    capture::floats_from_halves({from, 3 * row.length}, floats.data());
+    for (std::size_t x = 0; x < row.length; ++x) plate[row.in_cell + x] = load_four(&floats[3 * x]);
+  });
 }
 
 void TileWorkspace::Impl::light(const FrameContext& frame,
                                 const CellTransport& cell,
                                 RenderStatistics& statistics) {
   if (cell.empty) {
-    picture.added.fill({});
-    picture.share.fill({1, 1, 1});
-    picture.passed.fill(1);
+    picture.added.fill(Four{});
+    picture.share.fill(Four{1, 1, 1, 1});
     picture.seen.fill(1);
     return;
   }
@@ -77,105 +88,102 @@ void TileWorkspace::Impl::light(const FrameContext& frame,
                   picture, statistics);
 }
 
-void TileWorkspace::Impl::write(
-    const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) const {
-  const Rect& rect = tile.rect;
-  const calibrate::DirectionTable& directions = *frame.inputs.directions;
-  RenderStatistics& statistics = result.statistics;
-  const auto finish = [&statistics](float value) {
-    if (std::abs(value) <= capture::half_max) return value;
+// with_light() of stand_in_parameters.h, of colours in four lanes.
+Four with_light(Four plate, Four added) {
+  const Four sum = plate + added, none{};
+  const Four least = plate < 0 ? plate : none;
+  return (added < 0) & (sum < least) ? least : sum;
+}
+
+// Halves of values that halves can hold; else the nearest that they can, counted.
+void put_halves(std::span<float> values, capture::Half* to, RenderStatistics& statistics) {
+  // As bits without the sign: what is no number is above all others.
+  std::uint32_t most = 0;
+  for (const float value : values) {
+    most = std::max(most, std::bit_cast<std::uint32_t>(value) & 0x7FFFFFFF);
+  }
+  const bool fit = most <= std::bit_cast<std::uint32_t>(capture::half_max);
+  for (std::size_t i = 0; !fit && i < values.size(); ++i) {
+    float& value = values[i];
+    if (std::abs(value) <= capture::half_max) continue;
     ++statistics.clamped_values;
-    return std::isnan(value) ? 0.0F : std::clamp(value, -capture::half_max, capture::half_max);
-  };
-  for (int y = 0; y < cell_size; ++y) {
-    for (int x = 0; x < cell_size; ++x) {
-      const int row = y0 + y - rect.y, column = x0 + x - rect.x;
-      if (row < 0 || column < 0 || row >= rect.height || column >= rect.width) continue;
-      const auto k = static_cast<std::size_t>(y * cell_size + x);
-      const float sensitivity = directions.sensitivity.empty()
-                                    ? 1.0F
-                                    : directions.sensitivity[directions.index(y0 + y, x0 + x)];
-      const Vec3f rgb = with_light(plate[k] * picture.share[k], picture.added[k] * sensitivity);
-      const float coverage = 1 - picture.seen[k], matte = 1 - picture.passed[k];
-      const std::size_t at = static_cast<std::size_t>(row) * static_cast<std::size_t>(rect.width) +
-                             static_cast<std::size_t>(column);
-      result.rgba[at * 4] = capture::half_from_float(finish(rgb.x));
-      result.rgba[at * 4 + 1] = capture::half_from_float(finish(rgb.y));
-      result.rgba[at * 4 + 2] = capture::half_from_float(finish(rgb.z));
-      result.rgba[at * 4 + 3] = capture::half_from_float(finish(coverage));
-      result.matte[at] = capture::half_from_float(finish(matte));
-      statistics.virtual_pixels += coverage > 0;
-      statistics.affected_pixels += coverage > 0 || matte != 0 || picture.added[k] != Vec3f{};
+    value = std::isnan(value) ? 0.0F : std::clamp(value, -capture::half_max, capture::half_max);
+  }
+  capture::halves_from_floats(values, to);
+}
+
+void TileWorkspace::Impl::write(const FrameContext& frame,
+                                const TileView& tile,
+                                int x0,
+                                int y0) const {
+  const calibrate::DirectionTable& directions = *frame.inputs.directions;
+  RenderStatistics& statistics = *tile.statistics;
+  std::array<float, cell_size * 4> rgba;
+  std::array<float, cell_size> matte;
+  int y = y0, virtual_pixels = 0, affected_pixels = 0;
+  for_rows(tile, tile.stride, x0, y0, [&](const CellRow& row) {
+    const float* sensitivity =
+        directions.sensitivity.empty() ? nullptr : &directions.sensitivity[directions.index(y, x0)];
+    for (std::size_t x = 0; x < row.length; ++x) {
+      const std::size_t k = row.in_cell + x;
+      const Four light = sensitivity ? picture.added[k] * sensitivity[x] : picture.added[k];
+      const float coverage = 1 - picture.seen[k];
+      matte[x] = 1 - picture.share[k][3];
+      Four shown = with_light(plate[k] * picture.share[k], light);
+      shown[3] = coverage;
+      std::memcpy(&rgba[4 * x], &shown, sizeof shown);
+      // Of the last of four of what is added, nothing is known.
+      const unsigned covered = bits_of(shown > 0) & 8, lit = bits_of(picture.added[k] != 0) & 7;
+      virtual_pixels += static_cast<int>(covered >> 3);
+      affected_pixels += (lit | covered | static_cast<unsigned>(matte[x] != 0)) != 0;
     }
-  }
+    call_for<1>(tile.rgba + 4 * (row.in_image + cell_size), 4 * cell_size);
+    put_halves(std::span(rgba).first(4 * row.length), tile.rgba + 4 * row.in_image, statistics);
+    put_halves(std::span(matte).first(row.length), tile.matte + row.in_image, statistics);
+    ++y;
+  });
+  statistics.virtual_pixels += static_cast<std::uint64_t>(virtual_pixels);
+  statistics.affected_pixels += static_cast<std::uint64_t>(affected_pixels);
 }
 
-void TileWorkspace::Impl::write_counts(
-    const CellTransport& cell, const TileJob& tile, int x0, int y0, TileResult& result) {
-  const Rect& rect = tile.rect;
-  const int columns = std::min(cell_size, rect.x + rect.width - x0);
-  const int rows = std::min(cell_size, rect.y + rect.height - y0);
-  for (int y = 0; y < rows; ++y) {
-    const auto to = static_cast<std::ptrdiff_t>(y0 + y - rect.y) * rect.width + x0 - rect.x;
-    std::copy_n(cell.counts.begin() + static_cast<std::ptrdiff_t>(y) * cell_size, columns,
-                result.rays.begin() + to);
-  }
+void write_counts(const CellTransport& cell, const TileView& tile, int x0, int y0) {
+  for_rows(tile, tile.stride, x0, y0, [&](const CellRow& row) {
+    std::copy_n(&cell.counts[row.in_cell], row.length, tile.rays + row.in_image);
+  });
 }
 
-// A row of a cell, as far as it lies in the tile: in images of the tile's width and `channels`
-// values a pixel, and in the cell's own.
-struct CellRow {
-  std::size_t in_image, in_cell, length;
-};
-template <class Visit>
-void for_rows(
-    const Rect& image, const Rect& tile, int x0, int y0, std::size_t channels, Visit visit) {
-  const int columns = std::min(cell_size, tile.x + tile.width - x0);
-  const int rows = std::min(cell_size, tile.y + tile.height - y0);
-  for (int y = 0; y < rows; ++y) {
-    const int at = (y0 + y - image.y) * image.width + x0 - image.x;
-    visit(CellRow{static_cast<std::size_t>(at) * channels,
-                  static_cast<std::size_t>(y * cell_size) * channels,
-                  static_cast<std::size_t>(columns) * channels});
-  }
-}
-
-bool has_plate_of(const LitCell& lit, const TileJob& tile, int x0, int y0) {
+bool has_plate_of(const LitCell& lit, const TileView& tile, int x0, int y0) {
   bool same = true;
-  for_rows(tile.background_rect, tile.rect, x0, y0, 3, [&](const CellRow& row) {
-    same = same && std::memcmp(&lit.plate[row.in_cell], &tile.background[row.in_image],
-                               row.length * sizeof(capture::Half)) == 0;
+  for_rows(tile, tile.plate_stride, x0, y0, [&](const CellRow& row) {
+    same = same && std::memcmp(&lit.plate[3 * row.in_cell], tile.plate + 3 * row.in_image,
+                               3 * row.length * sizeof(capture::Half)) == 0;
   });
   return same;
 }
 
-void copy_lit(const LitCell& lit, const TileJob& tile, int x0, int y0, TileResult& result) {
-  for_rows(tile.rect, tile.rect, x0, y0, 4, [&](const CellRow& row) {
-    std::copy_n(&lit.rgba[row.in_cell], row.length, &result.rgba[row.in_image]);
+void copy_lit(const LitCell& lit, const TileView& tile, int x0, int y0) {
+  for_rows(tile, tile.stride, x0, y0, [&](const CellRow& row) {
+    std::copy_n(&lit.rgba[4 * row.in_cell], 4 * row.length, tile.rgba + 4 * row.in_image);
+    std::copy_n(&lit.matte[row.in_cell], row.length, tile.matte + row.in_image);
   });
-  for_rows(tile.rect, tile.rect, x0, y0, 1, [&](const CellRow& row) {
-    std::copy_n(&lit.matte[row.in_cell], row.length, &result.matte[row.in_image]);
-  });
-  result.statistics += lit.statistics;
+  *tile.statistics += lit.statistics;
 }
 
-void keep_lit(const TileResult& result, const TileJob& tile, int x0, int y0, LitCell& lit) {
-  for_rows(tile.background_rect, tile.rect, x0, y0, 3, [&](const CellRow& row) {
-    std::copy_n(&tile.background[row.in_image], row.length, &lit.plate[row.in_cell]);
+void keep_lit(const TileView& tile, int x0, int y0, LitCell& lit) {
+  for_rows(tile, tile.plate_stride, x0, y0, [&](const CellRow& row) {
+    std::copy_n(tile.plate + 3 * row.in_image, 3 * row.length, &lit.plate[3 * row.in_cell]);
   });
-  for_rows(tile.rect, tile.rect, x0, y0, 4, [&](const CellRow& row) {
-    std::copy_n(&result.rgba[row.in_image], row.length, &lit.rgba[row.in_cell]);
-  });
-  for_rows(tile.rect, tile.rect, x0, y0, 1, [&](const CellRow& row) {
-    std::copy_n(&result.matte[row.in_image], row.length, &lit.matte[row.in_cell]);
+  for_rows(tile, tile.stride, x0, y0, [&](const CellRow& row) {
+    std::copy_n(tile.rgba + 4 * row.in_image, 4 * row.length, &lit.rgba[4 * row.in_cell]);
+    std::copy_n(tile.matte + row.in_image, row.length, &lit.matte[row.in_cell]);
   });
 }
 
 // Whether anything of the plate is no number, so that even no share of it is none.
-bool is_broken_plate(const TileJob& tile, int x0, int y0) {
+bool is_broken_plate(const TileView& tile, int x0, int y0) {
   bool broken = false;
-  for_rows(tile.background_rect, tile.rect, x0, y0, 3, [&](const CellRow& row) {
-    const auto values = std::span(tile.background).subspan(row.in_image, row.length);
+  for_rows(tile, tile.plate_stride, x0, y0, [&](const CellRow& row) {
+    const auto values = std::span(tile.plate + 3 * row.in_image, 3 * row.length);
     broken = broken || std::ranges::any_of(
                            values, [](capture::Half value) { return (value & 0x7c00) == 0x7c00; });
   });
@@ -183,12 +191,8 @@ bool is_broken_plate(const TileJob& tile, int x0, int y0) {
 }
 
 // A cell whose transport is kept: as it was lit last, if nothing that lights it has changed.
-void TileWorkspace::Impl::write_kept(const FrameContext& frame,
-                                     const CellTransport& cell,
-                                     const TileJob& tile,
-                                     int x0,
-                                     int y0,
-                                     TileResult& result) {
+void TileWorkspace::Impl::write_kept(
+    const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0) {
   KeptTransport& memory = *frame.inputs.kept;
   const int column = x0 / cell_size, row = y0 / cell_size;
   const FrameKeys& keys = memory.keys();
@@ -196,47 +200,51 @@ void TileWorkspace::Impl::write_kept(const FrameContext& frame,
   if (lit && lit->light == keys.light.all &&
       (cell.bent.empty() || lit->plate_levels == keys.plate_levels.all) &&
       (lit->shows_plate ? has_plate_of(*lit, tile, x0, y0) : !is_broken_plate(tile, x0, y0))) {
-    copy_lit(*lit, tile, x0, y0, result);
+    copy_lit(*lit, tile, x0, y0);
     return;
   }
   load_plate(tile, x0, y0);
-  const RenderStatistics before = std::exchange(result.statistics, {});
-  light(frame, cell, result.statistics);
-  write(frame, tile, x0, y0, result);
+  TileView apart = tile;
+  RenderStatistics statistics;
+  apart.statistics = &statistics;
+  light(frame, cell, statistics);
+  write(frame, apart, x0, y0);
   if (LitCell* room = cell.video.empty() ? memory.place_lit(column, row) : nullptr) {
-    keep_lit(result, tile, x0, y0, *room);
+    keep_lit(tile, x0, y0, *room);
     room->light = keys.light.all;
     room->plate_levels = keys.plate_levels.all;
-    room->shows_plate =
-        !cell.catchers.empty() || is_broken_plate(tile, x0, y0) ||
-        std::ranges::any_of(picture.share, [](Vec3f share) { return share != Vec3f{}; });
-    room->statistics = result.statistics;
+    room->shows_plate = !cell.catchers.empty() || is_broken_plate(tile, x0, y0) ||
+                        std::any_of(picture.share.begin(), picture.share.begin() + cell_pixels,
+                                    [](Four share) { return three_of(share) != Vec3f{}; });
+    room->statistics = statistics;
   }
-  result.statistics += before;
+  *tile.statistics += statistics;
 }
 
-void TileWorkspace::Impl::render_cell(
-    const FrameContext& frame, const TileJob& tile, int x0, int y0, TileResult& result) {
+void TileWorkspace::Impl::render_cell(const FrameContext& frame,
+                                      const TileView& tile,
+                                      int x0,
+                                      int y0) {
   KeptTransport* memory = frame.inputs.kept;
   const int column = x0 / cell_size, row = y0 / cell_size;
   const int stage = frame.stage_of(column, row);
   const CellTransport* kept = memory ? memory->find(column, row, stage) : nullptr;
   const bool counts = frame.inputs.count_rays;
   if (kept && (!counts || !kept->counts.empty())) {
-    write_kept(frame, *kept, tile, x0, y0, result);
-    result.statistics.kept_rays += kept->rays;
-    if (counts) write_counts(*kept, tile, x0, y0, result);
+    write_kept(frame, *kept, tile, x0, y0);
+    tile.statistics->kept_rays += kept->rays;
+    if (counts) write_counts(*kept, tile, x0, y0);
   } else {
     load_plate(tile, x0, y0);
-    baker.bake(frame, stage, x0, y0, transport, result.statistics);
-    light(frame, transport, result.statistics);
-    if (counts) write_counts(transport, tile, x0, y0, result);
+    baker.bake(frame, stage, x0, y0, transport, *tile.statistics);
+    light(frame, transport, *tile.statistics);
+    if (counts) write_counts(transport, tile, x0, y0);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
     if (CellTransport* room = memory ? memory->place(column, row) : nullptr) {
       *room = transport;
       memory->keep(column, row, stage);
     }
-    write(frame, tile, x0, y0, result);
+    write(frame, tile, x0, y0);
   }
 }
 
@@ -257,16 +265,32 @@ bool find_cell(const FrameContext& context,
   return memory.find(column, row, stage) != nullptr;
 }
 
+void render_tile(const FrameContext& context, const TileView& tile, TileWorkspace& workspace) {
+  prepare_thread();
+  for (int y = tile.rect.y; y < tile.rect.y + tile.rect.height; y += cell_size) {
+    for (int x = tile.rect.x; x < tile.rect.x + tile.rect.width; x += cell_size) {
+      workspace.impl().render_cell(context, tile, x, y);
+    }
+  }
+}
+
 void render_tile(const FrameContext& context,
                  const TileJob& tile,
                  TileWorkspace& workspace,
                  TileResult& result) {
-  prepare_thread();
-  for (int y = tile.rect.y; y < tile.rect.y + tile.rect.height; y += cell_size) {
-    for (int x = tile.rect.x; x < tile.rect.x + tile.rect.width; x += cell_size) {
-      workspace.impl().render_cell(context, tile, x, y, result);
-    }
-  }
+  const Rect& rect = tile.rect;
+  const Rect& plate = tile.background_rect;
+  const auto first = std::ptrdiff_t{rect.y - plate.y} * plate.width + rect.x - plate.x;
+  render_tile(context,
+              {.rect = rect,
+               .plate = tile.background.data() + 3 * first,
+               .plate_stride = plate.width,
+               .rgba = result.rgba.data(),
+               .matte = result.matte.data(),
+               .rays = result.rays.data(),
+               .stride = rect.width,
+               .statistics = &result.statistics},
+              workspace);
 }
 
 }  // namespace render

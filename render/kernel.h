@@ -73,11 +73,28 @@ class TileWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
-// Makes a tile's job: its slice of the plate with a margin. `job`'s buffer is used again.
+// A part of the frame, a union of its cells, where it lies in memory: what belongs to its top left
+// pixel, and pixels from row to row.
+struct TileView {
+  Rect rect;                             // in the picture
+  const capture::Half* plate = nullptr;  // 3 values a pixel
+  std::ptrdiff_t plate_stride = 0;
+  capture::Half* rgba = nullptr;   // out
+  capture::Half* matte = nullptr;  // out
+  RayCount* rays = nullptr;        // out, where the frame's inputs ask
+  std::ptrdiff_t stride = 0;       // of what comes out
+  RenderStatistics* statistics = nullptr;
+};
+
+// Renders one tile. Its bits depend on the frame and the pixels only, not on how they are cut into
+// tiles.
+void render_tile(const FrameContext& context, const TileView& tile, TileWorkspace& workspace);
+
+// The same where tiles travel. Makes a tile's job: its slice of the plate with a margin. `job`'s
+// buffer is used again.
 void cut_tile(const capture::HalfImage& plate, Rect rect, int margin, TileJob& job);
 
-// Renders one tile. `result` must have been sized by size_result, as the frame's inputs ask. Its
-// bits depend on the frame and the pixels only, not on how they are cut into tiles.
+// `result` must have been sized by size_result, as the frame's inputs ask.
 void render_tile(const FrameContext& context,
                  const TileJob& tile,
                  TileWorkspace& workspace,

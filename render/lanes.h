@@ -1,12 +1,13 @@
 // Eight floats at a time, or one where there is no AVX2; and four.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 
-#if defined(__AVX2__)
+#if defined(__SSE2__)
 #include <immintrin.h>
 #endif
 
@@ -50,6 +51,15 @@ inline unsigned bits_of(Lanes mask) { return std::bit_cast<unsigned>(mask.v) >> 
 inline Lanes mask_of(unsigned bits) { return {std::bit_cast<float>(bits & 1 ? ~0U : 0U)}; }
 #endif
 
+// The same as numbers, whatever the machine has.
+using Eight = float __attribute__((vector_size(32)));
+inline Eight load_eight(const float* at) {
+  Eight v;
+  std::memcpy(&v, at, sizeof v);
+  return v;
+}
+inline void store_eight(float* at, Eight v) { std::memcpy(at, &v, sizeof v); }
+
 // A colour in four lanes, of which the last is idle.
 using Four = float __attribute__((vector_size(16)));
 inline Four load_four(const float* at) {
@@ -62,8 +72,35 @@ inline Four after_first(Four v) {
   using Order = std::int32_t __attribute__((vector_size(16)));
   return __builtin_shuffle(v, Order{1, 2, 3, 3});
 }
+// Of a mask, a bit for each lane, the first the lowest.
+inline unsigned bits_of(std::int32_t __attribute__((vector_size(16))) mask) {
+#if defined(__SSE2__)
+  return static_cast<unsigned>(_mm_movemask_ps(std::bit_cast<__m128>(mask)));
+#else
+  unsigned bits = 0;
+  for (unsigned i = 0; i < 4; ++i) bits |= static_cast<unsigned>(mask[i] != 0) << i;
+  return bits;
+#endif
+}
 inline Four four_of(calibrate::Vec3f v) { return Four{v.x, v.y, v.z, 0}; }
 inline calibrate::Vec3f three_of(Four v) { return {v[0], v[1], v[2]}; }
+// Eight colours, from each of the four values of all.
+inline std::array<Four, 8> fours_of(Eight r, Eight g, Eight b, Eight rest) {
+  const auto by_two = [](Eight v, Eight w) {
+    return std::array{__builtin_shufflevector(v, w, 0, 8, 1, 9, 4, 12, 5, 13),
+                      __builtin_shufflevector(v, w, 2, 10, 3, 11, 6, 14, 7, 15)};
+  };
+  const auto by_four = [](Eight v, Eight w) {
+    return std::array{__builtin_shufflevector(v, w, 0, 1, 8, 9, 4, 5, 12, 13),
+                      __builtin_shufflevector(v, w, 2, 3, 10, 11, 6, 7, 14, 15)};
+  };
+  const auto red_green = by_two(r, g), blue_rest = by_two(b, rest);
+  const auto low = by_four(red_green[0], blue_rest[0]), high = by_four(red_green[1], blue_rest[1]);
+  const auto first = [](Eight v) { return __builtin_shufflevector(v, v, 0, 1, 2, 3); };
+  const auto second = [](Eight v) { return __builtin_shufflevector(v, v, 4, 5, 6, 7); };
+  return {first(low[0]),  first(low[1]),  first(high[0]),  first(high[1]),
+          second(low[0]), second(low[1]), second(high[0]), second(high[1])};
+}
 
 inline Lanes dot(Lanes ax, Lanes ay, Lanes az, calibrate::Vec3f b) {
   return add(add(multiply(ax, all(b.x)), multiply(ay, all(b.y))), multiply(az, all(b.z)));

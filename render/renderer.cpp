@@ -19,16 +19,9 @@
 namespace render {
 namespace {
 
-// Per thread: what it renders tiles with.
-struct Worker {
-  TileWorkspace workspace;
-  TileJob job;
-  TileResult result;
-};
-
 // Threads keep their workspaces from frame to frame.
-tbb::enumerable_thread_specific<Worker>& workers() {
-  static tbb::enumerable_thread_specific<Worker> all;
+tbb::enumerable_thread_specific<TileWorkspace>& workspaces() {
+  static tbb::enumerable_thread_specific<TileWorkspace> all;
   return all;
 }
 
@@ -38,22 +31,6 @@ void size_image(capture::HalfImage& image, int height, int width, int channels) 
   image.channels = channels;
   image.pixels.resize(static_cast<std::size_t>(height) * static_cast<std::size_t>(width) *
                       static_cast<std::size_t>(channels));
-}
-
-void copy_counts(const TileResult& from, RayCounts& to) {
-  const Rect& rect = from.rect;
-  for (int y = 0; y < rect.height; ++y) {
-    std::copy_n(from.rays.begin() + static_cast<std::ptrdiff_t>(y) * rect.width, rect.width,
-                to.pixels.begin() + static_cast<std::ptrdiff_t>(rect.y + y) * to.width + rect.x);
-  }
-}
-
-void copy_rows(const std::vector<capture::Half>& from, const Rect& rect, capture::HalfImage& to) {
-  const auto row = static_cast<std::ptrdiff_t>(rect.width) * to.channels;
-  for (int y = 0; y < rect.height; ++y) {
-    std::copy_n(from.begin() + row * y, row,
-                to.pixels.begin() + static_cast<std::ptrdiff_t>(to.index(rect.y + y, rect.x)));
-  }
 }
 
 // The frame's tiles, row by row, but those first whose cells to be found take most.
@@ -77,6 +54,16 @@ std::vector<int> tiles_by_work(const FrameContext& context, int size, int column
   return order;
 }
 
+void check_plate(const FrameInputs& inputs, const capture::HalfImage& plate) {
+  const int width = inputs.directions->width, height = inputs.directions->height;
+  if (plate.width != width || plate.height != height || plate.channels != 3 ||
+      plate.pixels.size() != plate.index(height, 0)) {
+    throw std::invalid_argument("the plate is " + std::to_string(plate.width) + "x" +
+                                std::to_string(plate.height) + ", but its lens is for " +
+                                std::to_string(width) + "x" + std::to_string(height));
+  }
+}
+
 }  // namespace
 
 std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
@@ -85,12 +72,7 @@ std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
   FrameInputs with_plate = inputs;
   with_plate.plate = &plate;
   auto context = std::make_shared<FrameContext>(make_frame_context(with_plate, job));
-  const int width = inputs.directions->width, height = inputs.directions->height;
-  if (plate.width != width || plate.height != height || plate.channels != 3) {
-    throw std::invalid_argument("the plate is " + std::to_string(plate.width) + "x" +
-                                std::to_string(plate.height) + ", but its lens is for " +
-                                std::to_string(width) + "x" + std::to_string(height));
-  }
+  check_plate(inputs, plate);
   return context;
 }
 
@@ -107,7 +89,7 @@ void refine_cells(const FrameContext& context,
   // Each thread takes the next cell as long as there is time: cells differ by a hundred times in
   // what they take, so that no share of them given out before would keep all threads at work.
   const auto work = [&](int) {
-    TileWorkspace& workspace = workers().local().workspace;
+    TileWorkspace& workspace = workspaces().local();
     RenderStatistics taken;
     while (!full && std::chrono::steady_clock::now() < deadline) {
       const std::size_t i = next++;
@@ -140,6 +122,7 @@ void render_frame(const FrameContext& context,
   const FrameInputs& inputs = context.inputs;
   const FrameJob& job = *context.job;
   check_stages(context);
+  check_plate(inputs, plate);
   const int width = inputs.directions->width, height = inputs.directions->height;
   size_image(result.rgba, height, width, 4);
   size_image(result.matte, height, width, 1);
@@ -152,18 +135,23 @@ void render_frame(const FrameContext& context,
   const int columns = (width + size - 1) / size, rows = (height + size - 1) / size;
   std::mutex statistics_mutex;
   const auto render = [&](int i) {
-    Worker& worker = workers().local();
     Rect rect{i % columns * size, i / columns * size, size, size};
     rect.width = std::min(size, width - rect.x);
     rect.height = std::min(size, height - rect.y);
-    cut_tile(plate, rect, 0, worker.job);
-    size_result(rect, worker.result, inputs.count_rays);
-    render_tile(context, worker.job, worker.workspace, worker.result);
-    copy_rows(worker.result.rgba, rect, result.rgba);
-    copy_rows(worker.result.matte, rect, result.matte);
-    if (inputs.count_rays) copy_counts(worker.result, result.rays);
+    const auto first = static_cast<std::ptrdiff_t>(rect.y) * width + rect.x;
+    RenderStatistics statistics;
+    render_tile(context,
+                {.rect = rect,
+                 .plate = plate.pixels.data() + 3 * first,
+                 .plate_stride = width,
+                 .rgba = result.rgba.pixels.data() + 4 * first,
+                 .matte = result.matte.pixels.data() + first,
+                 .rays = inputs.count_rays ? result.rays.pixels.data() + first : nullptr,
+                 .stride = width,
+                 .statistics = &statistics},
+                workspaces().local());
     const std::lock_guard lock(statistics_mutex);
-    result.statistics += worker.result.statistics;
+    result.statistics += statistics;
   };
   // One after the other, those with most to find first: a few of them hold nearly all the work, and
   // no thread may be left with one of those when the others are done.

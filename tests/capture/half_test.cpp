@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <span>
+#include <vector>
 
 namespace capture {
 namespace {
@@ -26,6 +28,20 @@ TEST(FloatFromHalf, ComesBackFromEveryFiniteHalf) {
     const auto half = static_cast<Half>(bits);
     if (!std::isfinite(float_from_half(half))) continue;
     ASSERT_EQ(software::half_from_float(software::float_from_half(half)), half);
+  }
+}
+
+TEST(FloatsFromHalves, AreEachTheSame) {
+  std::vector<Half> halves(31);
+  for (std::size_t i = 0; i < halves.size(); ++i) halves[i] = static_cast<Half>(2111 * i);
+  for (std::size_t count = 0; count <= halves.size(); ++count) {
+    std::vector<float> floats(halves.size() + 1, -7);
+    floats_from_halves(std::span(halves).first(count), floats.data());
+    for (std::size_t i = 0; i < count; ++i) {
+      const float one = float_from_half(halves[i]);
+      EXPECT_EQ(std::bit_cast<std::uint32_t>(floats[i]), std::bit_cast<std::uint32_t>(one)) << i;
+    }
+    EXPECT_EQ(floats[count], -7) << "written beyond the last of " << count;
   }
 }
 

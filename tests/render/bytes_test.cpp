@@ -129,7 +129,9 @@ TEST(ParseEnvironment, RefusesLevelsThatPlacesDoNotFit) {
   const auto clear = [](Environment& env) {
     env.smoothed.clear(), env.halved.clear(), env.diffused.clear();
   };
-  refuses([&](Environment& env) { env.smoothed.clear(), env.diffused.clear(); }, "none smoothed");
+  refuses(
+      [&](Environment& env) { clear(env), env.halved = {env.radiance}, env.compact_apart = false; },
+      "none smoothed");
   refuses([&](Environment& env) { clear(env); }, "no level without");
   refuses([&](Environment& env) { env.diffused.clear(); }, "no level without");
 }
