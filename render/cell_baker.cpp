@@ -50,7 +50,7 @@ void CellBaker::bake(const FrameContext& frame,
                   frame.caustics.get(),
                   frame.job->lights.lamps.size(),
                   effort_.soft_lights ? &frame.soft_lights : nullptr,
-                  frame.light_order};
+                  &frame.light_rows};
   x0_ = x0;
   y0_ = y0;
   block_ = block_of_stage(stage);

@@ -344,6 +344,8 @@ class CellBaker final : public RaySink {
   std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<CellTransport::LightTerm> sorted_lights_;
+  std::vector<Vec3f> sum_of_light_;     // of a slot, by light; zero between slots
+  std::vector<std::uint64_t> has_sum_;  // bits, by light
   std::vector<EnvironmentTerm> sorted_places_;
   std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;

@@ -40,18 +40,19 @@ void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver
   for (const PointLamp& l : reached_) {
     const std::size_t i = point_of_receiver[l.point];
     const ShadePoint& p = points_[i];
-    const Vec3f irradiance = l.factor * frame_->planned_table->lamps[l.lamp].intensity;
-    const Vec3f weight = p.throughput * p.diffuse * l.factor;
+    const Vec3f factor = l.factor();
+    const Vec3f irradiance = factor * frame_->planned_table->lamps[l.lamp].intensity;
+    const Vec3f weight = p.throughput * p.diffuse * factor;
     light_of_point_[i].lamps += irradiance;
     if (weight != Vec3f{}) {
       lamp_terms_.push_back({static_cast<std::uint16_t>(target_of(p)), l.lamp, weight});
     }
     if (bent_of_receiver_[l.point] != no_catcher && shadow_rays_.is_caustic(l.lamp)) {
-      t.bent_caustics.push_back({bent_of_receiver_[l.point], l.lamp, l.factor});
+      t.bent_caustics.push_back({bent_of_receiver_[l.point], l.lamp, factor});
     }
     const std::uint32_t catcher = catcher_of_receiver_[l.point];
     if (catcher == no_catcher) continue;
-    t.caught.push_back({catcher, l.lamp, l.factor});
+    t.caught.push_back({catcher, l.lamp, factor});
     samples_[p.slot].added +=
         p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);
   }

@@ -273,15 +273,10 @@ void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool
     }
   }
   if (frame_->job->lights.lamps.empty()) return;
-  const Receivers& r = receivers_;
   for (const PointLamp& l : reached_) {
-    const std::size_t k = l.point;
+    if (shadow_rays_.is_caustic(l.lamp) || !(l.open > 0)) continue;
     for (const Lobe& lobe : std::ranges::equal_range(lobes_, l.point, {}, receiver_of)) {
-      if (!lobe.lamps || shadow_rays_.is_caustic(l.lamp)) continue;
-      const auto open = ray_to_lamp(
-          {{r.px[k], r.py[k], r.pz[k]}, {r.nx[k], r.ny[k], r.nz[k]}, {r.gx[k], r.gy[k], r.gz[k]}},
-          frame_->job->lights.lamps[l.lamp]);
-      if (open && open->per_intensity > 0) add_lamp(lobe, l.lamp, l.factor / open->per_intensity);
+      if (lobe.lamps) add_lamp(lobe, l.lamp, l.passed);
     }
   }
 }

@@ -1,6 +1,7 @@
 // A cell's transport, tidied: terms by slot, and those that are many times the same as one.
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <iterator>
 #include <numeric>
@@ -12,7 +13,6 @@
 namespace render {
 namespace {
 
-std::uint32_t key_of(const CellTransport::LightTerm& l) { return l.slot * 65536U + l.light; }
 std::uint32_t key_of(const CellTransport::SharedTerm& s) {
   return (s.slot * 65536U + s.centre) * 4U + static_cast<std::uint32_t>(s.of);
 }
@@ -56,19 +56,14 @@ void join_into(EnvironmentTerm& to, const EnvironmentTerm& from) {
   to.y += (from.y - to.y) * part;
 }
 
-// Terms in the order of their slots, of which there are few; sort_slot orders those of one.
-template <class Term, class F>
-void sort_by_slot(const std::vector<Term>& terms, std::vector<Term>& sorted, F&& sort_slot) {
+// Terms in the order of their slots, of which there are few; those of one stay in order.
+template <class Term>
+void sort_by_slot(const std::vector<Term>& terms, std::vector<Term>& sorted) {
   std::array<std::uint32_t, slots + 1> first{};  // of each slot's terms
   for (const Term& term : terms) ++first[term.slot + 1U];
   std::partial_sum(first.begin(), first.end(), first.begin());
   sorted.resize(terms.size());
-  std::array<std::uint32_t, slots + 1> next = first;
-  for (const Term& term : terms) sorted[next[term.slot]++] = term;
-  for (std::size_t slot = 0; slot < slots; ++slot) {
-    const std::size_t count = first[slot + 1] - first[slot];
-    if (count > 1) sort_slot(std::span(sorted).subspan(first[slot], count));
-  }
+  for (const Term& term : terms) sorted[first[term.slot]++] = term;
 }
 
 }  // namespace
@@ -137,21 +132,40 @@ void CellBaker::add_place(const EnvironmentTerm& term) {
   most_places_ = 2 * places_.size() + enough_terms;
 }
 
-// One term for each light of a slot: by slots first, of which there are few.
+// One term for each light of a slot, in order: by slots first, of which there are few, then added
+// up by light.
 void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
                             std::vector<CellTransport::LightTerm>& to) {
-  sort_by_slot(from, sorted_lights_, [](auto of_slot) {
-    std::ranges::sort(of_slot, {}, &CellTransport::LightTerm::light);
-  });
-  const auto kept = static_cast<std::ptrdiff_t>(join(sorted_lights_, sorted_lights_));
-  to.assign(sorted_lights_.begin(), sorted_lights_.begin() + kept);
+  sort_by_slot(from, sorted_lights_);
+  to.clear();
+  constexpr std::size_t word = 64;
+  for (std::size_t i = 0; i < sorted_lights_.size();) {
+    const std::uint16_t slot = sorted_lights_[i].slot;
+    for (; i < sorted_lights_.size() && sorted_lights_[i].slot == slot; ++i) {
+      const std::size_t light = sorted_lights_[i].light;
+      if (light >= sum_of_light_.size()) {
+        has_sum_.resize(light / word + 1);
+        sum_of_light_.resize(has_sum_.size() * word);
+      }
+      sum_of_light_[light] += sorted_lights_[i].weight;
+      has_sum_[light / word] |= std::uint64_t{1} << (light % word);
+    }
+    for (std::size_t first = 0; first < sum_of_light_.size(); first += word) {
+      std::uint64_t& bits = has_sum_[first / word];
+      for (; bits != 0; bits &= bits - 1) {
+        const std::size_t light = first + static_cast<std::size_t>(std::countr_zero(bits));
+        to.push_back({slot, static_cast<std::uint16_t>(light), sum_of_light_[light]});
+        sum_of_light_[light] = {};
+      }
+    }
+  }
 }
 
 // Places of a slot that lie between the same four texels of a level become one, in their middle:
 // many rays through glass, or of many samples, look nearly the same way. Between four texels a
 // picture is all but linear, so hardly anything is lost.
 void CellBaker::join_places(bool joins_wider) {
-  sort_by_slot(places_, sorted_places_, [](auto) {});
+  sort_by_slot(places_, sorted_places_);
   places_.clear();
   for (std::size_t i = 0; i < sorted_places_.size();) {
     keyed_places_.clear();

@@ -350,7 +350,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.pixel_angle =
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
   add_caustics(context, *planned_table);
-  context.light_order = order_by_place(planned_table->lights);
+  context.light_rows = LightRows(planned_table->lights);
   context.soft_lights = SoftLights(*planned_table, e.soft_lights);
   context.planned_table = std::move(planned_table);
   context.columns = (d.width + cell_size - 1) / cell_size;

@@ -27,7 +27,7 @@ struct FrameContext {
   std::shared_ptr<const Caustics> caustics;  // or null
   std::vector<LocalLight> lamps;
   SoftLights soft_lights;
-  std::vector<std::uint16_t> light_order;         // order_by_place()
+  LightRows light_rows;                           // of the planned table
   std::vector<std::uint32_t> compact;             // lights of the table that are compact and apart
   std::array<Effort, refinement_stages> efforts;  // of each stage
   int columns = 0, rows = 0;                      // of cells

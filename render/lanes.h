@@ -3,6 +3,7 @@
 
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -59,6 +60,71 @@ inline Eight load_eight(const float* at) {
   return v;
 }
 inline void store_eight(float* at, Eight v) { std::memcpy(at, &v, sizeof v); }
+inline Eight eight_of(float v) { return Eight{} + v; }
+inline float root(float v) { return std::sqrt(v); }
+inline Eight root(Eight v) {
+#if defined(__AVX2__)
+  return std::bit_cast<Eight>(_mm256_sqrt_ps(std::bit_cast<__m256>(v)));
+#else
+  for (int i = 0; i < 8; ++i) v[i] = std::sqrt(v[i]);
+  return v;
+#endif
+}
+// Of a mask, a bit for each lane, the first the lowest.
+inline unsigned bits_of(std::int32_t __attribute__((vector_size(32))) mask) {
+#if defined(__AVX2__)
+  return static_cast<unsigned>(_mm256_movemask_ps(std::bit_cast<__m256>(mask)));
+#else
+  unsigned bits = 0;
+  for (unsigned i = 0; i < 8; ++i) bits |= static_cast<unsigned>(mask[i] != 0) << i;
+  return bits;
+#endif
+}
+// The places of the bits that are set, in order, before anything.
+constexpr std::array<std::array<std::uint8_t, 8>, 256> places_of_bits() {
+  std::array<std::array<std::uint8_t, 8>, 256> places{};
+  for (std::size_t bits = 0; bits < 256; ++bits) {
+    std::size_t n = 0;
+    for (std::uint8_t k = 0; k < 8; ++k) {
+      if ((bits >> k & 1) != 0) places[bits][n++] = k;
+    }
+  }
+  return places;
+}
+// Moves the lanes whose bit is set to the front; what comes behind them means nothing.
+class ToFront {
+ public:
+  explicit ToFront(unsigned bits) {
+#if defined(__AVX2__)
+    std::int64_t eight;
+    std::memcpy(&eight, table[bits].data(), sizeof eight);
+    places_ = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(eight));
+#else
+    places_ = table[bits];
+#endif
+  }
+  // From eight numbers or more at `from` to as many at `to`.
+  template <class T>
+  void move(const T* from, T* to) const {
+    static_assert(sizeof(T) == 4);
+#if defined(__AVX2__)
+    __m256i v;
+    std::memcpy(&v, from, sizeof v);
+    v = _mm256_permutevar8x32_epi32(v, places_);
+    std::memcpy(to, &v, sizeof v);
+#else
+    for (std::size_t i = 0; i < 8; ++i) to[i] = from[places_[i]];
+#endif
+  }
+
+ private:
+  static constexpr auto table = places_of_bits();
+#if defined(__AVX2__)
+  __m256i places_;
+#else
+  std::array<std::uint8_t, 8> places_;
+#endif
+};
 
 // A colour in four lanes, of which the last is idle.
 using Four = float __attribute__((vector_size(16)));

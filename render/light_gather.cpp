@@ -36,11 +36,39 @@ void find_lit(const Receivers& r,
   }
 }
 
-float cosine_at(const Receivers& r, std::size_t k, Vec3f l) {
-  return r.nx[k] * l.x + r.ny[k] * l.y + r.nz[k] * l.z;
+// Of eight receivers side by side.
+LampWay<Eight> ways_to(const Receivers& r, std::size_t first, const LocalLight& lamp) {
+  const auto eight = [first](const auto& x, const auto& y, const auto& z) {
+    return calibrate::Vec3T<Eight>{load_eight(&x[first]), load_eight(&y[first]),
+                                   load_eight(&z[first])};
+  };
+  return way_to_lamp(eight(r.px, r.py, r.pz), eight(r.nx, r.ny, r.nz), eight(r.gx, r.gy, r.gz),
+                     lamp);
 }
 
-constexpr std::size_t most_stood_for = 16;  // lights, by one
+// Which pixels a lamp shines on, and how much of it they get.
+void find_lit(const Receivers& r,
+              const LocalLight& lamp,
+              CellLamps::Factors& factors,
+              CellMask& lit) {
+  for (std::size_t first = 0; first < cell_pixels; first += 8) {
+    const auto asked = static_cast<unsigned>(r.by_lamps[first / 64] >> (first % 64) & 0xFF);
+    if (asked == 0) continue;
+    unsigned shines = asked;
+    Eight got = eight_of(1);
+    if (lamp.ambient == 0) {
+      const LampWay<Eight> ways = ways_to(r, first, lamp);
+      shines &= bits_of(ways.shines);
+      got = ways.per_intensity;
+    }
+    for (unsigned left = shines; left != 0; left &= left - 1) {
+      const auto k = static_cast<std::size_t>(std::countr_zero(left));
+      factors.at[first + k] = got[k];
+    }
+    lit[first / 64] |= std::uint64_t{shines} << (first % 64);
+  }
+}
+
 constexpr float golden_ratio = 0.6180340F;
 constexpr float rough_accuracy = 0.5F;  // from here on, points that count little test half as many
 
@@ -76,12 +104,6 @@ std::uint32_t stride_of(const Effort& effort, float share, const DirectionalLigh
   const std::uint32_t stride = share >= 0.2F ? 2 : share >= 0.05F ? 4 : 8;
   return effort.accuracy > rough_accuracy ? stride : 2 * stride;
 }
-
-bool shines_on(const Receivers& r, std::size_t k, Vec3f l) {
-  return cosine_at(r, k, l) > 0 && r.gx[k] * l.x + r.gy[k] * l.y + r.gz[k] * l.z > 0;
-}
-
-float sum(Vec3f v) { return v.x + v.y + v.z; }
 
 // What a cell's centres get of a light's caustics, its colour as tints.
 void add_cell_caustic(const LightContext& context,
@@ -180,6 +202,21 @@ void find_windows(const Receivers& r,
 
 }  // namespace
 
+LightRows::LightRows(std::span<const DirectionalLight> lights) : number(order_by_place(lights)) {
+  wide = number.size();
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    if (lights[i].compact != 0) number.push_back(static_cast<std::uint16_t>(i));
+  }
+  for (const std::uint16_t i : number) {
+    const DirectionalLight& light = lights[i];
+    x.push_back(light.direction.x);
+    y.push_back(light.direction.y);
+    z.push_back(light.direction.z);
+    sum.push_back(light.irradiance.x + light.irradiance.y + light.irradiance.z);
+  }
+  for (std::vector<float>* row : {&x, &y, &z, &sum}) row->resize((number.size() + 7) / 8 * 8);
+}
+
 unsigned LightContext::mask_to(std::uint32_t light) const {
   return caustics != nullptr && caustics->photons().follows(light) ? ray_glass_blocks : 0U;
 }
@@ -259,10 +296,18 @@ void gather_cell(const LightContext& context,
 
 namespace {
 
-// What a light gives a point if nothing is in the way; 0 or less where it does not shine.
-float given(const Receivers& r, std::size_t k, const DirectionalLight& light) {
-  return shines_on(r, k, light.direction) ? cosine_at(r, k, light.direction) * sum(light.irradiance)
-                                          : 0.0F;
+// A row of lights and a point: calls `visit(first, cosines, shines)` for every eight of them
+// from `from` on; the mask is of those that shine on it, in both its normals.
+template <class F>
+void for_each_eight(
+    const LightRows& rows, const Receivers& r, std::size_t k, std::size_t from, F&& visit) {
+  for (std::size_t first = from / 8 * 8; first < rows.x.size(); first += 8) {
+    const Eight x = load_eight(&rows.x[first]), y = load_eight(&rows.y[first]),
+                z = load_eight(&rows.z[first]);
+    const Eight cosines = r.nx[k] * x + r.ny[k] * y + r.nz[k] * z;
+    const Eight risen = r.gx[k] * x + r.gy[k] * y + r.gz[k] * z;
+    visit(first, cosines, (cosines > Eight{}) & (risen > Eight{}));
+  }
 }
 
 // Which light of a few a point tests, and what of its irradiance it then stands for; nothing if
@@ -271,48 +316,54 @@ float given(const Receivers& r, std::size_t k, const DirectionalLight& light) {
 std::optional<GatherWorkspace::Asked> one_of(const LightContext& context,
                                              const Receivers& r,
                                              std::size_t k,
+                                             std::span<const float> given,
                                              std::size_t first,
                                              std::size_t count) {
-  const std::span<const std::uint16_t> few =
-      context.order.subspan(first, std::min(count, context.order.size() - first));
-  std::array<float, most_stood_for> gives{};
+  const std::span<const float> gives =
+      given.subspan(first, std::min(count, context.rows->wide - first));
   float all = 0;
-  for (std::size_t i = 0; i < few.size(); ++i) {
-    gives[i] = given(r, k, context.table->lights[few[i]]);
-    all += std::max(gives[i], 0.0F);
-  }
+  for (const float g : gives) all += std::max(g, 0.0F);
   if (!(all > 0)) return std::nullopt;
   auto chosen = static_cast<std::size_t>(std::ranges::max_element(gives) - gives.begin());
   if (r.part[k] != SoftLights::middle) {
     const float place = (static_cast<float>(r.part[k]) + 0.5F) / SoftLights::count +
                         golden_ratio * static_cast<float>(first / count);
     float left = (place - std::floor(place)) * all;
-    for (std::size_t i = 0; i < few.size(); ++i) {
+    for (std::size_t i = 0; i < gives.size(); ++i) {
       if (!(gives[i] > 0)) continue;
       chosen = i;
       left -= gives[i];
       if (left < 0) break;
     }
   }
-  const Vec3f e = context.table->lights[few[chosen]].irradiance;
-  return GatherWorkspace::Asked{static_cast<std::uint16_t>(k), few[chosen], all / sum(e)};
+  return GatherWorkspace::Asked{static_cast<std::uint16_t>(k), context.rows->number[first + chosen],
+                                all / context.rows->sum[first + chosen]};
 }
 
 void ask_lights(const LightContext& context, const Receivers& r, GatherWorkspace& w) {
   const auto& lights = context.table->lights;
+  const LightRows& rows = *context.rows;
   w.asked.clear();
+  w.gives.resize(rows.x.size());
   for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-    const auto ask = [&](std::size_t i) {
-      if (!shines_on(r, k, lights[i].direction)) return;
-      w.asked.push_back({static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i),
-                         cosine_at(r, k, lights[i].direction)});
-    };
     const std::uint32_t stride = stride_of(*context.effort, r.share[k], {});
-    for (std::size_t i = 0; i < lights.size(); ++i) {
-      if (stride == 1 || lights[i].compact != 0) ask(i);
-    }
-    for (std::size_t i = 0; stride > 1 && i < context.order.size(); i += stride) {
-      if (const auto asked = one_of(context, r, k, i, stride)) w.asked.push_back(*asked);
+    const std::size_t from = stride == 1 ? 0 : rows.wide;  // those that every point asks
+    const auto ask = [&](std::size_t first, const Eight& cosines, const auto& shines) {
+      unsigned bits = bits_of(shines);
+      if (first < from) bits &= ~0U << (from - first);
+      for (; bits != 0; bits &= bits - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(bits));
+        w.asked.push_back({static_cast<std::uint16_t>(k), rows.number[first + i], cosines[i]});
+      }
+    };
+    for_each_eight(rows, r, k, from, ask);
+    if (stride <= 1) continue;
+    for_each_eight(rows, r, k, 0, [&](std::size_t first, const Eight& cosines, const auto& shines) {
+      const Eight gives = cosines * load_eight(&rows.sum[first]);
+      store_eight(&w.gives[first], shines ? gives : Eight{});
+    });
+    for (std::size_t i = 0; i < rows.wide; i += stride) {
+      if (const auto asked = one_of(context, r, k, w.gives, i, stride)) w.asked.push_back(*asked);
     }
   }
   // Light by light: rays of a stream then go the same way.
@@ -336,11 +387,10 @@ void gather_points(const LightContext& context,
   const auto& lights = context.table->lights;
   const bool real = context.scene->has_real_blockers();
   ask_lights(context, r, w);
-  std::array<float, stream_rays> weights;
   std::size_t rays = 0;
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
     const Vec3f passed = blocked ? Vec3f{} : share;
-    const float weight = weights[rays++];
+    const float weight = w.ray_weight[rays++];
     const Vec3f open = lights[i].irradiance * weight;
     const Vec3f lost = open * (Vec3f{1, 1, 1} - passed);
     r.light.add_open(k, open);
@@ -362,7 +412,7 @@ void gather_points(const LightContext& context,
         continue;
       }
     }
-    weights[static_cast<std::size_t>(w.rays)] = weight;
+    w.ray_weight[static_cast<std::size_t>(w.rays)] = weight;
     add_ray(w, r, k, i, to, r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
     if (w.rays == stream_rays) shoot_all();
   }
@@ -390,15 +440,7 @@ void gather_cell_lamps(const LightContext& context,
         continue;
       }
       CellLamps::Factors factors{};
-      for (std::size_t word = 0; word < 4; ++word) {
-        for (std::uint64_t bits = r.by_lamps[word]; bits != 0; bits &= bits - 1) {
-          const std::size_t k = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
-          const auto ray = ray_to_lamp(lamp_receiver(r, k), lamp);
-          if (!ray) continue;
-          factors.at[k] = ray->per_intensity;
-          w.lit[i][word] |= std::uint64_t{1} << (k % 64);
-        }
-      }
+      find_lit(r, lamp, factors, w.lit[i]);
       if (w.lit[i] == CellMask{}) continue;
       place[i] = static_cast<std::uint16_t>(cell.numbers.size());
       cell.numbers.push_back(static_cast<std::uint16_t>(first + i));
@@ -426,37 +468,48 @@ void gather_point_lamps(const LightContext& context,
                         std::vector<PointLamp>& reached,
                         RenderStatistics& statistics) {
   const auto& lamps = context.table->lamps;
+  std::size_t rays = 0;
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
-    const auto ray = ray_to_lamp(lamp_receiver(r, k), lamps[i]);
-    if (blocked || !ray) return;
-    reached.push_back(
-        {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), share * ray->per_intensity});
+    const float open = w.ray_weight[rays++];
+    if (blocked) return;
+    reached.push_back({static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), share, open});
   };
-  for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-    const bool by_lamps = in(r.by_lamps, k), by_caustics = in(r.by_caustics, k);
-    if (!by_lamps && !by_caustics) continue;
-    for (std::uint32_t i = 0; i < lamps.size(); ++i) {
-      if (lamps[i].intensity == Vec3f{}) continue;
-      if (!(context.is_caustic(i) ? by_caustics : by_lamps)) continue;
-      if (context.is_caustic(i)) {
-        const LampReceiver at = lamp_receiver(r, k);
-        const Vec3f got =
-            context.caustics->at(i - context.first_caustic, at.origin, at.geometric_normal);
-        if (got == Vec3f{}) continue;
-        reached.push_back({static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(i), got});
-        continue;
+  const auto shoot_all = [&] {
+    rays = 0;
+    flush(*context.scene, w, statistics, visit);
+  };
+  w.ways.resize(lamps.size());
+  const auto count = static_cast<std::size_t>(r.count);
+  for (std::size_t first = 0; first < count; first += 8) {
+    for (std::size_t i = 0; i < lamps.size(); ++i) {
+      if (lamps[i].ambient == 0 && !context.is_caustic(i)) w.ways[i] = ways_to(r, first, lamps[i]);
+    }
+    for (std::size_t k = first; k < std::min(count, first + 8); ++k) {
+      const bool by_lamps = in(r.by_lamps, k), by_caustics = in(r.by_caustics, k);
+      if (!by_lamps && !by_caustics) continue;
+      const auto point = static_cast<std::uint16_t>(k);
+      for (std::uint32_t i = 0; i < lamps.size(); ++i) {
+        if (lamps[i].intensity == Vec3f{}) continue;
+        if (!(context.is_caustic(i) ? by_caustics : by_lamps)) continue;
+        const auto lamp = static_cast<std::uint16_t>(i);
+        if (context.is_caustic(i)) {
+          const LampReceiver at = lamp_receiver(r, k);
+          const Vec3f got =
+              context.caustics->at(i - context.first_caustic, at.origin, at.geometric_normal);
+          if (got != Vec3f{}) reached.push_back({point, lamp, got, 1});
+        } else if (lamps[i].ambient != 0) {
+          reached.push_back({point, lamp, {1, 1, 1}, 1});
+        } else if (const LampWay<Eight>& way = w.ways[i]; way.shines[k - first] != 0) {
+          const std::size_t j = k - first;
+          w.ray_weight[static_cast<std::size_t>(w.rays)] = way.per_intensity[j];
+          add_ray(w, r, k, i, {way.direction.x[j], way.direction.y[j], way.direction.z[j]},
+                  mask_virtual | mask_real_blocker, way.distance_m[j] * before_lamp);
+          if (w.rays == stream_rays) shoot_all();
+        }
       }
-      const auto ray = ray_to_lamp(lamp_receiver(r, k), lamps[i]);
-      if (!ray) continue;
-      if (!(ray->far_m > 0)) {
-        visit(static_cast<std::uint32_t>(k), i, false, {1, 1, 1});
-        continue;
-      }
-      add_ray(w, r, k, i, ray->direction, mask_virtual | mask_real_blocker, ray->far_m);
-      if (w.rays == stream_rays) flush(*context.scene, w, statistics, visit);
     }
   }
-  flush(*context.scene, w, statistics, visit);
+  shoot_all();
 }
 
 }  // namespace render

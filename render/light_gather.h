@@ -8,6 +8,7 @@
 
 #include "render/cell_visibility.h"
 #include "render/frame_job.h"
+#include "render/lamp_way.h"
 #include "render/ray_log.h"
 #include "render/scene.h"
 
@@ -47,6 +48,7 @@ struct GatherWorkspace {
   alignas(64) std::array<unsigned, stream_rays> mask, id, flags;
   alignas(64) std::array<float, stream_rays> tr, tg, tb;  // transmittance so far
   std::array<std::uint32_t, stream_rays> ray_light, ray_point;
+  std::array<float, stream_rays> ray_weight;  // of callers who want one back
   int rays = 0;
   RayLog* log = nullptr;            // keeps all rays, if set
   std::uint32_t* counts = nullptr;  // adds up shadow rays by receiver, if set
@@ -63,6 +65,8 @@ struct GatherWorkspace {
     float weight;  // see PointLight
   };
   std::vector<Asked> asked, asked_by_light;
+  std::vector<LampWay<Eight>> ways;  // to each lamp, of eight points
+  std::vector<float> gives;          // of a row of lights: what each gives a point, 0 below it
   std::vector<std::size_t> first_of_light;
   std::vector<Tint> tints;  // light that glass weakened, capacity reserved
   LightSums soft;
@@ -76,15 +80,26 @@ struct GatherWorkspace {
 
 class Caustics;
 
+// The table's lights side by side: those that are not compact in the order of their places in the
+// sky, then the compact ones; filled up to whole eights with some that shine nowhere.
+struct LightRows {
+  LightRows() = default;
+  explicit LightRows(std::span<const DirectionalLight> lights);
+  std::vector<std::uint16_t> number;  // in the table
+  std::vector<float> x, y, z;         // of directions
+  std::vector<float> sum;             // of the irradiance's colours
+  std::size_t wide = 0;               // so many are not compact
+};
+
 // What every cell of a frame shares.
 struct LightContext {
   const Scene* scene = nullptr;
   const LightTable* table = nullptr;
   const Effort* effort = nullptr;
-  const Caustics* caustics = nullptr;    // whose lights follow the table's own lamps, or null
-  std::size_t first_caustic = 0;         // of the lamps
-  const SoftLights* parts = nullptr;     // null: all lights are looked for in their middle
-  std::span<const std::uint16_t> order;  // order_by_place(): of the lights that are not compact
+  const Caustics* caustics = nullptr;  // whose lights follow the table's own lamps, or null
+  std::size_t first_caustic = 0;       // of the lamps
+  const SoftLights* parts = nullptr;   // null: all lights are looked for in their middle
+  const LightRows* rows = nullptr;
 
   bool is_caustic(std::size_t lamp) const { return caustics != nullptr && lamp >= first_caustic; }
   // What shadow rays to a light of the table carry in their mask beside what blocks them.
@@ -149,10 +164,12 @@ void gather_cell_lamps(const LightContext& context,
                        CellLamps& lamps,
                        RenderStatistics& statistics);
 
-// A lamp that reaches a point: irradiance per intensity.
+// A lamp that reaches a point.
 struct PointLamp {
   std::uint16_t point, lamp;
-  Vec3f factor;
+  Vec3f passed;  // share of its light that arrives; of a caustic, irradiance per intensity
+  float open;    // irradiance per intensity, were nothing in the way; of a caustic, 1
+  Vec3f factor() const { return passed * open; }
 };
 
 // The same for any points, point by point, appended to `reached`: every point tests every lamp.

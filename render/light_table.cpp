@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
+#include "render/lamp_way.h"
 #include "render/light_regions.h"
 #include "render/region_parts.h"
 
@@ -19,40 +19,11 @@ void check(const LightTableSettings& settings) {
   }
 }
 
-namespace {
-
-// What must be added to the squared distance so that a lamp's irradiance is that of a disc of its
-// area: from afar by the integral's second order, close by as on the disc's axis, where the radius'
-// square is exact.
-float nearness(
-    const LampReceiver& point, const LocalLight& lamp, float cosine, float facing, float squared) {
-  if (!(lamp.area_m2 > 0)) return 0;
-  const float radius_squared = lamp.area_m2 / std::numbers::pi_v<float>;
-  float afar = 1;
-  if (lamp.normal != Vec3f{}) {
-    const float along = -dot(point.normal, lamp.normal) * facing;
-    const float ratio = std::clamp(along, -2 * cosine, 2 * cosine) / cosine;
-    afar = std::clamp(3 * facing * facing - 1 - ratio, -2.0F, 1.0F);
-  }
-  const float close = radius_squared / (radius_squared + squared);
-  return radius_squared * (close + (1 - close) * afar);
-}
-
-}  // namespace
-
 std::optional<LampRay> ray_to_lamp(const LampReceiver& point, const LocalLight& lamp) {
   if (lamp.ambient != 0) return LampRay{{0, 0, 1}, 0, 1};
-  const Vec3f to = lamp.position - point.origin;
-  const float squared = dot(to, to);
-  const float distance = std::sqrt(squared);
-  if (!(distance > 1e-6F)) return std::nullopt;
-  const Vec3f l = to * (1 / distance);
-  const float cosine = dot(point.normal, l);
-  if (!(cosine > 0) || !(dot(point.geometric_normal, l) > 0)) return std::nullopt;
-  const float facing = lamp.normal == Vec3f{} ? 1.0F : -dot(lamp.normal, l);
-  if (!(facing > 0)) return std::nullopt;
-  return LampRay{l, distance * (1 - 1e-3F),
-                 cosine * facing / (squared + nearness(point, lamp, cosine, facing, squared))};
+  const LampWay<float> way = way_to_lamp(point.origin, point.normal, point.geometric_normal, lamp);
+  if (!way.shines) return std::nullopt;
+  return LampRay{way.direction, way.distance_m * before_lamp, way.per_intensity};
 }
 
 LightTable make_light_table(const Environment& env, const LightTableSettings& settings) {

@@ -92,8 +92,9 @@ class VisibilityFinder {
     const auto light = first + static_cast<std::uint32_t>(i);
     const unsigned mask = mask_of_ray(point, light);
     if (lamps_) {
-      const auto ray = ray_to_lamp(lamp_receiver(r_, point), context_.table->lamps[light]);
-      add_ray(w_, r_, point, light, ray->direction, mask, ray->far_m);
+      const Vec3f origin{r_.px[point], r_.py[point], r_.pz[point]};
+      const WayTo<float> way = way_to(origin, context_.table->lamps[light].position);
+      add_ray(w_, r_, point, light, way.direction, mask, way.distance_m * before_lamp);
     } else {
       add_ray(w_, r_, point, light, context_.direction(r_, point, light), mask);
     }
@@ -101,16 +102,16 @@ class VisibilityFinder {
   }
 
   void shoot_rest(std::uint32_t first) {
-    flush(*context_.scene, w_, statistics_,
-          [&](std::uint32_t point, std::uint32_t light, bool blocked, Vec3f share) {
-            const std::size_t i = light - first;
-            if (blocked) {
-              w_.seen[i][point / 64] &= ~bit(static_cast<int>(point % 64));
-            } else if (share != Vec3f{1, 1, 1} && w_.tints.size() < w_.tints.capacity()) {
-              w_.tints.push_back({light, point, Vec3f{1, 1, 1} - share});
-              tinted_[i][point / 64] |= bit(static_cast<int>(point % 64));
-            }
-          });
+    flush_dimmed(*context_.scene, w_, statistics_,
+                 [&](std::uint32_t point, std::uint32_t light, bool blocked, Vec3f share) {
+                   const std::size_t i = light - first;
+                   if (blocked) {
+                     w_.seen[i][point / 64] &= ~bit(static_cast<int>(point % 64));
+                   } else if (w_.tints.size() < w_.tints.capacity()) {
+                     w_.tints.push_back({light, point, Vec3f{1, 1, 1} - share});
+                     tinted_[i][point / 64] |= bit(static_cast<int>(point % 64));
+                   }
+                 });
   }
 
   // The pixel that stands for a block: another one for each light. Where blocks are looked at more
@@ -245,7 +246,20 @@ class VisibilityFinder {
         pixels &= ~bits;
       }
     }
-    for (; pixels != 0; pixels &= pixels - 1) test(first, i, word, std::countr_zero(pixels));
+    if (lamps_ || ray_mask_ != 0 || has_parts(first, i) || context_.mask_to(light) != 0) {
+      for (; pixels != 0; pixels &= pixels - 1) test(first, i, word, std::countr_zero(pixels));
+      return;
+    }
+    pixels &= ~w_.tested[i][wi];
+    w_.tested[i][wi] |= pixels;
+    for (int k = 0; k < 64 && pixels >> k != 0; k += 8) {
+      const auto eight = static_cast<unsigned>(pixels >> k & 0xFF);
+      if (eight == 0) continue;
+      if (w_.rays + 8 > stream_rays) shoot_rest(first);
+      add_rays(w_, r_, static_cast<std::size_t>(point_of(word, k)), eight, light,
+               context_.table->lights[light].direction);
+    }
+    if (w_.rays == stream_rays) shoot_rest(first);
   }
 
   // Where what was tested of a block disagrees in itself or with the blocks around it, looks
@@ -312,11 +326,10 @@ class VisibilityFinder {
   }
 
   void shoot_near(std::uint32_t first) {
-    flush(*context_.scene, w_, statistics_,
-          [&](std::uint32_t point, std::uint32_t light, bool blocked, Vec3f share) {
-            if (!blocked && share == Vec3f{1, 1, 1}) return;
-            w_.near[light - first][point / 64] |= bit(static_cast<int>(point % 64));
-          });
+    flush_dimmed(*context_.scene, w_, statistics_,
+                 [&](std::uint32_t point, std::uint32_t light, bool, Vec3f) {
+                   w_.near[light - first][point / 64] |= bit(static_cast<int>(point % 64));
+                 });
   }
 
   // Gives a 2x2 block's answer to its four pixels.
