@@ -31,6 +31,9 @@ bool receives_light(const ShadePoint& p) {
 
 CellBaker::CellBaker() {
   queue_.reserve(16384);
+  // More than come together in any scene yet: what is not used of it takes no memory, and growing
+  // would hold all of them twice.
+  places_.reserve(std::size_t{1} << 21);
   gather_.tints.reserve(static_cast<std::size_t>(GatherWorkspace::group) * cell_pixels);
 }
 

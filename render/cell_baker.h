@@ -37,6 +37,8 @@ class CellBaker final : public RaySink {
             CellTransport& transport,
             RenderStatistics& statistics);
   void log_rays(RayLog* log) { gather_.log = log; }
+  // Of the lists that are as long as cells need: of the longest so far.
+  std::size_t scratch_bytes() const;
 
   void push(const ShadePoint& from, const NewRay& ray) override;
 
@@ -346,7 +348,6 @@ class CellBaker final : public RaySink {
   std::vector<CellTransport::LightTerm> sorted_lights_;
   std::vector<Vec3f> sum_of_light_;     // of a slot, by light; zero between slots
   std::vector<std::uint64_t> has_sum_;  // bits, by light
-  std::vector<EnvironmentTerm> sorted_places_;
   std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
   std::vector<PointLamp> reached_;
@@ -356,9 +357,10 @@ class CellBaker final : public RaySink {
   // Many times the transport's.
   std::vector<CellTransport::LightTerm> lamp_terms_;
   std::vector<EnvironmentTerm> places_;
-  // Beyond so many terms they are joined, and may then be twice as many, and `enough_terms` more.
+  // Beyond so many terms they are joined, and may then be twice as many, places not by more than
+  // eight times as many as this, and `enough_terms` more.
   static constexpr std::size_t enough_terms = std::size_t{1} << 15;
-  std::size_t most_lights_ = 0, most_places_ = 0;
+  std::size_t most_lights_ = 0, most_places_ = 0, longest_places_ = enough_terms;
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;

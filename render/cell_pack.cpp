@@ -66,6 +66,22 @@ void sort_by_slot(const std::vector<Term>& terms, std::vector<Term>& sorted) {
   for (const Term& term : terms) sorted[first[term.slot]++] = term;
 }
 
+// The same in place, for there may be more than a million; those of a slot in any order.
+template <class Term>
+void sort_by_slot(std::vector<Term>& terms) {
+  std::array<std::uint32_t, slots + 1> first{};
+  for (const Term& term : terms) ++first[term.slot + 1U];
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  std::array<std::uint32_t, slots> next;
+  std::copy_n(first.begin(), slots, next.begin());
+  for (std::size_t slot = 0; slot < slots; ++slot) {
+    for (; next[slot] < first[slot + 1]; ++next[slot]) {
+      Term& here = terms[next[slot]];
+      while (here.slot != slot) std::swap(here, terms[next[here.slot]++]);
+    }
+  }
+}
+
 }  // namespace
 
 // Tells what came of the cell's slots, and joins what is many times the same.
@@ -114,6 +130,12 @@ void CellBaker::pack_bases() {
   }
 }
 
+std::size_t CellBaker::scratch_bytes() const {
+  const auto bytes = [](const auto& list) { return list.capacity() * sizeof list[0]; };
+  return longest_places_ * sizeof places_[0] + bytes(keyed_places_) + bytes(sorted_lights_) +
+         bytes(lamp_terms_);
+}
+
 // A cell that samples glass a thousand times a pixel finds millions of terms: they are joined time
 // and again. Those of the pixels around it are few, and are dropped by their number.
 void CellBaker::add_light(const CellTransport::LightTerm& term) {
@@ -129,7 +151,8 @@ void CellBaker::add_place(const EnvironmentTerm& term) {
   places_.push_back(term);
   if (places_.size() <= most_places_ || shades_ring_) return;
   join_places(false);
-  most_places_ = 2 * places_.size() + enough_terms;
+  most_places_ = places_.size() + std::min(places_.size(), 8 * enough_terms) + enough_terms;
+  longest_places_ = std::max(longest_places_, most_places_);
 }
 
 // One term for each light of a slot, in order: by slots first, of which there are few, then added
@@ -165,21 +188,22 @@ void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
 // many rays through glass, or of many samples, look nearly the same way. Between four texels a
 // picture is all but linear, so hardly anything is lost.
 void CellBaker::join_places(bool joins_wider) {
-  sort_by_slot(places_, sorted_places_);
-  places_.clear();
-  for (std::size_t i = 0; i < sorted_places_.size();) {
+  sort_by_slot(places_);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < places_.size();) {
     keyed_places_.clear();
-    const std::uint16_t slot = sorted_places_[i].slot;
-    for (; i < sorted_places_.size() && sorted_places_[i].slot == slot; ++i) {
-      keyed_places_.push_back({texels_of(sorted_places_[i]), sorted_places_[i]});
+    const std::uint16_t slot = places_[i].slot;
+    for (; i < places_.size() && places_[i].slot == slot; ++i) {
+      keyed_places_.push_back({texels_of(places_[i]), places_[i]});
     }
     join_places_of_slot();
     if (keyed_places_.size() > most_places_of_slot && halve_faint_places()) {
       join_places_of_slot();
     }
     if (joins_wider) join_wider_places();
-    for (const KeyedPlace& place : keyed_places_) places_.push_back(place.term);
+    for (const KeyedPlace& place : keyed_places_) places_[kept++] = place.term;
   }
+  places_.resize(kept);
 }
 
 void CellBaker::join_places_of_slot() {

@@ -1,6 +1,8 @@
 // Transport kept from frame to frame.
 #include "render/kept_transport.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <iterator>
 #include <utility>
@@ -15,7 +17,7 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
   auto moved = Scene::moved(places_, scene.places());
   const bool same_transport = keys.transport == keys_.transport;
   light_stays_ = keys.light.all == keys_.light.all;
-  scarce_ = bytes_ > max_bytes_ / 2;
+  scarce_ = bytes_ > room() / 2;
   keys_ = keys;
   const auto caustics_before = std::exchange(shown_caustics_, frame.caustics);
   if (same_transport && same_size && moved) {
@@ -47,6 +49,7 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
 
 void KeptTransport::forget_all(const Scene& scene) {
   for (Cell& cell : cells_) cell.stage = none;
+  scratch_bytes_ = 0;
   bends_plate_ = false;
   cones_.clear();
   grid_ = SpaceGrid(scene.virtual_bounds());
@@ -95,25 +98,34 @@ CellTransport* KeptTransport::place(int column, int row) {
     bytes_ -= cell.bytes;
     cell = {};
   }
+  // What is kept already stays as it is, rather than make room for the same in more detail.
+  if (bytes_ >= room() && (!cell.transport || cell.stage != none)) {
+    full_ = true;
+    return nullptr;
+  }
   if (!cell.transport) {
-    if (bytes_ >= max_bytes_) {
-      full_ = true;
-      return nullptr;
-    }
     cell.transport = std::make_unique<CellTransport>();
   }
   return cell.transport.get();
+}
+
+void KeptTransport::found_with(std::size_t scratch_bytes) {
+  const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t all = scratch_bytes * threads;
+  std::size_t before = scratch_bytes_;
+  while (before < all && !scratch_bytes_.compare_exchange_weak(before, all)) {
+  }
 }
 
 void KeptTransport::keep(int column, int row, int stage) {
   Cell& cell = cells_[index(column, row)];
   cell.lit.reset();
   const std::size_t bytes = cell.transport->bytes();
-  const std::size_t before = bytes_.fetch_add(bytes - cell.bytes);
+  const std::size_t others = bytes_.fetch_add(bytes - cell.bytes) - cell.bytes;
   cell.bytes = bytes;
   cell.stage = stage;
   if (!cell.transport->bent.empty()) bends_plate_ = true;
-  if (before + bytes <= max_bytes_) return;
+  if (others + bytes <= room()) return;
   // Too much: this cell's is given back.
   full_ = true;
   bytes_ -= cell.bytes;
@@ -124,7 +136,7 @@ LitCell* KeptTransport::place_lit(int column, int row) {
   Cell& cell = cells_[index(column, row)];
   if (!light_stays_ || cell.stage == none) return nullptr;
   if (!cell.lit) {
-    if (bytes_ + sizeof(LitCell) > max_bytes_) return nullptr;
+    if (bytes_ + sizeof(LitCell) > room()) return nullptr;
     cell.lit = std::make_unique<LitCell>();
     cell.bytes += sizeof(LitCell);
     bytes_ += sizeof(LitCell);

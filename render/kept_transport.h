@@ -74,9 +74,17 @@ class KeptTransport {
   // What cells mark where they reach in; stays while any cell is kept.
   const SpaceGrid& grid() const { return grid_; }
 
-  // Of so many cells: half a kilobyte a pixel, but at least 128 and at most 512 MB.
+  // What finding a cell took on one thread: kept cells leave room for as much on all threads.
+  void found_with(std::size_t scratch_bytes);
+
+  // Of so many cells: half a kilobyte a pixel, but at least 128 and at most 512 MB. Kept cells have
+  // what finding them leaves of it.
   static constexpr std::size_t max_bytes(std::size_t cells) {
     return std::clamp(cells * cell_pixels * 512, std::size_t{128} << 20, std::size_t{512} << 20);
+  }
+  // For kept cells: many threads leave them half.
+  std::size_t room() const {
+    return max_bytes_ - std::min<std::size_t>(scratch_bytes_, max_bytes_ / 2);
   }
   // Taken so far.
   std::size_t bytes() const { return bytes_; }
@@ -107,11 +115,13 @@ class KeptTransport {
   SpaceGrid grid_;
   int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
+
   std::size_t max_bytes_ = 0;
-  std::vector<CellCone> cones_;  // once anything has moved
+  std::atomic<std::size_t> scratch_bytes_ = 0;  // of all threads
+  std::vector<CellCone> cones_;                 // once anything has moved
   std::atomic<std::size_t> bytes_ = 0;
   std::atomic<bool> full_ = false, bends_plate_ = false;
-  bool scarce_ = false;  // when the frame began, half of the memory was taken
+  bool scarce_ = false;  // when the frame began, half of the room was taken
 };
 
 }  // namespace render

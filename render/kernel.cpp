@@ -240,6 +240,7 @@ void TileWorkspace::Impl::render_cell(const FrameContext& frame,
     light(frame, transport, *tile.statistics);
     if (counts) write_counts(transport, tile, x0, y0);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
+    if (memory) memory->found_with(baker.scratch_bytes());
     if (CellTransport* room = memory ? memory->place(column, row) : nullptr) {
       *room = transport;
       memory->keep(column, row, stage);
@@ -260,6 +261,7 @@ bool find_cell(const FrameContext& context,
   if (!room) return false;
   TileWorkspace::Impl& impl = workspace.impl();
   impl.baker.bake(context, stage, column * cell_size, row * cell_size, impl.transport, statistics);
+  memory.found_with(impl.baker.scratch_bytes());
   *room = impl.transport;
   memory.keep(column, row, stage);
   return memory.find(column, row, stage) != nullptr;

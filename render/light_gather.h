@@ -81,7 +81,8 @@ struct GatherWorkspace {
 class Caustics;
 
 // The table's lights side by side: those that are not compact in the order of their places in the
-// sky, then the compact ones; filled up to whole eights with some that shine nowhere.
+// sky, then the compact ones; rows of floats filled up to whole eights with some that shine
+// nowhere.
 struct LightRows {
   LightRows() = default;
   explicit LightRows(std::span<const DirectionalLight> lights);

@@ -1,5 +1,6 @@
 // Cells that are kept from frame to frame: lit as they were, or found ahead.
 #include <gtest/gtest.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
@@ -156,6 +157,25 @@ TEST(LitCells, AreNotKeptWhileTheLightChanges) {
   for (int i = 0; i < 2; ++i) shot.show(&shot.kept);
   EXPECT_GT(shot.lit_cells(), 10);
   EXPECT_LT(shot.lit_cells(), 30);  // some see the video
+}
+
+TEST(KeptTransport, LeavesRoomForWhatFindingCellsTakes) {
+  constexpr std::size_t megabyte = std::size_t{1} << 20, all = 128 * megabyte;
+  tbb::task_arena(1).execute([&] {  // for what one thread's lists have grown to counts for all
+    RealFloorRoom shown;
+    shown.show(&shown.kept);
+    const std::size_t room = shown.kept.room();
+    EXPECT_LT(room, all);
+    shown.kept.found_with(60 * megabyte);
+    EXPECT_EQ(shown.kept.room(), std::min(room, all - 60 * megabyte));
+    shown.kept.found_with(megabyte);  // the largest counts
+    EXPECT_EQ(shown.kept.room(), std::min(room, all - 60 * megabyte));
+    shown.kept.found_with(100 * all);
+    EXPECT_EQ(shown.kept.room(), all / 2);
+    shown.room.job.effort.accuracy = 0.9F;  // all is found anew
+    shown.show(&shown.kept);
+    EXPECT_GT(shown.kept.room(), all / 2);
+  });
 }
 
 TEST(RefineCells, FindsCellsAheadAsTheFrameWouldShowThem) {
