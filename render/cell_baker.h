@@ -255,8 +255,7 @@ class CellBaker final : public RaySink {
   };
   void pack();
   void pack_bases();
-  void pack_lights(const std::vector<CellTransport::LightTerm>& from,
-                   std::vector<CellTransport::LightTerm>& to);
+  void pack_lights(std::vector<CellTransport::LightTerm>& terms);
   void add_light(const CellTransport::LightTerm& term);
   void add_place(const EnvironmentTerm& term);
   void join_places(bool joins_wider);
@@ -345,9 +344,8 @@ class CellBaker final : public RaySink {
   std::array<MirroredHit, cell_pixels> mirrored_hits_;
   std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
-  std::vector<CellTransport::LightTerm> sorted_lights_;
-  std::vector<Vec3f> sum_of_light_;     // of a slot, by light; zero between slots
-  std::vector<std::uint64_t> has_sum_;  // bits, by light
+  std::vector<Vec3f> sum_of_light_;               // of a slot, by light; zero between slots
+  std::vector<std::uint64_t> has_sum_;            // bits, by light
   std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
   std::vector<PointLamp> reached_;

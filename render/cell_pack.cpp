@@ -56,17 +56,8 @@ void join_into(EnvironmentTerm& to, const EnvironmentTerm& from) {
   to.y += (from.y - to.y) * part;
 }
 
-// Terms in the order of their slots, of which there are few; those of one stay in order.
-template <class Term>
-void sort_by_slot(const std::vector<Term>& terms, std::vector<Term>& sorted) {
-  std::array<std::uint32_t, slots + 1> first{};  // of each slot's terms
-  for (const Term& term : terms) ++first[term.slot + 1U];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  sorted.resize(terms.size());
-  for (const Term& term : terms) sorted[first[term.slot]++] = term;
-}
-
-// The same in place, for there may be more than a million; those of a slot in any order.
+// Brings terms into the order of their slots, of which there are few, in place, for there may be
+// more than a million; those of a slot come in any order.
 template <class Term>
 void sort_by_slot(std::vector<Term>& terms) {
   std::array<std::uint32_t, slots + 1> first{};
@@ -103,8 +94,9 @@ void CellBaker::pack() {
           {static_cast<std::uint16_t>(k), static_cast<std::uint16_t>(centre), borrowed_[k][i]});
     }
   }
-  pack_lights(t.lights, t.lights);
-  pack_lights(lamp_terms_, t.lamp_terms);
+  pack_lights(t.lights);
+  pack_lights(lamp_terms_);
+  t.lamp_terms = lamp_terms_;
   join_places(effort_.aa_samples > 1);  // a picture of one ray a pixel is hardly kept
   t.environment.pack(places_, frame_->planned_levels);
   std::ranges::sort(t.shared, {}, [](const CellTransport::SharedTerm& s) {
@@ -132,8 +124,7 @@ void CellBaker::pack_bases() {
 
 std::size_t CellBaker::scratch_bytes() const {
   const auto bytes = [](const auto& list) { return list.capacity() * sizeof list[0]; };
-  return longest_places_ * sizeof places_[0] + bytes(keyed_places_) + bytes(sorted_lights_) +
-         bytes(lamp_terms_);
+  return longest_places_ * sizeof places_[0] + bytes(keyed_places_) + bytes(lamp_terms_);
 }
 
 // A cell that samples glass a thousand times a pixel finds millions of terms: they are joined time
@@ -142,7 +133,7 @@ void CellBaker::add_light(const CellTransport::LightTerm& term) {
   auto& terms = transport_->lights;
   terms.push_back(term);
   if (terms.size() <= most_lights_ || shades_ring_) return;
-  pack_lights(terms, terms);
+  pack_lights(terms);
   most_lights_ = 2 * terms.size() + enough_terms;
 }
 
@@ -157,31 +148,31 @@ void CellBaker::add_place(const EnvironmentTerm& term) {
 
 // One term for each light of a slot, in order: by slots first, of which there are few, then added
 // up by light.
-void CellBaker::pack_lights(const std::vector<CellTransport::LightTerm>& from,
-                            std::vector<CellTransport::LightTerm>& to) {
-  sort_by_slot(from, sorted_lights_);
-  to.clear();
+void CellBaker::pack_lights(std::vector<CellTransport::LightTerm>& terms) {
+  sort_by_slot(terms);
   constexpr std::size_t word = 64;
-  for (std::size_t i = 0; i < sorted_lights_.size();) {
-    const std::uint16_t slot = sorted_lights_[i].slot;
-    for (; i < sorted_lights_.size() && sorted_lights_[i].slot == slot; ++i) {
-      const std::size_t light = sorted_lights_[i].light;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < terms.size();) {
+    const std::uint16_t slot = terms[i].slot;
+    for (; i < terms.size() && terms[i].slot == slot; ++i) {
+      const std::size_t light = terms[i].light;
       if (light >= sum_of_light_.size()) {
         has_sum_.resize(light / word + 1);
         sum_of_light_.resize(has_sum_.size() * word);
       }
-      sum_of_light_[light] += sorted_lights_[i].weight;
+      sum_of_light_[light] += terms[i].weight;
       has_sum_[light / word] |= std::uint64_t{1} << (light % word);
     }
     for (std::size_t first = 0; first < sum_of_light_.size(); first += word) {
       std::uint64_t& bits = has_sum_[first / word];
       for (; bits != 0; bits &= bits - 1) {
         const std::size_t light = first + static_cast<std::size_t>(std::countr_zero(bits));
-        to.push_back({slot, static_cast<std::uint16_t>(light), sum_of_light_[light]});
+        terms[kept++] = {slot, static_cast<std::uint16_t>(light), sum_of_light_[light]};
         sum_of_light_[light] = {};
       }
     }
   }
+  terms.resize(kept);
 }
 
 // Places of a slot that lie between the same four texels of a level become one, in their middle:

@@ -103,9 +103,7 @@ CellTransport* KeptTransport::place(int column, int row) {
     full_ = true;
     return nullptr;
   }
-  if (!cell.transport) {
-    cell.transport = std::make_unique<CellTransport>();
-  }
+  if (!cell.transport) cell.transport = std::make_unique<CellTransport>();
   return cell.transport.get();
 }
 

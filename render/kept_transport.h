@@ -115,7 +115,6 @@ class KeptTransport {
   SpaceGrid grid_;
   int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
-
   std::size_t max_bytes_ = 0;
   std::atomic<std::size_t> scratch_bytes_ = 0;  // of all threads
   std::vector<CellCone> cones_;                 // once anything has moved

@@ -71,13 +71,17 @@ inline Eight root(Eight v) {
 #endif
 }
 // Of a mask, a bit for each lane, the first the lowest.
+template <unsigned count, class Mask>
+unsigned bits_one_by_one(const Mask& mask) {
+  unsigned bits = 0;
+  for (unsigned i = 0; i < count; ++i) bits |= static_cast<unsigned>(mask[i] != 0) << i;
+  return bits;
+}
 inline unsigned bits_of(std::int32_t __attribute__((vector_size(32))) mask) {
 #if defined(__AVX2__)
-  return static_cast<unsigned>(_mm256_movemask_ps(std::bit_cast<__m256>(mask)));
+  return bits_of(std::bit_cast<Lanes>(mask));
 #else
-  unsigned bits = 0;
-  for (unsigned i = 0; i < 8; ++i) bits |= static_cast<unsigned>(mask[i] != 0) << i;
-  return bits;
+  return bits_one_by_one<8>(mask);
 #endif
 }
 // The places of the bits that are set, in order, before anything.
@@ -138,14 +142,11 @@ inline Four after_first(Four v) {
   using Order = std::int32_t __attribute__((vector_size(16)));
   return __builtin_shuffle(v, Order{1, 2, 3, 3});
 }
-// Of a mask, a bit for each lane, the first the lowest.
 inline unsigned bits_of(std::int32_t __attribute__((vector_size(16))) mask) {
 #if defined(__SSE2__)
   return static_cast<unsigned>(_mm_movemask_ps(std::bit_cast<__m128>(mask)));
 #else
-  unsigned bits = 0;
-  for (unsigned i = 0; i < 4; ++i) bits |= static_cast<unsigned>(mask[i] != 0) << i;
-  return bits;
+  return bits_one_by_one<4>(mask);
 #endif
 }
 inline Four four_of(calibrate::Vec3f v) { return Four{v.x, v.y, v.z, 0}; }

@@ -97,8 +97,7 @@ bool can_be_blocked(const LightContext& context, const Scene::Bounds& box, std::
 
 // A point that counts little tests every second, fourth ... light only; compact ones are few and
 // strong, and are tested by all. 0 = none.
-std::uint32_t stride_of(const Effort& effort, float share, const DirectionalLight& light) {
-  if (light.compact != 0) return 1;
+std::uint32_t stride_of(const Effort& effort, float share) {
   if (share == 0) return 0;
   if (effort.accuracy >= 1 || share >= 0.5F) return 1;
   const std::uint32_t stride = share >= 0.2F ? 2 : share >= 0.05F ? 4 : 8;
@@ -346,7 +345,7 @@ void ask_lights(const LightContext& context, const Receivers& r, GatherWorkspace
   w.asked.clear();
   w.gives.resize(rows.x.size());
   for (std::size_t k = 0; k < static_cast<std::size_t>(r.count); ++k) {
-    const std::uint32_t stride = stride_of(*context.effort, r.share[k], {});
+    const std::uint32_t stride = stride_of(*context.effort, r.share[k]);
     const std::size_t from = stride == 1 ? 0 : rows.wide;  // those that every point asks
     const auto ask = [&](std::size_t first, const Eight& cosines, const auto& shines) {
       unsigned bits = bits_of(shines);
@@ -481,7 +480,8 @@ void gather_point_lamps(const LightContext& context,
   w.ways.resize(lamps.size());
   const auto count = static_cast<std::size_t>(r.count);
   for (std::size_t first = 0; first < count; first += 8) {
-    for (std::size_t i = 0; i < lamps.size(); ++i) {
+    const bool any_by_lamps = (r.by_lamps[first / 64] >> (first % 64) & 0xFF) != 0;
+    for (std::size_t i = 0; any_by_lamps && i < lamps.size(); ++i) {
       if (lamps[i].ambient == 0 && !context.is_caustic(i)) w.ways[i] = ways_to(r, first, lamps[i]);
     }
     for (std::size_t k = first; k < std::min(count, first + 8); ++k) {
