@@ -73,9 +73,20 @@ struct GatherWorkspace {
   // What is so near to a centre, times the radius of a light, casts penumbrae narrower than pixels
   // can share.
   std::array<float, cell_pixels> sharp_m;
-  CellMask same4, same2;  // pixels whose 4x4, 2x2 block is one smooth surface
-  // Of every 4x4 block that is one, the sides on which the surface ends with it, or the cell does.
-  std::array<std::uint8_t, 16> ends;
+  CellMask same2;  // pixels whose 2x2 block is one smooth surface
+  // A smooth surface, or what of it lies in a 4x4 block.
+  struct Region {
+    std::uint64_t pixels;       // of a word
+    std::uint64_t outermost;    // of these, those where the surface ends, or the cell does; none if
+                                // it is all of the block
+    CellMask beside;            // regions of the same surface in this block and those about it
+    CellMask alike;             // and in all of the cell
+    std::uint8_t word, column;  // of the block
+    std::uint8_t ends;          // sides on which the surface ends with a block that is all of it
+    bool whole;                 // it is all of the block
+  };
+  std::array<Region, cell_pixels> regions;
+  std::size_t region_count = 0;
 };
 
 class Caustics;
@@ -119,9 +130,10 @@ struct LightContext {
 // Finds what the pixels of a cell see, and adds up their light. Shadow rays go to
 // one pixel of every 4x4 block of a smooth surface first, another for each light, but an outermost
 // one at the cell's border and where the surface ends beside the block, and to two of compact
-// lights and of surfaces that end on both sides; where blocks disagree with their neighbours, to
-// their 2x2 blocks or pixels, as the effort's interleave asks; for lights that have parts, all over
-// the cell.
+// lights and of surfaces that end on both sides; where surfaces meet in a block, to two pixels of
+// each, but of all for lights that are compact or have parts. Where these disagree with their
+// surface's in the blocks around, to their 2x2 blocks or pixels, as the effort's interleave asks;
+// for lights that have parts, all over the surface.
 void gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 
 #include "render/light_gather.h"
 #include "render/shadow_stream.h"
@@ -19,6 +20,44 @@ inline constexpr float touching = 1.2F;
 
 inline int bit_of(int x, int y) { return (y & 3) * 16 + x; }
 inline int point_of(int word, int bit) { return word * 64 + bit; }
+
+// A cell's 2x2 blocks: bit = row * 8 + column.
+using Quads = std::uint64_t;
+
+// Those that have any of some pixels.
+inline Quads quads_of(const CellMask& pixels) {
+  Quads all = 0;
+  for (std::size_t word = 0; word < 4; ++word) {
+    std::uint64_t q = pixels[word] | pixels[word] >> 16;  // of two rows
+    q = (q | q >> 1) & 0x0000555500005555ULL;             // of two columns
+    q = (q | q >> 1) & 0x0000333300003333ULL;
+    q = (q | q >> 2) & 0x00000F0F00000F0FULL;
+    q = (q | q >> 4) & 0x000000FF000000FFULL;
+    all |= (q & 0xFF) << (16 * word) | (q >> 32) << (16 * word + 8);
+  }
+  return all;
+}
+
+inline CellMask pixels_of(Quads quads) {
+  CellMask all;
+  for (std::size_t word = 0; word < 4; ++word) {
+    std::uint64_t q = quads >> (16 * word);
+    q = (q & 0xFF) | (q & 0xFF00) << 24;
+    q = (q | q << 4) & 0x00000F0F00000F0FULL;
+    q = (q | q << 2) & 0x0000333300003333ULL;
+    q = (q | q << 1) & 0x0000555500005555ULL;
+    q |= q << 1;
+    all[word] = q | q << 16;
+  }
+  return all;
+}
+
+// And those about them.
+inline Quads grown(Quads quads) {
+  constexpr Quads first_column = 0x0101010101010101ULL;
+  const Quads rows = quads | quads << 8 | quads >> 8;
+  return rows | (rows & ~(first_column << 7)) << 1 | (rows & ~first_column) >> 1;
+}
 
 // Whether two pixels show the same surface, and it is nearly flat between them.
 bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b);
@@ -62,6 +101,10 @@ class VisibilityFinder {
     }
     shoot_rest(first);
     for (std::size_t i = 0; i < count; ++i) {
+      if (!skip_[i]) refine_quads(first, i);
+    }
+    shoot_rest(first);
+    for (std::size_t i = 0; i < count; ++i) {
       w_.near[i] = {};
       if (!skip_[i] && ray_mask_ == 0 && has_parts(first, i)) test_near(first, i);
     }
@@ -74,6 +117,10 @@ class VisibilityFinder {
   std::array<bool, GatherWorkspace::group> skip_{};  // lights that nothing can block here
 
  private:
+  using Region = GatherWorkspace::Region;
+  static constexpr int few = 2;  // pixels are tested one by one
+
+  std::span<const Region> regions() const { return std::span(w_.regions).first(w_.region_count); }
   static std::uint64_t bit(int k) { return std::uint64_t{1} << k; }
   bool has_parts(std::uint32_t first, std::size_t i) const {
     return !lamps_ && context_.has_parts(first + i);
@@ -118,38 +165,35 @@ class VisibilityFinder {
   // closely, it is an outermost one where the surface ends beside the block, for things that touch
   // cast narrow shadows, and at the border of the cell, so that no shadow comes in unseen from the
   // cell beside, and the two cells agree where they meet.
-  int first_of_block(std::uint32_t light, int word, int bx) const {
-    auto any = static_cast<int>((light * 7 + light / 16) & 15);
+  int first_of_block(std::uint32_t light, const Region& region) const {
+    const int word = region.word, bx = region.column;
+    int any = any_of(light);
     // Of lights that have parts, another one for each block: blocks side by side, of different
     // quarters, but where they end.
     if (!lamps_ && context_.has_parts(light)) {
       any ^= (bx / 4 & 1) * 2 + (word & 1) * 8 + bx / 8 + (word & 2) * 2;
     }
     if (block_ == 4) return bit_of(bx + (any & 3), any >> 2);
-    return bit_of(bx + at_end(ends_across(word, bx), any & 3),
-                  at_end(ends_down(word, bx), any >> 2));
+    return bit_of(bx + at_end(ends_across(region), any & 3), at_end(ends_down(region), any >> 2));
   }
+  static int any_of(std::uint32_t light) { return static_cast<int>((light * 7 + light / 16) & 15); }
   // Of four pixels in a row, or a column, the one at the end; the first, if both are.
   static int at_end(unsigned ends, int any) {
     return (ends & ends_left) != 0 ? 0 : (ends & ends_right) != 0 ? 3 : any;
   }
-  unsigned ends_across(int word, int bx) const {
-    return w_.ends[static_cast<std::size_t>(word * 4 + bx / 4)] & both_ends;
-  }
+  static unsigned ends_across(const Region& region) { return region.ends & both_ends; }
   // As if the column were a row.
-  unsigned ends_down(int word, int bx) const {
-    return w_.ends[static_cast<std::size_t>(word * 4 + bx / 4)] / ends_above;
-  }
+  static unsigned ends_down(const Region& region) { return region.ends / ends_above; }
   // The same block's pixel towards the middle of the cell, for thin shadows of bright light slip
   // through where blocks' pixels are far apart; or the one at the other end.
-  int second_of_block(std::uint32_t light, int word, int bx) const {
-    const auto any = static_cast<int>((light * 7 + light / 16) & 15);
-    const int x = ends_across(word, bx) == both_ends ? 3 : outermost(3 - bx / 4, any & 3);
-    const int y = ends_down(word, bx) == both_ends ? 3 : outermost(3 - word, any >> 2);
+  static int second_of_block(std::uint32_t light, const Region& region) {
+    const int any = any_of(light), word = region.word, bx = region.column;
+    const int x = ends_across(region) == both_ends ? 3 : outermost(3 - bx / 4, any & 3);
+    const int y = ends_down(region) == both_ends ? 3 : outermost(3 - word, any >> 2);
     return bit_of(bx + x, y);
   }
-  bool asks_twice(bool compact, int word, int bx) const {
-    const bool narrow = ends_across(word, bx) == both_ends || ends_down(word, bx) == both_ends;
+  bool asks_twice(bool compact, const Region& region) const {
+    const bool narrow = ends_across(region) == both_ends || ends_down(region) == both_ends;
     return block_ < 4 && (compact || narrow);
   }
   // Of four pixels, in the first to last of four blocks.
@@ -157,26 +201,65 @@ class VisibilityFinder {
   static int offset2(std::uint32_t light) {
     return bit_of(static_cast<int>(light & 1), static_cast<int>((light >> 1) & 1));
   }
+  // The nth of some pixels, counted round.
+  static int nth_of(std::uint64_t pixels, int n) {
+    for (n %= std::popcount(pixels); n > 0; --n) pixels &= pixels - 1;
+    return std::countr_zero(pixels);
+  }
+  // Of pixels, the first or the last: the farther.
+  static int far_from(int pixel, std::uint64_t pixels) {
+    const int first = std::countr_zero(pixels), last = 63 - std::countl_zero(pixels);
+    return pixel - first > last - pixel ? first : last;
+  }
+
+  // The pixels that stand for those of a part of a block on which a light shines: one where the
+  // surface ends, another one for each light, and one far from that.
+  void test_part(std::uint32_t first, std::size_t i, const Region& region, std::uint64_t pixels) {
+    const std::uint32_t light = first + static_cast<std::uint32_t>(i);
+    const std::uint64_t at_end = pixels & region.outermost;
+    const int one = nth_of(at_end != 0 ? at_end : pixels, any_of(light));
+    test(first, i, region.word, one);
+    test(first, i, region.word, far_from(one, pixels));
+  }
+
+  // One pixel of each 2x2 of a whole block, unless one is tested.
+  void test_quads(std::uint32_t first, std::size_t i, const Region& region) {
+    const int offset = offset2(first + static_cast<std::uint32_t>(i));
+    for (const int corner : {bit_of(0, 0), bit_of(2, 0), bit_of(0, 2), bit_of(2, 2)}) {
+      const int quad = region.column + corner;
+      if ((w_.tested[i][region.word] & block2 << quad) == 0) {
+        test(first, i, region.word, quad + offset);
+      }
+    }
+    by_quads_[i][region.word] |= region.pixels;
+  }
 
   void test_first(std::uint32_t first, std::size_t i) {
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
     const bool compact = !lamps_ && context_.table->lights[light].compact != 0;
-    for (int word = 0; word < 4; ++word) {
-      const auto wi = static_cast<std::size_t>(word);
-      const std::uint64_t lit = w_.lit[i][wi];
-      std::uint64_t rest = lit;
-      if (coarse_ && !(compact && r_.mirrored)) {
-        for (int bx = 0; bx < cell_size; bx += 4) {
-          const std::uint64_t bits = block4 << bx;
-          if ((lit & w_.same4[wi] & bits) != bits) continue;
-          test(first, i, word, first_of_block(light, word, bx));
-          if (asks_twice(compact, word, bx)) {
-            test(first, i, word, second_of_block(light, word, bx));
+    CellMask rest = w_.lit[i];
+    if (coarse_) {
+      for (const Region& region : regions()) {
+        const std::uint64_t pixels = rest[region.word] & region.pixels;
+        const bool whole = region.whole && pixels == region.pixels;
+        const bool all = compact && r_.mirrored;
+        if (whole && all && quick_) {
+          test_quads(first, i, region);
+        } else if (whole && !all) {
+          test(first, i, region.word, first_of_block(light, region));
+          if (asks_twice(compact, region)) {
+            test(first, i, region.word, second_of_block(light, region));
           }
-          rest &= ~bits;
+        } else if (!compact && !has_parts(first, i) && std::popcount(pixels) > few) {
+          test_part(first, i, region, pixels);
+        } else {
+          continue;
         }
+        rest[region.word] &= ~pixels;
       }
-      test_pixels(first, i, word, rest);
+    }
+    for (int word = 0; word < 4; ++word) {
+      test_pixels(first, i, word, rest[static_cast<std::size_t>(word)]);
     }
   }
 
@@ -214,13 +297,9 @@ class VisibilityFinder {
       });
       if (!beside) continue;
       const std::uint32_t light_number = first + static_cast<std::uint32_t>(i);
-      for (int word = 0; word < 4; ++word) {
-        const auto wi = static_cast<std::size_t>(word);
-        for (int bx = 0; bx < cell_size; bx += 4) {
-          const std::uint64_t bits = block4 << bx;
-          if ((w_.lit[i][wi] & w_.same4[wi] & bits) != bits) continue;
-          test(first, i, word, opposite(first_of_block(light_number, word, bx), bx));
-        }
+      for (const Region& region : regions()) {
+        if (!region.whole || (w_.lit[i][region.word] & region.pixels) != region.pixels) continue;
+        test(first, i, region.word, opposite(first_of_block(light_number, region), region.column));
       }
     }
     shoot_rest(first);
@@ -262,44 +341,71 @@ class VisibilityFinder {
     if (w_.rays == stream_rays) shoot_rest(first);
   }
 
-  // Where what was tested of a block disagrees in itself or with the blocks around it, looks
-  // closer.
+  // Where what was tested of a region disagrees in itself or with those of its surface around it,
+  // looks closer.
   void refine(std::uint32_t first, std::size_t i) {
     if (!coarse_) return;
-    // 4 x 4 flags of blocks: bit by * 4 + bx.
-    unsigned whole = 0, sees = 0, hidden = 0, tinted = 0;
-    for (int by = 0; by < 4; ++by) {
-      const auto wi = static_cast<std::size_t>(by);
-      for (int bx = 0; bx < 4; ++bx) {
-        const std::uint64_t bits = block4 << (4 * bx);
-        if ((w_.lit[i][wi] & w_.same4[wi] & bits) == bits) whole |= 1U << (by * 4 + bx);
-        const std::uint64_t tested = w_.tested[i][wi] & bits;
-        if (w_.seen[i][wi] & tested) sees |= 1U << (by * 4 + bx);
-        if (~w_.seen[i][wi] & tested) hidden |= 1U << (by * 4 + bx);
-        if (tinted_[i][wi] & tested) tinted |= 1U << (by * 4 + bx);
-      }
+    CellMask sees{}, hidden{}, tinted{};  // by the numbers of regions
+    std::uint64_t any_sees = 0, any_tinted = 0, any_hidden = 0;
+    for (std::size_t wi = 0; wi < 4; ++wi) {
+      any_sees |= w_.tested[i][wi] & w_.seen[i][wi];
+      any_hidden |= w_.tested[i][wi] & ~w_.seen[i][wi];
+      any_tinted |= tinted_[i][wi];
     }
-    const auto grown = [](unsigned f) {
-      const unsigned rows = f | (f << 4) | (f >> 4);
-      return (rows | ((rows & 0x7777U) << 1) | ((rows & 0xEEEEU) >> 1)) & 0xFFFFU;
-    };
-    unsigned differ = (grown(hidden) & sees) | (grown(sees) & hidden) | grown(tinted);
+    if (any_hidden == 0 && any_tinted == 0) return;
+    if (any_sees == 0) {
+      for (std::uint64_t& seen : w_.seen[i]) seen = 0;
+      return;
+    }
+    const std::span<const Region> all = regions();
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      const std::uint64_t tested = w_.tested[i][all[n].word] & all[n].pixels;
+      const std::uint64_t seen = w_.seen[i][all[n].word] & tested;
+      sees[n / 64] |= std::uint64_t{seen != 0} << (n % 64);
+      hidden[n / 64] |= std::uint64_t{seen != tested} << (n % 64);
+      tinted[n / 64] |= std::uint64_t{(tinted_[i][all[n].word] & tested) != 0} << (n % 64);
+    }
     // Penumbrae of a light that has parts are broad, and what little of them a block's one pixel
     // misses would show beside a block that is looked at more closely.
-    if (has_parts(first, i) && hidden != 0 && sees != 0) differ = 0xFFFF;
-    for (int by = 0; by < 4; ++by) {
-      const auto wi = static_cast<std::size_t>(by);
-      for (int bx = 0; bx < 4; ++bx) {
-        const unsigned flag = 1U << (by * 4 + bx);
-        if (!(whole & flag)) continue;
-        const std::uint64_t bits = block4 << (4 * bx);
-        if (!(differ & flag) || block_ == 4) {
-          if (!(sees & flag)) w_.seen[i][wi] &= ~bits;
-          continue;
-        }
-        test_pixels(first, i, by, bits);
+    const bool broad = has_parts(first, i);
+    for (std::size_t n = 0; n < all.size(); ++n) {
+      const Region& region = all[n];
+      const std::uint64_t pixels = w_.lit[i][region.word] & region.pixels;
+      if ((pixels & ~w_.tested[i][region.word]) == 0) continue;
+      const CellMask& about = broad ? region.alike : region.beside;
+      const bool differs = (in(sees, n) && meet(hidden, about)) ||
+                           (in(hidden, n) && meet(sees, about)) || meet(tinted, region.beside);
+      const bool whole = region.whole && pixels == region.pixels;
+      if (by_quads_[i][region.word] & pixels) continue;
+      if (differs && whole && quick_) {
+        test_quads(first, i, region);
+      } else if (differs && !(region.whole && block_ == 4)) {
+        test_pixels(first, i, region.word, pixels);
+      } else if (!in(sees, n)) {
+        w_.seen[i][region.word] &= ~pixels;
       }
     }
+  }
+
+  // The same for 2x2 pixels of which one is tested.
+  void refine_quads(std::uint32_t first, std::size_t i) {
+    if (block_ >= 2 || none(by_quads_[i])) return;
+    CellMask seen, hidden;
+    for (std::size_t wi = 0; wi < 4; ++wi) {
+      seen[wi] = w_.tested[i][wi] & w_.seen[i][wi];
+      hidden[wi] = w_.tested[i][wi] & ~w_.seen[i][wi];
+    }
+    const Quads sees = quads_of(seen), hides = quads_of(hidden), dims = quads_of(tinted_[i]);
+    const Quads differ = (grown(hides) & sees) | (grown(sees) & hides) | grown(dims);
+    if (differ == 0) return;
+    const CellMask closer = pixels_of(differ);
+    for (int word = 0; word < 4; ++word) {
+      const auto wi = static_cast<std::size_t>(word);
+      test_pixels(first, i, word, closer[wi] & by_quads_[i][wi]);
+    }
+  }
+  static bool meet(const CellMask& a, const CellMask& b) {
+    return ((a[0] & b[0]) | (a[1] & b[1]) | (a[2] & b[2]) | (a[3] & b[3])) != 0;
   }
 
   // Tells what is hidden, or tinted, by something near, where not all of the cell agrees.
@@ -334,9 +440,9 @@ class VisibilityFinder {
 
   // Gives a 2x2 block's answer to its four pixels.
   void spread(std::size_t i) {
-    if (block_ < 2) return;
+    if (block_ < 2 && none(by_quads_[i])) return;
     for (std::size_t wi = 0; wi < 4; ++wi) {
-      const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
+      const std::uint64_t smooth = block_ < 2 ? by_quads_[i][wi] : w_.lit[i][wi] & w_.same2[wi];
       std::uint64_t left = smooth & w_.tested[i][wi] & ~w_.seen[i][wi];
       for (; left != 0; left &= left - 1) {
         const int k = std::countr_zero(left);
@@ -357,7 +463,11 @@ class VisibilityFinder {
   bool lamps_;
   int block_ = context_.effort->interleave;
   bool coarse_ = context_.effort->adaptive_visibility || block_ == 4;
+  // Where no light is looked for in parts, as while things move, 4x4 pixels are looked at more
+  // closely by one of each 2x2 first.
+  bool quick_ = context_.parts == nullptr && block_ < 4;
   std::array<CellMask, GatherWorkspace::group> tinted_{};
+  std::array<CellMask, GatherWorkspace::group> by_quads_{};  // pixels of which each 2x2 is tested
 };
 
 }  // namespace render

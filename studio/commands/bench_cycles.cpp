@@ -192,17 +192,22 @@ std::vector<NamedEffort> efforts() {
   std::vector<NamedEffort> all;
   for (const int lights : {16, 24, 64}) {
     for (const int interleave : {2, 1}) {
-      render::Effort e;
-      e.light_samples = lights;
-      e.interleave = interleave;
-      const auto add = [&](int rays, float contrast, const char* where) {
-        e.aa_samples = rays;
-        e.aa_tolerance = e.glint_contrast = contrast;
-        all.push_back({fmt::format("{} lights, interleaved {}, {}", lights, interleave, where), e});
-      };
-      add(1, 0, "1 ray");
-      add(4, 0, "4 at edges");
-      add(4, 0.3F, "4 at glints too");
+      for (const bool soft : {false, true}) {
+        render::Effort e;
+        e.light_samples = lights;
+        e.interleave = interleave;
+        e.soft_lights = soft;
+        const auto add = [&](int rays, float contrast, const char* where) {
+          e.aa_samples = rays;
+          e.aa_tolerance = e.glint_contrast = contrast;
+          all.push_back({fmt::format("{} {} lights, interleaved {}, {}", lights,
+                                     soft ? "soft" : "hard", interleave, where),
+                         e});
+        };
+        add(1, 0, "1 ray");
+        add(4, 0, "4 at edges");
+        add(4, 0.3F, "4 at glints too");
+      }
     }
   }
   all.push_back({"default", {}});
@@ -286,19 +291,19 @@ Json compare(const std::string& name, const CyclesBench& bench, Console& console
                               material, 100 * there.share, there.mean, there.rms));
     }
   }
-  console.say(fmt::format("  {:<36} {:>10} {:>10} {:>8} {:>10}", "Cycles", "CPU ms", "wall ms",
+  console.say(fmt::format("  {:<44} {:>10} {:>10} {:>8} {:>10}", "Cycles", "CPU ms", "wall ms",
                           "RMSE", "to ours"));
   for (const Point& p : their_points) {
-    console.say(fmt::format("  {:<36} {:>10.0f} {:>10.0f} {:>8.4f} {:>10.4f}", p.name, p.cpu_ms,
+    console.say(fmt::format("  {:<44} {:>10.0f} {:>10.0f} {:>8.4f} {:>10.4f}", p.name, p.cpu_ms,
                             p.wall_ms, p.error, p.error_to_other));
   }
-  console.say(fmt::format("  {:<36} {:>10} {:>10} {:>8} {:>10} {:>8}", "Platelight", "CPU ms",
+  console.say(fmt::format("  {:<44} {:>10} {:>10} {:>8} {:>10} {:>8}", "Platelight", "CPU ms",
                           "wall ms", "RMSE", "to theirs", "faster"));
   Json ours = Json::array();
   for (const Point& p : our_points) {
     const auto [cycles_ms, at_least] = time_at(their_points, p.error);
     const double faster = cycles_ms / p.cpu_ms;
-    console.say(fmt::format("  {:<36} {:>10.0f} {:>10.0f} {:>8.4f} {:>10.4f} {:>2}{:>5.0f}x",
+    console.say(fmt::format("  {:<44} {:>10.0f} {:>10.0f} {:>8.4f} {:>10.4f} {:>2}{:>5.0f}x",
                             p.name, p.cpu_ms, p.wall_ms, p.error, p.error_to_other,
                             at_least ? ">" : "", faster));
     ours.push_back(json_of(p));

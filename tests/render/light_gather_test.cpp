@@ -11,6 +11,7 @@
 #include "plain_shapes.h"
 #include "render/shadow_stream.h"
 #include "render/trace.h"
+#include "render/visibility_finder.h"
 
 namespace render {
 namespace {
@@ -144,6 +145,81 @@ TEST_F(LightGather, OfACellIsThatOfEveryPixelsOwnRays) {
                         receivers_->mask[tint.centre]);
       const Vec3f apart = passes - (Vec3f{1, 1, 1} - tint.lost_share);
       EXPECT_LT(length(apart), 1e-6F) << tint.light << ' ' << tint.centre;
+    }
+  }
+}
+
+TEST_F(LightGather, OfTwoSurfacesThatMeetTakesFewRays) {
+  // A wall stands on a floor, slanting through the cell, and a box hangs before both.
+  Receivers& r = *receivers_;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const auto x = static_cast<float>(k % cell_size), y = static_cast<float>(k / cell_size);
+    const float from_wall = y - 5.3F - 0.4F * x;  // in pixels
+    const bool floor = from_wall > 0;
+    const Vec3f n = floor ? Vec3f{0, 0, 1} : Vec3f{0, -1, 0};
+    r.px[k] = 0.1F * x - 0.8F;
+    r.py[k] = floor ? -0.1F * from_wall : -1e-3F;
+    r.pz[k] = floor ? 1e-3F : -0.1F * from_wall;
+    r.nx[k] = r.gx[k] = n.x, r.ny[k] = r.gy[k] = n.y, r.nz[k] = r.gz[k] = n.z;
+    r.surface[k] = floor;
+    r.share[k] = 1;
+  }
+  r.active = {~0ULL, ~0ULL, ~0ULL, ~0ULL};
+  const Scene scene(make_scene(make_box({-0.5F, -1.2F, 0.8F}, {0.3F, -0.3F, 1.1F}), {}));
+  workspace_->tints.reserve(GatherWorkspace::group * cell_pixels);
+  const auto gather = [&](bool adaptive) {
+    effort_.adaptive_visibility = adaptive;
+    statistics_ = {};
+    CellVisibility visibility;
+    gather_cell(context(scene), r, *workspace_, visibility, statistics_);
+    return visibility;
+  };
+  const CellVisibility all = gather(false);
+  const std::uint64_t all_rays = statistics_.shadow_rays;
+  const CellVisibility few = gather(true);
+  EXPECT_LT(statistics_.shadow_rays, all_rays / 2);
+  std::size_t lit = 0, hidden = 0, wrong = 0;
+  for (std::size_t i = 0; i < table_.lights.size(); ++i) {
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      ASSERT_EQ(in(few.lit[i], k), in(all.lit[i], k));
+      if (!in(all.lit[i], k)) continue;
+      const bool differs = in(few.seen[i], k) != in(all.seen[i], k);
+      ++lit, hidden += !in(all.seen[i], k), wrong += differs;
+    }
+  }
+  EXPECT_GT(hidden, lit / 20);
+  EXPECT_LT(wrong, lit / 200);
+}
+
+TEST_F(LightGather, KnowsThe2x2BlocksOfPixels) {
+  for (int i = 0; i < 200; ++i) {
+    CellMask pixels{};
+    for (int n = i; n >= 0; --n) {
+      const std::size_t k = random_() % cell_pixels;
+      pixels[k / 64] |= std::uint64_t{1} << (k % 64);
+    }
+    const Quads quads = quads_of(pixels), about = grown(quads);
+    const CellMask whole = pixels_of(quads);
+    for (int y = 0; y < 8; ++y) {
+      for (int x = 0; x < 8; ++x) {
+        const auto any_at = [&pixels](int column, int row) {
+          bool any = false;
+          for (int k = 0; k < 4 && column >= 0 && column < 8 && row >= 0 && row < 8; ++k) {
+            any = any || in(pixels, static_cast<std::size_t>((2 * row + k / 2) * cell_size +
+                                                             2 * column + k % 2));
+          }
+          return any;
+        };
+        bool near = false;
+        for (int k = 0; k < 9; ++k) near = near || any_at(x + k % 3 - 1, y + k / 3 - 1);
+        ASSERT_EQ(quads >> (8 * y + x) & 1, any_at(x, y) ? 1U : 0U);
+        ASSERT_EQ(about >> (8 * y + x) & 1, near ? 1U : 0U);
+        for (int k = 0; k < 4; ++k) {
+          ASSERT_EQ(
+              in(whole, static_cast<std::size_t>((2 * y + k / 2) * cell_size + 2 * x + k % 2)),
+              any_at(x, y));
+        }
+      }
     }
   }
 }
