@@ -9,6 +9,7 @@
 
 #include "render/embree_context.h"
 #include "render/kept_transport.h"
+#include "render/lanes.h"
 #include "render/refinement.h"
 #include "render/standard.h"
 #include "render/trace.h"
@@ -152,24 +153,61 @@ void CellBaker::set_camera_ray(int index, Vec3f v) {
   stream_.mask[i] = seen ? mask_virtual | mask_stand_in : 0U;
 }
 
+// Eight rays of the stream, from the lens's directions that stand there, as set_camera_ray.
+void CellBaker::set_camera_rays(std::size_t first) {
+  const auto& m = frame_->set_from_cam;
+  RayStream& s = stream_;
+  const Eight x = load_eight(&s.dx[first]), y = load_eight(&s.dy[first]),
+              z = load_eight(&s.dz[first]);
+  const Eight dx = m[0] * x + m[1] * y + m[2] * z, dy = m[3] * x + m[4] * y + m[5] * z,
+              dz = m[6] * x + m[7] * y + m[8] * z;
+  const Eight l = dx * dx + dy * dy + dz * dz, by = 1 / root(l);
+  const auto seen = l > 0.25F;
+  store_eight(&s.dx[first], seen ? dx * by : Eight{});
+  store_eight(&s.dy[first], seen ? dy * by : Eight{});
+  store_eight(&s.dz[first], seen ? dz * by : eight_of(1));
+  const unsigned bits = bits_of(seen);
+  for (std::size_t i = 0; i < 8; ++i) {
+    s.ox[first + i] = frame_->camera.x, s.oy[first + i] = frame_->camera.y,
+                 s.oz[first + i] = frame_->camera.z;
+    s.near_m[first + i] = 0;
+    s.mask[first + i] = (bits >> i & 1) != 0 ? mask_virtual | mask_stand_in : 0U;
+  }
+}
+
 void CellBaker::trace_centres() {
   const auto& table = *frame_->inputs.directions;
+  RayStream& s = stream_;
   inside_ = {};
   // 4x4 blocks one after the other: coherent for Embree, and each stream is exactly one cell.
-  for (int i = 0; i < cell_pixels; ++i) {
-    const auto [x, y] = pixel_of_ray(i);
-    const bool in = transport_->blocks.has_ray(x, y);
-    if (in) {
+  for (std::size_t i = 0; i < cell_pixels; i += 4) {
+    const auto [x, y] = pixel_of_ray(static_cast<int>(i));
+    unsigned in = 0;
+    for (int k = 0; k < 4; ++k)
+      in |= static_cast<unsigned>(transport_->blocks.has_ray(x + k, y)) << k;
+    if (in == 0xF) {
       const std::size_t t = table.index(y0_ + y, x0_ + x);
-      set_camera_ray(i, {table.x[t], table.y[t], table.z[t]});
-      inside_[static_cast<std::size_t>(y / 4)] |= std::uint64_t{1} << ((y & 3) * 16 + x);
+      std::copy_n(&table.x[t], 4, &s.dx[i]);
+      std::copy_n(&table.y[t], 4, &s.dy[i]);
+      std::copy_n(&table.z[t], 4, &s.dz[i]);
     } else {
-      set_camera_ray(i, {});
+      for (int k = 0; k < 4; ++k) {
+        const std::size_t t = table.index(y0_ + y, x0_ + x + k),
+                          at = i + static_cast<std::size_t>(k);
+        const bool any = (in >> k & 1) != 0;
+        s.dx[at] = any ? table.x[t] : 0;
+        s.dy[at] = any ? table.y[t] : 0;
+        s.dz[at] = any ? table.z[t] : 0;
+      }
     }
-    statistics_->primary_rays += in;
-    if (counting_ && stream_.mask[static_cast<std::size_t>(i)]) {
-      ++counting_[static_cast<std::size_t>(y * cell_size + x)].rays;
-    }
+    inside_[static_cast<std::size_t>(y / 4)] |= std::uint64_t{in} << ((y & 3) * 16 + x);
+    statistics_->primary_rays += static_cast<unsigned>(std::popcount(in));
+    if (i % 8 != 0) set_camera_rays(i - 4);
+  }
+  for (std::size_t i = 0; counting_ && i < cell_pixels; ++i) {
+    if (s.mask[i] == 0) continue;
+    const auto [x, y] = pixel_of_ray(static_cast<int>(i));
+    ++counting_[static_cast<std::size_t>(y * cell_size + x)].rays;
   }
   trace(cell_pixels, true, RayKind::camera, frame_->pixel_angle * static_cast<float>(block_));
 }
@@ -198,7 +236,7 @@ void CellBaker::set_camera_cone(ShadePoint& p, int index, float width_rad) const
   const Vec3f right{m[0], m[3], m[6]};
   const Vec3f a = normalize(right - p.incoming * dot(right, p.incoming));
   const float far_m = stream_.far_m[static_cast<std::size_t>(index)];
-  arrive(p, {}, {a * width_rad, cross(p.incoming, a) * width_rad}, far_m);
+  arrive_round(p, {a * width_rad, cross(p.incoming, a) * width_rad}, width_rad, far_m);
 }
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.

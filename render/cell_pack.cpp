@@ -60,6 +60,7 @@ void join_into(EnvironmentTerm& to, const EnvironmentTerm& from) {
 // more than a million; those of a slot come in any order.
 template <class Term>
 void sort_by_slot(std::vector<Term>& terms) {
+  if (terms.empty()) return;  // as most lists are where one ray a pixel meets dull things
   std::array<std::uint32_t, slots + 1> first{};
   for (const Term& term : terms) ++first[term.slot + 1U];
   std::partial_sum(first.begin(), first.end(), first.begin());

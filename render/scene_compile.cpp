@@ -188,13 +188,12 @@ void Scene::Impl::assemble(const Impl* before) {
     const MeshTree* tree = trees[instance.mesh].get();
     if (tree) add_instance(i, tree->scene);
     facets.emplace_back();
-    if (!instance.moves) continue;
-    if (!mesh->rest && mesh->triangles.size() <= most_facets &&
-        !c.pictures_of_mesh[instance.mesh].empty()) {
+    if (!mesh->rest && mesh->triangles.size() <= most_facets) {
       for (std::uint32_t t = 0; t < mesh->triangles.size(); ++t) {
         facets[i].push_back(facet_of(*mesh, mesh->positions.data(), t, &instance.set_from_object));
       }
     }
+    if (!instance.moves) continue;
     normal_matrices[i] = normal_matrix(instance.set_from_object);
     const Bounds own =
         mesh->rest ? (tree ? tree->bounds : no_bounds) : c.mesh_bounds[instance.mesh];

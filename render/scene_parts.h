@@ -205,7 +205,8 @@ struct Scene::Impl {
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds, blocker_bounds = no_bounds;
   std::vector<Bounds> blocker_boxes;
   std::size_t skipped = 0;
-  // Per instance: of the few triangles of a billboard, which most of its rays only pass.
+  // Per instance: of few triangles, as of a floor, or a billboard, which most of its rays only
+  // pass.
   std::vector<std::vector<Facet>> facets;
 
   ~Impl() {

@@ -1,6 +1,12 @@
 // Which pixels of a cell see which light.
 #include "render/visibility_finder.h"
 
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+
+#include "render/lanes.h"
+
 namespace render {
 
 bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b) {
@@ -13,27 +19,69 @@ namespace {
 constexpr std::size_t side = 4;  // of a block
 using Region = GatherWorkspace::Region;
 
-// Sides on which the surface of a whole block ends.
-std::uint8_t find_ends(const Receivers& r, std::size_t bx, std::size_t by) {
-  const std::size_t corner = by * cell_size + bx;
-  // Along a side, from a corner on by `step`: whether it goes on at pixels that are `across`
-  // away.
-  const auto goes_on = [&](std::size_t from, std::size_t step, std::size_t across) {
-    for (std::size_t i = 0; i < side; ++i) {
-      const std::size_t k = from + i * step, beside = k + across;
-      if (!in(r.active, beside) || !is_one_surface(r, k, beside)) return false;
+std::uint64_t bit_at(std::size_t k) { return std::uint64_t{1} << (k % 64); }
+
+// Pixels of one surface with the next one to the right, below, and diagonally below.
+struct AlikePixels {
+  CellMask right{}, below{}, diagonal{};
+
+  explicit AlikePixels(const Receivers& r) {
+    // With room behind them, for those below the last row.
+    constexpr std::size_t beyond = cell_size + 8;
+    std::array<float, cell_pixels + beyond> nx{}, ny{}, nz{};
+    std::array<std::int32_t, cell_pixels + beyond> surface{};
+    std::ranges::copy(r.nx, nx.begin()), std::ranges::copy(r.ny, ny.begin());
+    std::ranges::copy(r.nz, nz.begin());
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      surface[k] = in(r.active, k) ? static_cast<std::int32_t>(r.surface[k]) : -1;
     }
-    return true;
+    using Numbers = std::int32_t __attribute__((vector_size(32)));
+    const auto numbers = [&surface](std::size_t k) {
+      Numbers v;
+      std::memcpy(&v, &surface[k], sizeof v);
+      return v;
+    };
+    for (std::size_t k = 0; k < cell_pixels; k += 8) {
+      const Eight x = load_eight(&nx[k]), y = load_eight(&ny[k]), z = load_eight(&nz[k]);
+      const Numbers here = numbers(k);
+      const auto alike = [&](std::size_t to) {
+        const Eight cosine =
+            x * load_eight(&nx[k + to]) + y * load_eight(&ny[k + to]) + z * load_eight(&nz[k + to]);
+        return std::uint64_t{
+                   bits_of((here >= 0) & (here == numbers(k + to)) & (cosine > alike_normals))}
+               << (k % 64);
+      };
+      right[k / 64] |= alike(1), below[k / 64] |= alike(cell_size);
+      diagonal[k / 64] |= alike(cell_size + 1);
+    }
+    constexpr std::uint64_t last_column = 0x8000800080008000ULL, last_row = 0xFFFFULL << 48;
+    for (std::size_t word = 0; word < 4; ++word) {
+      right[word] &= ~last_column, diagonal[word] &= ~last_column;
+    }
+    below[3] &= ~last_row, diagonal[3] &= ~last_row;
+  }
+
+  // Those that are of one surface with the one to the left, and above.
+  std::uint64_t left_of(std::size_t word) const { return right[word] << 1; }
+  std::uint64_t above_of(std::size_t word) const {
+    return below[word] << cell_size | (word > 0 ? below[word - 1] >> 48 : 0);
+  }
+  // Those beside which there is another surface, or the end of the cell.
+  std::uint64_t outermost(std::size_t word) const {
+    return ~(right[word] & left_of(word) & below[word] & above_of(word));
+  }
+};
+
+// Sides on which the surface of a whole block ends.
+std::uint8_t find_ends(const AlikePixels& alike, std::size_t word, std::size_t bx) {
+  constexpr std::uint64_t column = 0x0001000100010001ULL, row = 0xF;
+  const auto ends = [bx](std::uint64_t goes_on, std::uint64_t edge, unsigned which) {
+    return (goes_on & edge << bx) == edge << bx ? 0U : which;
   };
-  constexpr auto back = [](std::size_t step) { return ~step + 1; };
-  const std::size_t last_column = corner + side - 1;
-  const std::size_t last_row = corner + (side - 1) * cell_size;
-  const bool left = bx > 0 && goes_on(corner, cell_size, back(1));
-  const bool right = bx + side < cell_size && goes_on(last_column, cell_size, 1);
-  const bool above = by > 0 && goes_on(corner, 1, back(cell_size));
-  const bool below = by + side < cell_size && goes_on(last_row, 1, cell_size);
-  return static_cast<std::uint8_t>((left ? 0 : ends_left) | (right ? 0 : ends_right) |
-                                   (above ? 0 : ends_above) | (below ? 0 : ends_below));
+  return static_cast<std::uint8_t>(ends(alike.left_of(word), column, ends_left) |
+                                   ends(alike.right[word], column << 3, ends_right) |
+                                   ends(alike.above_of(word), row, ends_above) |
+                                   ends(alike.below[word], row << 48, ends_below));
 }
 
 bool is_smooth_block(const Receivers& r, const CellMask& same2, std::size_t bx, std::size_t by) {
@@ -53,26 +101,7 @@ bool is_flat_between(const Receivers& r, std::size_t a, std::size_t b) {
   return height * height <= steep * steep * dot(way, way);
 }
 
-std::uint64_t bit_at(std::size_t k) { return std::uint64_t{1} << (k % 64); }
-
-// Of a region, the pixels beside which there is another surface, or the end of the cell.
-std::uint64_t find_outermost(const Receivers& r, const Region& region) {
-  std::uint64_t outermost = 0;
-  for (std::uint64_t left = region.pixels; left != 0; left &= left - 1) {
-    const std::size_t k = region.word * 64U + static_cast<std::size_t>(std::countr_zero(left));
-    const std::size_t x = k % cell_size, y = k / cell_size;
-    const auto goes_on = [&](bool inside, std::size_t beside) {
-      return inside && in(r.active, beside) && is_one_surface(r, k, beside);
-    };
-    if (!goes_on(x > 0, k - 1) || !goes_on(x + 1 < cell_size, k + 1) ||
-        !goes_on(y > 0, k - cell_size) || !goes_on(y + 1 < cell_size, k + cell_size)) {
-      outermost |= bit_at(k);
-    }
-  }
-  return outermost;
-}
-
-void find_regions(const Receivers& r, GatherWorkspace& w) {
+void find_regions(const Receivers& r, const AlikePixels& alike, GatherWorkspace& w) {
   w.region_count = 0;
   for (std::size_t by = 0; by < cell_size; by += side) {
     for (std::size_t bx = 0; bx < cell_size; bx += side) {
@@ -81,16 +110,16 @@ void find_regions(const Receivers& r, GatherWorkspace& w) {
       const bool whole = is_smooth_block(r, w.same2, bx, by);
       while (left != 0) {
         Region& region = w.regions[w.region_count++];
-        region.word = static_cast<std::uint8_t>(word),
+        region.word = static_cast<std::uint8_t>(word);
         region.column = static_cast<std::uint8_t>(bx);
         region.whole = whole;
         if (whole) {
           region.pixels = left;
           region.outermost = 0;
-          region.ends = find_ends(r, bx, by);
+          region.ends = find_ends(alike, word, bx);
         } else {
           const std::size_t first = word * 64 + static_cast<std::size_t>(std::countr_zero(left));
-          region.pixels = 0;
+          region.pixels = bit_at(first);  // even if its normal is none
           for (std::uint64_t others = left; others != 0; others &= others - 1) {
             const std::size_t k = word * 64 + static_cast<std::size_t>(std::countr_zero(others));
             if (is_one_surface(r, first, k) && is_flat_between(r, first, k)) {
@@ -98,7 +127,7 @@ void find_regions(const Receivers& r, GatherWorkspace& w) {
             }
           }
           region.ends = 0;
-          region.outermost = find_outermost(r, region);
+          region.outermost = region.pixels & alike.outermost(word);
         }
         left &= ~region.pixels;
       }
@@ -128,19 +157,14 @@ void find_neighbours(const Receivers& r, GatherWorkspace& w) {
 }  // namespace
 
 void find_smooth_blocks(const Receivers& r, GatherWorkspace& w) {
-  const auto alike = [&r](std::size_t a, std::size_t b) { return is_one_surface(r, a, b); };
-  w.same2 = {};
-  for (int by = 0; by < cell_size; by += 2) {
-    for (int bx = 0; bx < cell_size; bx += 2) {
-      const auto k = static_cast<std::size_t>(by * cell_size + bx);
-      const std::uint64_t bits = block2 << bit_of(bx, by);
-      if ((r.active[k / 64] & bits) != bits) continue;
-      if (alike(k, k + 1) && alike(k, k + cell_size) && alike(k, k + cell_size + 1)) {
-        w.same2[k / 64] |= bits;
-      }
-    }
+  constexpr std::uint64_t corners = 0x0000555500005555ULL;  // top left, of 2x2 blocks
+  const AlikePixels alike(r);
+  for (std::size_t word = 0; word < 4; ++word) {
+    std::uint64_t same = alike.right[word] & alike.below[word] & alike.diagonal[word] & corners;
+    same |= same << 1;
+    w.same2[word] = same | same << cell_size;
   }
-  find_regions(r, w);
+  find_regions(r, alike, w);
   find_neighbours(r, w);
 }
 

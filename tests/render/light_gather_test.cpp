@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <random>
 #include <vector>
@@ -189,6 +190,29 @@ TEST_F(LightGather, OfTwoSurfacesThatMeetTakesFewRays) {
   }
   EXPECT_GT(hidden, lit / 20);
   EXPECT_LT(wrong, lit / 200);
+}
+
+TEST_F(LightGather, EndsWherePixelsHaveNoNormalOrPlace) {
+  // What only mirrors has no normal for dull light.
+  Receivers& r = *receivers_;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    r.surface[k] = k % 3 == 0;
+    if (k % 5 == 0) r.nx[k] = r.ny[k] = r.nz[k] = 0;
+    if (k % 7 == 0) r.px[k] = r.ny[k] = std::numeric_limits<float>::quiet_NaN();
+  }
+  effort_.adaptive_visibility = true;
+  const Scene scene(things(false));
+  CellVisibility visibility;
+  gather_cell(context(scene), r, *workspace_, visibility, statistics_);
+  std::uint64_t pixels[4]{};
+  std::size_t all = 0;
+  for (std::size_t i = 0; i < workspace_->region_count; ++i) {
+    const GatherWorkspace::Region& region = workspace_->regions[i];
+    EXPECT_EQ(pixels[region.word] & region.pixels, 0U) << "each pixel is in one";
+    pixels[region.word] |= region.pixels, all += region.pixels != 0;
+  }
+  EXPECT_EQ(all, workspace_->region_count);
+  for (std::size_t word = 0; word < 4; ++word) EXPECT_EQ(pixels[word], r.active[word]);
 }
 
 TEST_F(LightGather, KnowsThe2x2BlocksOfPixels) {
