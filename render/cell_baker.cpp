@@ -138,75 +138,57 @@ void CellBaker::trace(int count, bool coherent, RayKind kind, float cone_rad) {
                                    static_cast<std::size_t>(count));
 }
 
+// Where the lens looks in its own frame: zero where it sees nothing.
 void CellBaker::set_camera_ray(int index, Vec3f v) {
   const auto i = static_cast<std::size_t>(index);
-  const auto& m = frame_->set_from_cam;
-  const Vec3f d{m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
-                m[6] * v.x + m[7] * v.y + m[8] * v.z};
-  const float l = dot(d, d);
-  const bool seen = l > 0.25F;  // zero where the lens sees nothing
-  const Vec3f unit = seen ? d * (1 / std::sqrt(l)) : Vec3f{0, 0, 1};
-  stream_.ox[i] = frame_->camera.x, stream_.oy[i] = frame_->camera.y,
-  stream_.oz[i] = frame_->camera.z;
-  stream_.dx[i] = unit.x, stream_.dy[i] = unit.y, stream_.dz[i] = unit.z;
-  stream_.near_m[i] = 0;
-  stream_.mask[i] = seen ? mask_virtual | mask_stand_in : 0U;
+  stream_.dx[i] = v.x, stream_.dy[i] = v.y, stream_.dz[i] = v.z;
 }
 
-// Eight rays of the stream, from the lens's directions that stand there, as set_camera_ray.
-void CellBaker::set_camera_rays(std::size_t first) {
+// Turns the first `count` of these into rays of the set, eight at a time.
+void CellBaker::turn_camera_rays(int count) {
   const auto& m = frame_->set_from_cam;
   RayStream& s = stream_;
-  const Eight x = load_eight(&s.dx[first]), y = load_eight(&s.dy[first]),
-              z = load_eight(&s.dz[first]);
-  const Eight dx = m[0] * x + m[1] * y + m[2] * z, dy = m[3] * x + m[4] * y + m[5] * z,
-              dz = m[6] * x + m[7] * y + m[8] * z;
-  const Eight l = dx * dx + dy * dy + dz * dz, by = 1 / root(l);
-  const auto seen = l > 0.25F;
-  store_eight(&s.dx[first], seen ? dx * by : Eight{});
-  store_eight(&s.dy[first], seen ? dy * by : Eight{});
-  store_eight(&s.dz[first], seen ? dz * by : eight_of(1));
-  const unsigned bits = bits_of(seen);
-  for (std::size_t i = 0; i < 8; ++i) {
-    s.ox[first + i] = frame_->camera.x, s.oy[first + i] = frame_->camera.y,
-                 s.oz[first + i] = frame_->camera.z;
-    s.near_m[first + i] = 0;
-    s.mask[first + i] = (bits >> i & 1) != 0 ? mask_virtual | mask_stand_in : 0U;
+  for (std::size_t first = 0; first < static_cast<std::size_t>(count); first += 8) {
+    const Eight x = load_eight(&s.dx[first]), y = load_eight(&s.dy[first]),
+                z = load_eight(&s.dz[first]);
+    const Eight dx = m[0] * x + m[1] * y + m[2] * z, dy = m[3] * x + m[4] * y + m[5] * z,
+                dz = m[6] * x + m[7] * y + m[8] * z;
+    const Eight l = dx * dx + dy * dy + dz * dz, by = 1 / root(l);
+    const auto seen = l > 0.25F;
+    store_eight(&s.dx[first], seen ? dx * by : Eight{});
+    store_eight(&s.dy[first], seen ? dy * by : Eight{});
+    store_eight(&s.dz[first], seen ? dz * by : eight_of(1));
+    const unsigned bits = bits_of(seen);
+    for (std::size_t i = 0; i < 8; ++i) {
+      s.mask[first + i] = (bits >> i & 1) != 0 ? mask_virtual | mask_stand_in : 0U;
+    }
   }
+  std::fill_n(s.ox.begin(), count, frame_->camera.x);
+  std::fill_n(s.oy.begin(), count, frame_->camera.y);
+  std::fill_n(s.oz.begin(), count, frame_->camera.z);
+  std::fill_n(s.near_m.begin(), count, 0.0F);
 }
 
 void CellBaker::trace_centres() {
   const auto& table = *frame_->inputs.directions;
-  RayStream& s = stream_;
   inside_ = {};
   // 4x4 blocks one after the other: coherent for Embree, and each stream is exactly one cell.
-  for (std::size_t i = 0; i < cell_pixels; i += 4) {
-    const auto [x, y] = pixel_of_ray(static_cast<int>(i));
-    unsigned in = 0;
-    for (int k = 0; k < 4; ++k)
-      in |= static_cast<unsigned>(transport_->blocks.has_ray(x + k, y)) << k;
-    if (in == 0xF) {
+  for (int i = 0; i < cell_pixels; ++i) {
+    const auto [x, y] = pixel_of_ray(i);
+    const bool in = transport_->blocks.has_ray(x, y);
+    if (in) {
       const std::size_t t = table.index(y0_ + y, x0_ + x);
-      std::copy_n(&table.x[t], 4, &s.dx[i]);
-      std::copy_n(&table.y[t], 4, &s.dy[i]);
-      std::copy_n(&table.z[t], 4, &s.dz[i]);
+      set_camera_ray(i, {table.x[t], table.y[t], table.z[t]});
+      inside_[static_cast<std::size_t>(y / 4)] |= std::uint64_t{1} << ((y & 3) * 16 + x);
     } else {
-      for (int k = 0; k < 4; ++k) {
-        const std::size_t t = table.index(y0_ + y, x0_ + x + k),
-                          at = i + static_cast<std::size_t>(k);
-        const bool any = (in >> k & 1) != 0;
-        s.dx[at] = any ? table.x[t] : 0;
-        s.dy[at] = any ? table.y[t] : 0;
-        s.dz[at] = any ? table.z[t] : 0;
-      }
+      set_camera_ray(i, {});
     }
-    inside_[static_cast<std::size_t>(y / 4)] |= std::uint64_t{in} << ((y & 3) * 16 + x);
-    statistics_->primary_rays += static_cast<unsigned>(std::popcount(in));
-    if (i % 8 != 0) set_camera_rays(i - 4);
+    statistics_->primary_rays += in;
   }
-  for (std::size_t i = 0; counting_ && i < cell_pixels; ++i) {
-    if (s.mask[i] == 0) continue;
-    const auto [x, y] = pixel_of_ray(static_cast<int>(i));
+  turn_camera_rays(cell_pixels);
+  for (int i = 0; counting_ && i < cell_pixels; ++i) {
+    if (stream_.mask[static_cast<std::size_t>(i)] == 0) continue;
+    const auto [x, y] = pixel_of_ray(i);
     ++counting_[static_cast<std::size_t>(y * cell_size + x)].rays;
   }
   trace(cell_pixels, true, RayKind::camera, frame_->pixel_angle * static_cast<float>(block_));
@@ -236,7 +218,7 @@ void CellBaker::set_camera_cone(ShadePoint& p, int index, float width_rad) const
   const Vec3f right{m[0], m[3], m[6]};
   const Vec3f a = normalize(right - p.incoming * dot(right, p.incoming));
   const float far_m = stream_.far_m[static_cast<std::size_t>(index)];
-  arrive_round(p, {a * width_rad, cross(p.incoming, a) * width_rad}, width_rad, far_m);
+  arrive(p, {}, {a * width_rad, cross(p.incoming, a) * width_rad}, far_m);
 }
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.

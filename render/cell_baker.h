@@ -169,8 +169,8 @@ class CellBaker final : public RaySink {
 
   // cell_baker.cpp
   void trace(int count, bool coherent, RayKind kind, float cone_rad);
-  void set_camera_rays(std::size_t first);
   void set_camera_ray(int i, Vec3f v_cam);
+  void turn_camera_rays(int count);
   void set_point(ShadePoint& p, int i, std::uint32_t pixel, std::uint32_t slot);
   void set_camera_cone(ShadePoint& p, int i, float width_rad) const;
   void trace_centres();

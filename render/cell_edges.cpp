@@ -78,6 +78,7 @@ void CellBaker::trace_ring() {
     const std::size_t t = in ? table.index(y0_ + y, x0_ + x) : 0;
     set_camera_ray(i, in ? Vec3f{table.x[t], table.y[t], table.z[t]} : Vec3f{});
   }
+  turn_camera_rays(around);
   trace(around, true, RayKind::camera, frame_->pixel_angle);
   for (int i = 0; i < around; ++i) {
     const auto [x, y] = pixel_around(i);
@@ -281,6 +282,7 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
 
 // The camera rays of `further_`. Cut-outs are filtered over a sample's share of the pixel's area.
 void CellBaker::trace_further(int count) {
+  turn_camera_rays(count);
   trace(count, true, RayKind::camera,
         frame_->pixel_angle / std::sqrt(static_cast<float>(samples_each_)));
   statistics_->primary_rays += static_cast<std::uint64_t>(count);

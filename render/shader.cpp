@@ -36,9 +36,6 @@ std::shared_ptr<const T> find(const Table<T>& table, std::string_view name, cons
                               "\"; there are: " + known);
 }
 
-// Seen at a slant a cone covers a longer piece of surface that way: up to this cosine.
-constexpr float flattest = 0.1F;
-
 }  // namespace
 
 void arrive(ShadePoint& p, const Spread& steps, const Spread& turns, float distance_m) {
@@ -47,19 +44,10 @@ void arrive(ShadePoint& p, const Spread& steps, const Spread& turns, float dista
     return moved - p.incoming * dot(moved, p.incoming);
   };
   p.footprint_m = std::sqrt(length(across(steps.a, turns.a)) * length(across(steps.b, turns.b)));
+  // Seen at a slant the cone covers a longer piece of surface that way.
+  constexpr float flattest = 0.1F;
   p.steps = {arrived({steps.a, turns.a}, p.hit, p.incoming, distance_m, flattest).step,
              arrived({steps.b, turns.b}, p.hit, p.incoming, distance_m, flattest).step};
-  p.turns = turns;
-}
-
-void arrive_round(ShadePoint& p, const Spread& turns, float width_rad, float distance_m) {
-  p.footprint_m = width_rad * distance_m;
-  const Vec3f along = p.incoming * (1 / std::max(-dot(p.hit.normal, p.incoming), flattest));
-  const auto arrived = [&](Vec3f turn) {
-    const Vec3f across = turn * distance_m;
-    return across + along * dot(across, p.hit.normal);
-  };
-  p.steps = {arrived(turns.a), arrived(turns.b)};
   p.turns = turns;
 }
 

@@ -85,9 +85,6 @@ struct NewRay {
 //
 // Igehy, "Tracing Ray Differentials", SIGGRAPH 1999, section 3.
 void arrive(ShadePoint& p, const Spread& steps, const Spread& turns, float distance_m);
-// The same of a round cone, `width_rad` wide, whose ray began in one point: `turns` are as long,
-// and across the ray and each other.
-void arrive_round(ShadePoint& p, const Spread& turns, float width_rad, float distance_m);
 
 // How directions change across the cone of a sample that is mirrored at a surface of unit normal
 // `normal` to the unit direction `view` that it came from. From the same paper.

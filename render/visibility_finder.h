@@ -66,7 +66,7 @@ bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b);
 inline constexpr unsigned ends_left = 1, ends_right = 2, ends_above = 4, ends_below = 8;
 inline constexpr unsigned both_ends = ends_left | ends_right;
 
-// Marks the blocks of a cell that are one smooth surface, and where that ends.
+// Finds the smooth surfaces of a cell's 4x4 blocks, where they end, and which 2x2 blocks are one.
 void find_smooth_blocks(const Receivers& r, GatherWorkspace& w);
 
 // Pixels of one light, or lamp, whose visibility must be tested: see gather_cell.
@@ -263,15 +263,19 @@ class VisibilityFinder {
     }
   }
 
-  // Whether blocks' pixels disagree.
-  bool is_mixed(std::size_t i) const {
-    std::uint64_t hidden = 0, seen = 0, tinted = 0;
+  // What was tested of a light, any bits of it.
+  struct Answers {
+    std::uint64_t seen = 0, hidden = 0, tinted = 0;
+    bool disagree() const { return (hidden != 0 && seen != 0) || tinted != 0; }
+  };
+  Answers answers(std::size_t i) const {
+    Answers all;
     for (std::size_t wi = 0; wi < 4; ++wi) {
-      hidden |= w_.tested[i][wi] & ~w_.seen[i][wi];
-      seen |= w_.tested[i][wi] & w_.seen[i][wi];
-      tinted |= tinted_[i][wi];
+      all.seen |= w_.tested[i][wi] & w_.seen[i][wi];
+      all.hidden |= w_.tested[i][wi] & ~w_.seen[i][wi];
+      all.tinted |= tinted_[i][wi];
     }
-    return (hidden != 0 && seen != 0) || tinted != 0;
+    return all;
   }
 
   // What hides a part of a light may hide a little of the one beside it in the sky, or all but a
@@ -281,14 +285,14 @@ class VisibilityFinder {
     std::array<std::uint8_t, GatherWorkspace::group> mixed;
     std::size_t any = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (!skip_[i] && has_parts(first, i) && is_mixed(i)) {
+      if (!skip_[i] && has_parts(first, i) && answers(i).disagree()) {
         mixed[any++] = static_cast<std::uint8_t>(i);
       }
     }
     if (any == 0) return;
     const auto& lights = context_.table->lights;
     for (std::size_t i = 0; i < count; ++i) {
-      if (skip_[i] || !has_parts(first, i) || is_mixed(i)) continue;
+      if (skip_[i] || !has_parts(first, i) || answers(i).disagree()) continue;
       const DirectionalLight& light = lights[first + i];
       const bool beside = std::any_of(mixed.begin(), mixed.begin() + any, [&](std::uint8_t j) {
         const DirectionalLight& other = lights[first + j];
@@ -345,18 +349,13 @@ class VisibilityFinder {
   // looks closer.
   void refine(std::uint32_t first, std::size_t i) {
     if (!coarse_) return;
-    CellMask sees{}, hidden{}, tinted{};  // by the numbers of regions
-    std::uint64_t any_sees = 0, any_tinted = 0, any_hidden = 0;
-    for (std::size_t wi = 0; wi < 4; ++wi) {
-      any_sees |= w_.tested[i][wi] & w_.seen[i][wi];
-      any_hidden |= w_.tested[i][wi] & ~w_.seen[i][wi];
-      any_tinted |= tinted_[i][wi];
-    }
-    if (any_hidden == 0 && any_tinted == 0) return;
-    if (any_sees == 0) {
-      for (std::uint64_t& seen : w_.seen[i]) seen = 0;
+    const Answers any = answers(i);
+    if (any.hidden == 0 && any.tinted == 0) return;
+    if (any.seen == 0) {
+      w_.seen[i] = {};
       return;
     }
+    CellMask sees{}, hidden{}, tinted{};  // by the numbers of regions
     const std::span<const Region> all = regions();
     for (std::size_t n = 0; n < all.size(); ++n) {
       const std::uint64_t tested = w_.tested[i][all[n].word] & all[n].pixels;
@@ -379,7 +378,7 @@ class VisibilityFinder {
       if (by_quads_[i][region.word] & pixels) continue;
       if (differs && whole && quick_) {
         test_quads(first, i, region);
-      } else if (differs && !(region.whole && block_ == 4)) {
+      } else if (differs && !(whole && block_ == 4)) {
         test_pixels(first, i, region.word, pixels);
       } else if (!in(sees, n)) {
         w_.seen[i][region.word] &= ~pixels;
@@ -410,19 +409,12 @@ class VisibilityFinder {
 
   // Tells what is hidden, or tinted, by something near, where not all of the cell agrees.
   void test_near(std::uint32_t first, std::size_t i) {
-    CellMask dimmed{};
-    std::uint64_t any_dimmed = 0, any_seen = 0, any_tinted = 0;
-    for (std::size_t wi = 0; wi < 4; ++wi) {
-      dimmed[wi] = w_.tested[i][wi] & (~w_.seen[i][wi] | tinted_[i][wi]);
-      any_dimmed |= dimmed[wi];
-      any_seen |= w_.tested[i][wi] & w_.seen[i][wi];
-      any_tinted |= tinted_[i][wi];
-    }
-    if (any_dimmed == 0 || (any_seen | any_tinted) == 0) return;
+    if (!answers(i).disagree()) return;
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
     const float radius = context_.table->lights[light].spread;
     for (std::size_t wi = 0; wi < 4; ++wi) {
-      for (std::uint64_t left = dimmed[wi]; left != 0; left &= left - 1) {
+      std::uint64_t left = w_.tested[i][wi] & (~w_.seen[i][wi] | tinted_[i][wi]);
+      for (; left != 0; left &= left - 1) {
         const auto point = wi * 64 + static_cast<std::size_t>(std::countr_zero(left));
         add_ray(w_, r_, point, light, context_.direction(r_, point, light),
                 mask_of_ray(point, light), w_.sharp_m[point] / radius);

@@ -53,28 +53,6 @@ std::optional<Ray> through_ball(const Scene& scene, Ray ray, int mirrored) {
   return ray;
 }
 
-TEST(RayCone, OfACameraArrivesAsAnyOther) {
-  std::mt19937 random(3);
-  std::uniform_real_distribution<float> any(-1, 1);
-  for (int trial = 0; trial < 200; ++trial) {
-    ShadePoint p{};
-    p.incoming = normalize(Vec3f{any(random), any(random), any(random)});
-    const Vec3f normal = normalize(Vec3f{any(random), any(random), any(random)});
-    p.hit.normal = dot(normal, p.incoming) < 0 ? normal : -normal;
-    const Vec3f a = normalize(cross(p.incoming, normal)), b = cross(p.incoming, a);
-    const float width_rad = 1e-3F * (1.5F + any(random)), far_m = 20 + 19 * any(random);
-    const Spread turns{a * width_rad, b * width_rad};
-    ShadePoint round = p;
-    arrive(p, {}, turns, far_m);
-    arrive_round(round, turns, width_rad, far_m);
-    EXPECT_NEAR(round.footprint_m, p.footprint_m, 1e-5F * p.footprint_m);
-    EXPECT_LT(length(round.steps.a - p.steps.a), 1e-4F * p.footprint_m) << trial;
-    EXPECT_LT(length(round.steps.b - p.steps.b), 1e-4F * p.footprint_m) << trial;
-    EXPECT_EQ(round.turns.a, p.turns.a);
-    EXPECT_EQ(round.turns.b, p.turns.b);
-  }
-}
-
 TEST(RayCone, IsWhatNeighbouringRaysOfABallOfGlassPartBy) {
   SceneDescription description;
   description.meshes = {make_sphere(1, 192)};
