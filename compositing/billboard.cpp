@@ -166,6 +166,7 @@ class BillboardShader final : public render::Shader {
   }
 
   bool lets_light_through(const Material&) const override { return true; }
+  bool glows_by_means() const override { return true; }
 
   std::vector<std::size_t> pictures_of(const Material& material) const override {
     return {block_of(material).picture};

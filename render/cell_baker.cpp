@@ -75,6 +75,7 @@ void CellBaker::bake(const FrameContext& frame,
   compares_further_ = effort_.aa_tolerance > 0 || counting_ != nullptr;
   samples_.fill({});
   first_.fill({});
+  own_.fill({});
   base_.fill({});
   light_.fill({});
   edge_.fill(Edge::none);
@@ -212,13 +213,34 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
   p.media.count = 0;
 }
 
-// The cone of a camera ray: round, so wide.
-void CellBaker::set_camera_cone(ShadePoint& p, int index, float width_rad) const {
+// By how much directions differ across a pixel of the picture and down it, in the camera's frame.
+std::array<Vec3f, 2> CellBaker::sides_of(int x, int y) const {
+  const auto& table = *frame_->inputs.directions;
+  const auto at = [&](std::size_t t) { return Vec3f{table.x[t], table.y[t], table.z[t]}; };
+  const std::size_t here = table.index(y, x);
+  // Half of the way from the one before to the one after, or what there is of it.
+  const auto across = [&](std::size_t before, std::size_t after) {
+    const Vec3f a = at(before), b = at(after), middle = at(here);
+    const bool has_a = a != Vec3f{}, has_b = b != Vec3f{};
+    if (has_a && has_b) return (b - a) * 0.5F;
+    return has_b ? b - middle : has_a ? middle - a : Vec3f{};
+  };
+  const auto row = static_cast<std::size_t>(table.width + 2);
+  return {across(here - 1, here + 1), across(here - row, here + row)};
+}
+
+// The cone of a camera ray, which is as wide and high as so many pixels are there.
+void CellBaker::set_camera_cone(ShadePoint& p, int index, float pixels) const {
+  const auto [right, down] = sides_of(x0_ + static_cast<int>(p.pixel) % cell_size,
+                                      y0_ + static_cast<int>(p.pixel) / cell_size);
   const auto& m = frame_->set_from_cam;
-  const Vec3f right{m[0], m[3], m[6]};
-  const Vec3f a = normalize(right - p.incoming * dot(right, p.incoming));
+  const auto turned = [&](Vec3f v) {
+    return Vec3f{m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
+                 m[6] * v.x + m[7] * v.y + m[8] * v.z} *
+           pixels;
+  };
   const float far_m = stream_.far_m[static_cast<std::size_t>(index)];
-  arrive(p, {}, {a * width_rad, cross(p.incoming, a) * width_rad}, far_m);
+  arrive(p, {}, {turned(right), turned(down)}, far_m);
 }
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.
@@ -243,13 +265,16 @@ void CellBaker::for_each_shader(int count, F&& call) {
 void CellBaker::shade_points(int count, bool grid) {
   if (count == 0) return;
   const Scene& scene = *frame_->inputs.scene;
-  const ShadeContext context{&scene.description(), &scene, scene.pictures(), scene.prepared()};
+  const ShadeContext context{&scene.description(), &scene, scene.pictures(), scene.prepared(),
+                             effort_.aa_samples > 1 ? TextureFilter::dense : TextureFilter::quick};
   lobes_.clear();
   pushing_ = nullptr;
   for_each_shader(count, [&](const Shader& shader, std::span<ShadePoint* const> group_points) {
     for (ShadePoint* p : group_points) clear_answer(*p);
     shader.shade(context, group_points, *this);
+    const bool means = compares_centres_ && shader.glows_by_means();
     for (ShadePoint* p : group_points) {
+      if (means && p->depth == 0) own_[p->slot] += p->throughput * p->radiance;
       // Around the cell, light is not asked for.
       if (!shades_ring_ || p->depth > 0) continue;
       answers_light_[static_cast<std::size_t>(p - points_.data())] =
@@ -329,7 +354,7 @@ void CellBaker::shade_centres() {
     if (stream_.geom[static_cast<std::size_t>(i)] != RTC_INVALID_GEOMETRY_ID) {
       ShadePoint& p = points_[static_cast<std::size_t>(count++)];
       set_point(p, i, pixel, pixel);
-      set_camera_cone(p, i, frame_->pixel_angle * static_cast<float>(block_));
+      set_camera_cone(p, i, static_cast<float>(block_));
     } else {
       ShadePoint& p = points_[stream_rays - ++leaving];
       set_point(p, i, pixel, pixel);

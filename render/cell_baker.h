@@ -172,7 +172,8 @@ class CellBaker final : public RaySink {
   void set_camera_ray(int i, Vec3f v_cam);
   void turn_camera_rays(int count);
   void set_point(ShadePoint& p, int i, std::uint32_t pixel, std::uint32_t slot);
-  void set_camera_cone(ShadePoint& p, int i, float width_rad) const;
+  std::array<Vec3f, 2> sides_of(int x, int y) const;
+  void set_camera_cone(ShadePoint& p, int i, float pixels) const;
   void trace_centres();
   void shade_centres();
   template <class F>
@@ -305,6 +306,7 @@ class CellBaker final : public RaySink {
   bool mirrors_across(int i) const;
   void find_edges();
   void find_glints();
+  float light_step(std::size_t a, std::size_t b) const;
   bool lit_unlike(std::size_t a, std::size_t b) const;
   void sample_edges();
   void blend_neighbours();
@@ -375,6 +377,7 @@ class CellBaker final : public RaySink {
   std::array<Light, cell_pixels> light_;  // at what the centres met
   std::array<Met, ring_pixels> met_;
   std::array<Vec3f, slots> first_;          // of `added`, what the first surface gives
+  std::array<Vec3f, slots> own_;            // and of that, means that it glows by
   std::array<Vec3f, around> mirrored_;      // of `added` at the pixels around, what it does not
   std::array<std::uint8_t, around> knows_;  // that
   std::array<std::uint8_t, stream_rays>

@@ -113,7 +113,7 @@ void CellBaker::shade_ring() {
     first_[cell_pixels + k] = {};
     ShadePoint& p = points_[static_cast<std::size_t>(count++)];
     set_point(p, i, static_cast<std::uint32_t>(pixel), static_cast<std::uint32_t>(cell_pixels + k));
-    set_camera_cone(p, i, frame_->pixel_angle);
+    set_camera_cone(p, i, 1);
   }
   if (count == 0) return;
   CellTransport& own = *transport_;
@@ -179,6 +179,26 @@ void CellBaker::find_edges() {
   }
 }
 
+// By how much the light of two neighbours differs, as eyes see it, but for what one surface's
+// textures differ by: of these, each has the mean already.
+float CellBaker::light_step(std::size_t a, std::size_t b) const {
+  const float step = step_between(samples_[a].added, samples_[b].added);
+  const float least = smooths_ ? blend_contrast_ : effort_.glint_contrast;
+  if (!(step > least) || !continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera))
+    return step;
+  const CellTransport& t = *transport_;
+  const CellTransport::Centres& c = t.centres.front();
+  const bool lit = in(t.receiving, a) && in(t.receiving, b);
+  const auto even = [&](std::size_t k, std::size_t other) {
+    Vec3f change = (own_[other] - own_[k]) * 0.5F;
+    if (lit)
+      change +=
+          (c.diffuse.at(other) - c.diffuse.at(k)) * (light_[k].arriving + light_[k].lamps) * 0.5F;
+    return samples_[k].added + change;
+  };
+  return step_between(even(a, b), even(b, a));
+}
+
 // Marks pixels whose virtual light, or the shadow that they catch, differs from a neighbour's by
 // more than the effort allows.
 void CellBaker::find_glints() {
@@ -186,7 +206,7 @@ void CellBaker::find_glints() {
   if (!(least > 0)) return;
   const auto compare = [&](std::size_t a, std::size_t b) {
     if (!is_inside(a) || !is_inside(b)) return;
-    const float step = step_between(samples_[a].added, samples_[b].added);
+    const float step = light_step(a, b);
     for (const std::size_t k : {a, b}) {
       if (step > least && !smooths_) {
         if (edge_[k] != Edge::shadow) edge_[k] = Edge::glint;
@@ -234,9 +254,10 @@ bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
       !continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera))
     return false;
   const CellTransport::Centres& c = t.centres.front();
+  const Vec3f diffuse = (c.diffuse.at(a) + c.diffuse.at(b)) * 0.5F;
   const auto shown = [&](std::size_t k, Vec3f in_doubt) {
     const Light& light = light_[k];
-    return c.diffuse.at(k) * (light.arriving + light.lamps - in_doubt) +
+    return diffuse * (light.arriving + light.lamps - in_doubt) +
            c.shadow.at(k) * passing(light.open, light.open - light.arriving) * plate_contrast;
   };
   const auto differ = [&](const std::array<Vec3f, 2>& in_doubt) {
@@ -333,7 +354,7 @@ void CellBaker::finish_further(int count) {
     ShadePoint& p =
         hit ? points_[static_cast<std::size_t>(shaded++)] : points_[stream_rays - ++leaving];
     set_point(p, i, f.pixel, static_cast<std::uint32_t>(slot));
-    if (hit) set_camera_cone(p, i, frame_->pixel_angle * finer);
+    if (hit) set_camera_cone(p, i, finer);
     if (hit && neighbour >= 0 && edge_[f.pixel] != Edge::shadow)
       lender_[static_cast<std::size_t>(shaded - 1)] = static_cast<std::int16_t>(neighbour);
     if (!hit) group_[leaving - 1] = &p;

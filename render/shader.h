@@ -17,6 +17,7 @@
 #include "render/glass.h"
 #include "render/live_picture.h"
 #include "render/scene.h"
+#include "render/texture.h"
 
 namespace render {
 
@@ -114,6 +115,7 @@ struct ShadeContext {
   const Scene* compiled = nullptr;  // for shade()
   std::span<const std::shared_ptr<const LivePicture>> pictures = {};
   std::span<const PreparedSurface> prepared = {};
+  TextureFilter texture_filter = TextureFilter::dense;
 
   // What Shader::prepare() gave for the surface, or null.
   const Prepared* prepared_for(const HitPoint& hit) const {
@@ -149,6 +151,9 @@ class Shader {
     static_cast<void>(material);
     return false;
   }
+  // Whether what a point glows by is the mean over all that its sample sees: then what neighbours
+  // differ by is no edge.
+  virtual bool glows_by_means() const { return false; }
   // What transmittance() says of shadows where it is the same anywhere on the surface, which then
   // has no holes: it is not called.
   virtual std::optional<Vec3f> shadow_everywhere(const Material& material) const {

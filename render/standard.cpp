@@ -60,11 +60,12 @@ float spread_of_normals(float l) {
 MappedNormal mapped_normal(const StandardParameters& parameters,
                            const SceneDescription& scene,
                            const HitPoint& hit,
-                           const UvFootprint& footprint) {
+                           const UvFootprint& footprint,
+                           TextureFilter filter) {
   const Texture* map = texture_at(scene, parameters.normal_texture);
   if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return {hit.normal};
   const auto in_tangents = [&](const UvFootprint& over) {
-    const auto texel = sample(*map, hit.u, hit.v, over);
+    const auto texel = sample(*map, hit.u, hit.v, over, filter);
     return Vec3f{(2 * texel[0] - 1) * parameters.normal_scale,
                  (2 * texel[1] - 1) * parameters.normal_scale, 2 * texel[2] - 1};
   };
@@ -125,12 +126,13 @@ Material make_standard_material(std::string name, const StandardParameters& para
 StandardSurface standard_surface(const StandardParameters& parameters,
                                  const SceneDescription& scene,
                                  const HitPoint& hit,
-                                 const Spread& footprint) {
+                                 const Spread& footprint,
+                                 TextureFilter filter) {
   const UvFootprint area{uv_of_step(hit, footprint.a), uv_of_step(hit, footprint.b)};
   const auto look_up = [&](std::int32_t index) -> std::array<float, 4> {
     const Texture* texture = texture_at(scene, index);
     return texture == nullptr ? std::array<float, 4>{1, 1, 1, 1}
-                              : sample(*texture, hit.u, hit.v, area);
+                              : sample(*texture, hit.u, hit.v, area, filter);
   };
   StandardSurface surface;
   const auto base = look_up(parameters.base_color_texture);
@@ -157,7 +159,7 @@ StandardSurface standard_surface(const StandardParameters& parameters,
     surface.emission = {surface.emission.x * emission[0], surface.emission.y * emission[1],
                         surface.emission.z * emission[2]};
   }
-  const MappedNormal mapped = mapped_normal(parameters, scene, hit, area);
+  const MappedNormal mapped = mapped_normal(parameters, scene, hit, area, filter);
   surface.normal = mapped.normal;
   if (mapped.rougher > 0) {
     const float alpha = surface.roughness * surface.roughness;

@@ -21,6 +21,7 @@
 #include "render/environment.h"
 #include "render/light_table.h"
 #include "render/mesh.h"
+#include "render/texture.h"
 
 namespace render {
 
@@ -78,7 +79,8 @@ struct SceneDescription;  // scene.h
 StandardSurface standard_surface(const StandardParameters& parameters,
                                  const SceneDescription& scene,
                                  const HitPoint& hit,
-                                 const Spread& footprint = {});
+                                 const Spread& footprint = {},
+                                 TextureFilter filter = TextureFilter::dense);
 // Its alpha alone, at one point, for rays that only ask whether there is a hole.
 float standard_alpha(const StandardParameters& parameters,
                      const SceneDescription& scene,

@@ -29,7 +29,8 @@ class StandardShader final : public Shader {
     for (ShadePoint* p : points) {
       const StandardParameters block = block_of(context.scene->materials[p->hit.material]);
       const Spread seen{as_wide(p->steps.a, p->blur_m), as_wide(p->steps.b, p->blur_m)};
-      const StandardSurface surface = standard_surface(block, *context.scene, p->hit, seen);
+      const StandardSurface surface =
+          standard_surface(block, *context.scene, p->hit, seen, context.texture_filter);
       const Vec3f view = -p->incoming;
       const StandardWeights weights = standard_weights(surface, view);
       constexpr float per_pi = 0.318309886F;
@@ -61,6 +62,8 @@ class StandardShader final : public Shader {
       }
     }
   }
+
+  bool glows_by_means() const override { return true; }
 
   bool lets_light_through(const Material& material) const override {
     const StandardParameters parameters = block_of(material);

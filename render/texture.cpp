@@ -149,41 +149,49 @@ float wrapped(float coordinate) {
 }
 
 template <int channels>
-std::array<float, channels> sample_levels(const Texture& texture,
-                                          float u,
-                                          float v,
-                                          const UvFootprint& footprint) {
+std::array<float, channels> sample_levels(
+    const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
   const LightTables& tables = light_tables();
   const float* alpha = tables.unit_of_code.data();
   const float* colour = texture.srgb ? tables.light_of_code.data() : alpha;
-  Level level{texture.texels.data(), texture.width, texture.height};
-  const int longer = std::max(texture.width, texture.height);
-  const int last = std::bit_width(static_cast<unsigned>(longer)) - 1;
-  const FootprintGrid grid =
-      footprint_grid(footprint, texture.width, texture.height, last, most_along_texture);
   const auto coarser = [](const Level& from) {
     return Level{from.texels + static_cast<std::size_t>(from.width) *
                                    static_cast<std::size_t>(from.height) * channels,
                  std::max(1, from.width / 2), std::max(1, from.height / 2)};
   };
-  for (int k = 0; k < grid.fine; ++k) level = coarser(level);
-  const int count = grid.count();
-  if (count == 1 && grid.fraction == 0) {
-    return sample_level<channels>(level, wrapped(u), wrapped(v), colour, alpha);
-  }
-  const Level next = coarser(level);
-  const float share = 1 / static_cast<float>(count);
+  Level level{texture.texels.data(), texture.width, texture.height};
+  const int longer = std::max(texture.width, texture.height);
+  const int last = std::bit_width(static_cast<unsigned>(longer)) - 1;
   std::array<float, channels> sum{};
   const auto add = [&](const Level& from, float at_u, float at_v, float weight) {
     const auto one = sample_level<channels>(from, at_u, at_v, colour, alpha);
     for (std::size_t c = 0; c < channels; ++c) sum[c] += weight * one[c];
   };
-  for (int i = 0; i < count; ++i) {
-    const auto [du, dv] = grid.offset(i);
-    const float at_u = wrapped(u + du), at_v = wrapped(v + dv);
-    add(level, at_u, at_v, share * (1 - grid.fraction));
-    if (grid.fraction > 0) add(next, at_u, at_v, share * grid.fraction);
+  if (filter == TextureFilter::quick) {
+    const FootprintGrid grid =
+        footprint_grid(footprint, texture.width, texture.height, last, most_along_texture);
+    for (int k = 0; k < grid.fine; ++k) level = coarser(level);
+    const Level next = grid.fraction > 0 ? coarser(level) : level;
+    const float share = 1 / static_cast<float>(grid.count());
+    for (int i = 0; i < grid.count(); ++i) {
+      const auto [du, dv] = grid.offset(i);
+      const float at_u = wrapped(u + du), at_v = wrapped(v + dv);
+      add(level, at_u, at_v, share * (1 - grid.fraction));
+      if (grid.fraction > 0) add(next, at_u, at_v, share * grid.fraction);
+    }
+    return sum;
   }
+  const DenseGrids dense = dense_grids(footprint, texture.width, texture.height, last);
+  const auto add_all = [&](const Level& from, const FootprintGrid& grid, float weight) {
+    const float share = weight / static_cast<float>(grid.count());
+    for (int i = 0; i < grid.count(); ++i) {
+      const auto [du, dv] = grid.offset(i);
+      add(from, wrapped(u + du), wrapped(v + dv), share);
+    }
+  };
+  for (int k = 0; k < dense.grid.fine; ++k) level = coarser(level);
+  add_all(level, dense.grid, 1 - dense.share_of_next);
+  if (dense.share_of_next > 0) add_all(coarser(level), dense.next, dense.share_of_next);
   return sum;
 }
 
@@ -231,25 +239,23 @@ Texture make_texture(
   return texture;
 }
 
-std::array<float, 4> sample(const Texture& texture,
-                            float u,
-                            float v,
-                            const UvFootprint& footprint) {
+std::array<float, 4> sample(
+    const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
   switch (texture.channels) {
     case 1: {
-      const auto [grey] = sample_levels<1>(texture, u, v, footprint);
+      const auto [grey] = sample_levels<1>(texture, u, v, footprint, filter);
       return {grey, grey, grey, 1};
     }
     case 2: {
-      const auto [grey, alpha] = sample_levels<2>(texture, u, v, footprint);
+      const auto [grey, alpha] = sample_levels<2>(texture, u, v, footprint, filter);
       return {grey, grey, grey, alpha};
     }
     case 3: {
-      const auto [red, green, blue] = sample_levels<3>(texture, u, v, footprint);
+      const auto [red, green, blue] = sample_levels<3>(texture, u, v, footprint, filter);
       return {red, green, blue, 1};
     }
     default:
-      return sample_levels<4>(texture, u, v, footprint);
+      return sample_levels<4>(texture, u, v, footprint, filter);
   }
 }
 

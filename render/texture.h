@@ -26,10 +26,16 @@ Texture make_texture(
 
 // Red, green, blue, alpha at (u, v), 0..1, colour in linear light; u to the right, v down from the
 // texture's top edge, repeated in both directions. One channel is grey, two are grey and alpha;
-// alpha is 1 where there is none. What is wanted is the mean of the footprint, by the look-ups of
-// footprint_grid(), of which it takes up to so many along the longer side. Coordinates that are not
-// finite, or beyond a million, count as 0.
+// alpha is 1 where there is none. What is wanted is the mean of the footprint: by dense_grids(),
+// or, where few camera rays are taken, whose own errors hide the difference, by footprint_grid()
+// with up to so many look-ups along the longer side. Coordinates that are not finite, or beyond a
+// million, count as 0.
+enum class TextureFilter : std::uint8_t { dense, quick };
 inline constexpr int most_along_texture = 12;
-std::array<float, 4> sample(const Texture& texture, float u, float v, const UvFootprint& footprint);
+std::array<float, 4> sample(const Texture& texture,
+                            float u,
+                            float v,
+                            const UvFootprint& footprint,
+                            TextureFilter filter = TextureFilter::dense);
 
 }  // namespace render

@@ -108,7 +108,8 @@ TEST(LiveVideo, IsBlurredByRoughSurfaces) {
     room.show(stripes);
     const FrameResult result = render_room(room);
     std::vector<float> row;
-    for (int x = 40; x < 50; ++x)
+    // Just beside them, where the screen ends in the ball, stripes show to the reference as well.
+    for (int x = 42; x < 50; ++x)
       row.push_back(float_from_half(result.rgba.pixels[result.rgba.index(59, x, 0)]));
     return row;
   };

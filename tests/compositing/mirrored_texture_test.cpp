@@ -154,6 +154,64 @@ TEST(Texture, OfAFloorSeenAtASlantIsAsInTheReference) {
   }
 }
 
+// A wall of random greys that glows, or lies in even light, right before a lens of 110 degrees:
+// towards its corners pixels are less than half as wide as in the middle.
+MadeShot wide_view_of_a_wall(bool glows) {
+  register_shaders();
+  std::mt19937 random(8);
+  std::vector<std::uint8_t> texels;
+  for (int i = 0; i < 256 * 256; ++i) texels.push_back(random() & 1U ? 230 : 20);
+  render::SceneDescription scene;
+  scene.background = "environment";
+  scene.textures = {
+      std::make_shared<render::Texture>(render::make_texture(256, 256, 1, false, texels))};
+  render::StandardParameters greys;
+  greys.specular = 0;
+  if (glows) {
+    std::fill_n(greys.base_color, 3, 0.0F);
+    std::fill_n(greys.emission, 3, 1.0F);
+    greys.emission_texture = 0;
+  } else {
+    greys.base_color_texture = 0;
+  }
+  scene.materials = {make_standard_material("greys", greys)};
+  scene.meshes = {square({{{-9, 3, -9}, {9, 3, -9}, {9, 3, 9}, {-9, 3, 9}}}, 1, 0)};
+  scene.instances.emplace_back();
+  MadeShot shot = shot_of(std::move(scene));
+  const double f = width * 0.35;
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  shot.environment = made_sky(16, 1, 1);
+  shot.job.lights = even_lights(64);
+  shot.job.cam_from_set = calibrate::look_at({0, 0, 0}, {0, 3, 0}, 0);
+  return shot;
+}
+
+TEST(Texture, TowardsTheCornersOfAWideLensIsAsInTheReference) {
+  MadeShot shot = wide_view_of_a_wall(true);
+  shot.job.effort.aa_samples = 1;
+  EXPECT_LT(error_of(shot), 0.05) << "as wide everywhere as in the middle, it would be .13";
+}
+
+// What one surface's texture differs by is no edge: its pixels' own rays have its mean already.
+TEST(Texture, TakesNoFurtherRaysHoweverItContrasts) {
+  for (const bool glows : {false, true}) {
+    const MadeShot shot = wide_view_of_a_wall(glows);
+    ASSERT_GT(shot.job.effort.aa_samples, 1);
+    render::FrameResult result;
+    render_frame(shot.inputs(), shot.job, shot.plate, result);
+    EXPECT_EQ(result.statistics.primary_rays, static_cast<std::uint64_t>(width * height)) << glows;
+    const capture::Image shown = capture::to_float(result.rgba);
+    float least = 1e9F, most = 0;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        least = std::min(least, shown.at(y, x, 0)), most = std::max(most, shown.at(y, x, 0));
+      }
+    }
+    EXPECT_GT(most - least, 0.3F * most) << "the texture must show";
+  }
+}
+
 // Metal flakes in a clear coat, as models of cars have them: a normal map of small tilted facets.
 // Far away each pixel holds many, which together are a rough metal.
 MadeShot flaky_paint(float tilt) {
