@@ -305,6 +305,7 @@ class CellBaker final : public RaySink {
   void shade_ring();
   bool mirrors_across(int i) const;
   void find_edges();
+  void mark_small_lights();
   void find_glints();
   float light_step(std::size_t a, std::size_t b) const;
   bool lit_unlike(std::size_t a, std::size_t b) const;
@@ -388,6 +389,7 @@ class CellBaker final : public RaySink {
   std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_,
       batch_squares_;  // of further samples
   std::array<std::uint16_t, cell_pixels> counts_, batches_;
+  std::array<int, cell_pixels> least_samples_;  // that small lights ask for
   // Further samples of a pixel that follow each other, added up.
   struct Batch {
     std::size_t pixel = 0;

@@ -349,6 +349,8 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
                     b = d.index(d.height / 2, d.width / 2 + 1);
   context.pixel_angle =
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
+  context.small_lights = find_small_lights(inputs.scene->glowing_parts(), context.camera,
+                                           context.set_from_cam, context.pixel_angle);
   add_caustics(context, *planned_table);
   context.light_rows = LightRows(planned_table->lights);
   context.soft_lights = SoftLights(*planned_table, e.soft_lights);

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "render/glowing_parts.h"
 #include "render/light_gather.h"
 #include "render/ray_log.h"
 #include "render/refinement.h"
@@ -50,6 +51,7 @@ struct FrameContext {
   std::array<float, 9> set_from_cam{};  // rotation
   Vec3f camera;                         // its position in the set
   float pixel_angle = 0;                // radians across a pixel at the picture's centre
+  std::vector<SmallLight> small_lights;
 };
 // Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not
 // finite).

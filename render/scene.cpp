@@ -432,6 +432,7 @@ Scene::Bounds Scene::virtual_bounds() const { return impl_->virtual_bounds; }
 Scene::Bounds Scene::bounds() const { return impl_->all_bounds; }
 Scene::Bounds Scene::blocker_bounds() const { return impl_->blocker_bounds; }
 const std::vector<Scene::Bounds>& Scene::blocker_boxes() const { return impl_->blocker_boxes; }
+const std::vector<Scene::GlowingPart>& Scene::glowing_parts() const { return impl_->glowing_parts; }
 std::size_t Scene::skipped_triangles() const { return impl_->skipped; }
 const Scene::Pictures& Scene::pictures() const { return impl_->pictures; }
 const std::vector<PreparedSurface>& Scene::prepared() const { return impl_->prepared; }

@@ -171,6 +171,12 @@ class Scene {
   // it.
   Bounds blocker_bounds() const;
   const std::vector<Bounds>& blocker_boxes() const;
+  // What glows by itself, of meshes that do not deform, by parts that are apart (glowing_parts.h).
+  struct GlowingPart {
+    Bounds bounds;
+    float radiance = 0;  // the most, of any colour
+  };
+  const std::vector<GlowingPart>& glowing_parts() const;
   std::size_t skipped_triangles() const;  // left out
   const Pictures& pictures() const;
   const std::vector<PreparedSurface>& prepared() const;  // by Shader::prepare()

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "render/glowing_parts.h"
 #include "render/scene_parts.h"
 #include "render/transform.h"
 
@@ -40,10 +41,12 @@ void check_built(RTCDevice device) {
 
 void Scene::Compiled::build(const SceneDescription& description) {
   kept_meshes = description.meshes;
+  std::vector<float> glow;  // per material
   for (const Material& material : description.materials) {
     const std::shared_ptr<const Shader>& shader =
         shaders.emplace_back(find_shader(material.shader));
     shader->check(description, material);
+    glow.push_back(shader->glow(material));
     shadow.push_back(shader->shadow_everywhere(material));
     filtered.push_back(shader->lets_light_through(material) ? 1 : 0);
     glass.push_back(material.shader == "glass" ? std::optional(make_glass(material))
@@ -61,6 +64,7 @@ void Scene::Compiled::build(const SceneDescription& description) {
   may_stand_back.assign(meshes, 0);
   instanced.assign(meshes, 0);
   mesh_bounds.assign(meshes, no_bounds);
+  moving_glowing_parts.resize(meshes);
   for (const Instance& instance : description.instances) {
     if (++uses[instance.mesh] > 1 || instance.moves) instanced[instance.mesh] = 1;
     two_level = two_level || instance.moves;
@@ -79,8 +83,12 @@ void Scene::Compiled::build(const SceneDescription& description) {
     if (mesh.rest) {  // its bounds are its shape's
     } else if (instance.moves) {
       mesh_bounds[instance.mesh] = bounds_of(mesh, Instance{}.set_from_object);
+      moving_glowing_parts[instance.mesh] =
+          find_glowing_parts(mesh, Instance{}.set_from_object, glow);
     } else {
       const Bounds bounds = bounds_of(mesh, instance.set_from_object);
+      const auto parts_of_mesh = find_glowing_parts(mesh, instance.set_from_object, glow);
+      glowing_parts.insert(glowing_parts.end(), parts_of_mesh.begin(), parts_of_mesh.end());
       all_bounds = joined(all_bounds, bounds);
       if (instance.kind == ObjectKind::virtual_object) {
         virtual_bounds = joined(virtual_bounds, bounds);
@@ -180,6 +188,7 @@ void Scene::Impl::assemble(const Impl* before) {
   virtual_bounds = c.virtual_bounds;
   all_bounds = c.all_bounds;
   blocker_boxes = c.blocker_boxes;
+  glowing_parts = c.glowing_parts;
   normal_matrices = c.normal_matrices;
   for (std::uint32_t i = 0; i < description.instances.size(); ++i) {
     const Instance& instance = description.instances[i];
@@ -209,6 +218,9 @@ void Scene::Impl::assemble(const Impl* before) {
       shown.push_back(pictures[picture]);
     }
     places.bounds.push_back(bounds);
+    for (const auto& [box, radiance] : c.moving_glowing_parts[instance.mesh]) {
+      glowing_parts.push_back({placed_bounds(box, instance.set_from_object), radiance});
+    }
     all_bounds = joined(all_bounds, bounds);
     if (instance.kind == ObjectKind::virtual_object) {
       virtual_bounds = joined(virtual_bounds, bounds);

@@ -119,6 +119,9 @@ struct Scene::Compiled {
   std::vector<std::vector<std::uint32_t>> shown_by_material;  // per mesh: those that show them
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds;  // of what does not move
   std::vector<Bounds> blocker_boxes;                          // of it
+  std::vector<GlowingPart> glowing_parts;                     // of it
+  std::vector<std::vector<GlowingPart>>
+      moving_glowing_parts;  // per mesh that moves, in its own frame
   std::size_t skipped = 0;
   bool two_level = false;  // something moves
   bool stands_back = false;
@@ -204,6 +207,7 @@ struct Scene::Impl {
   std::vector<std::uint8_t> mirrored;                  // per instance: inside out by its matrix
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds, blocker_bounds = no_bounds;
   std::vector<Bounds> blocker_boxes;
+  std::vector<GlowingPart> glowing_parts;
   std::size_t skipped = 0;
   // Per instance: of few triangles, as of a floor, or a billboard, which most of its rays only
   // pass.

@@ -154,6 +154,11 @@ class Shader {
   // Whether what a point glows by is the mean over all that its sample sees: then what neighbours
   // differ by is no edge.
   virtual bool glows_by_means() const { return false; }
+  // The most radiance, of any colour, that it sends out by itself.
+  virtual float glow(const Material& material) const {
+    static_cast<void>(material);
+    return 0;
+  }
   // What transmittance() says of shadows where it is the same anywhere on the surface, which then
   // has no holes: it is not called.
   virtual std::optional<Vec3f> shadow_everywhere(const Material& material) const {

@@ -65,6 +65,11 @@ class StandardShader final : public Shader {
 
   bool glows_by_means() const override { return true; }
 
+  float glow(const Material& material) const override {
+    const StandardParameters block = block_of(material);
+    return block.emission_gain * std::ranges::max(block.emission);
+  }
+
   bool lets_light_through(const Material& material) const override {
     const StandardParameters parameters = block_of(material);
     return parameters.transmission > 0 || parameters.alpha_cutoff > 0;

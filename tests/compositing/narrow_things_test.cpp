@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "made_shot.h"
+#include "render/kept_transport.h"
 
 namespace compositing {
 namespace {
@@ -251,6 +252,83 @@ TEST(BentEdges, GlintAsBrightFromFarAsFromNear) {
     }
     EXPECT_GT(near, 0.1);
     EXPECT_NEAR(far / near, 1, 0.06) << roughness;
+  }
+}
+
+// Lights two fifths of a pixel wide on a black floor, one for each cell but the outer ones, each
+// elsewhere among the pixels' centres.
+constexpr double light_side = 0.4;
+constexpr float light_radiance = 2;
+render::SceneDescription small_lights(double aside) {
+  register_shaders();
+  render::SceneDescription scene;
+  scene.background = "environment";
+  render::StandardParameters black;
+  std::fill_n(black.base_color, 3, 0.0F);
+  black.specular = 0;
+  scene.materials = {make_standard_material("floor", black)};
+  std::fill_n(black.emission, 3, light_radiance);
+  scene.materials.push_back(make_standard_material("lights", black));
+  auto floor = made_floor(20, 0);
+  auto lights = std::make_shared<render::Mesh>();
+  for (int i = 0; i < 16; ++i) {
+    const double column = 8 + 16 * (i % 4) + 0.37 * i + aside, row = 8 + 16 * (i / 4) + 0.23 * i;
+    const auto first = static_cast<std::uint32_t>(lights->positions.size());
+    for (const auto& [x, y] : {std::pair{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
+      lights->positions.push_back(
+          {metres_right(column + x * light_side), metres_up(row + y * light_side), 1e-3F});
+    }
+    lights->triangles.push_back({first, first + 1, first + 2});
+    lights->triangles.push_back({first, first + 2, first + 3});
+  }
+  lights->materials = {1};
+  scene.meshes = {std::move(floor), std::move(lights)};
+  scene.instances.resize(2);
+  scene.instances[1].mesh = 1;
+  return scene;
+}
+
+TEST(SmallLights, AreSeenWhereNoPixelsCentreShowsThem) {
+  double shown = 0;
+  constexpr int places = 8;
+  for (int i = 0; i < places; ++i) {
+    MadeShot shot = from_above(small_lights(i / double{places}));
+    shot.environment = made_sky(32, 0, 0);
+    const render::FrameResult frame = frame_of(shot);
+    EXPECT_LT(frame.statistics.primary_rays, side * side + 16 * 9 * 100U) << "only about them";
+    for (int cell = 0; cell < 16; ++cell) {
+      double sum = 0;
+      for (int p = 0; p < 256; ++p) {
+        const int y = cell / 4 * 16 + p / 16, x = cell % 4 * 16 + p % 16;
+        sum += double{float_from_half(frame.rgba.pixels[frame.rgba.index(y, x)])};
+      }
+      EXPECT_GT(sum, 0.3 * light_side * light_side * double{light_radiance}) << i << " " << cell;
+      shown += sum / (16 * places);
+    }
+  }
+  EXPECT_NEAR(shown / (light_side * light_side * double{light_radiance}), 1, 0.05);
+}
+
+TEST(SmallLights, AreFoundAnewWhereTheyMove) {
+  render::KeptTransport kept;
+  std::unique_ptr<render::Scene> before;
+  for (int i = 0; i < 6; ++i) {
+    render::SceneDescription scene = small_lights(0.3);
+    scene.instances[1].moves = true;
+    scene.instances[1].set_from_object[3] = metres_right(middle + 0.7 * i);
+    scene.instances[1].set_from_object[7] = metres_up(middle + 0.3 * i);
+    const MadeShot cold = from_above(scene);
+    // The same scene's meshes: only then it goes on from the one before.
+    if (before) scene.meshes = before->description().meshes;
+    auto now = before ? std::make_unique<render::Scene>(std::move(scene), *before)
+                      : std::make_unique<render::Scene>(std::move(scene));
+    render::FrameInputs inputs = cold.inputs();
+    inputs.scene = now.get();
+    inputs.kept = &kept;
+    render::FrameResult warm;
+    render_frame(inputs, cold.job, cold.plate, warm);
+    EXPECT_EQ(warm.rgba.pixels, frame_of(cold).rgba.pixels) << i;
+    before = std::move(now);
   }
 }
 
