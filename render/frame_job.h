@@ -22,11 +22,11 @@ struct Effort {
   // Standard error, in radiance, that a pixel of further camera rays may have before it takes four
   // times as many, and again, up to 1,024: of the first aa_samples half of this, and twice as much
   // each time. 0 = aa_samples must do.
-  float aa_tolerance = 0.06F;
-  // Radiance by which the virtual light of neighbouring pixels may differ before they are sampled
-  // like edges, where it is 1 or more; below, by the root of the radiance less. 0 = it never
-  // matters.
-  float glint_contrast = 0.1F;
+  float aa_tolerance = 0.05F;
+  // Radiance by which the virtual light of neighbouring pixels may differ, beside what one
+  // surface's textures differ by, before they are sampled like edges, where it is 1 or more; below,
+  // by the root of the radiance less. 0 = it never matters.
+  float glint_contrast = 0.09F;
   int light_samples = 64;  // lights in the table
   int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
