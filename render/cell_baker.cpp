@@ -147,13 +147,11 @@ void CellBaker::set_camera_ray(int index, Vec3f v) {
 
 // Turns the first `count` of these into rays of the set, eight at a time.
 void CellBaker::turn_camera_rays(int count) {
-  const auto& m = frame_->set_from_cam;
   RayStream& s = stream_;
   for (std::size_t first = 0; first < static_cast<std::size_t>(count); first += 8) {
     const Eight x = load_eight(&s.dx[first]), y = load_eight(&s.dy[first]),
                 z = load_eight(&s.dz[first]);
-    const Eight dx = m[0] * x + m[1] * y + m[2] * z, dy = m[3] * x + m[4] * y + m[5] * z,
-                dz = m[6] * x + m[7] * y + m[8] * z;
+    const auto [dx, dy, dz] = frame_->turn.to_set(calibrate::Vec3T<Eight>{x, y, z});
     const Eight l = dx * dx + dy * dy + dz * dz, by = 1 / root(l);
     const auto seen = l > 0.25F;
     store_eight(&s.dx[first], seen ? dx * by : Eight{});
@@ -233,14 +231,8 @@ std::array<Vec3f, 2> CellBaker::sides_of(int x, int y) const {
 void CellBaker::set_camera_cone(ShadePoint& p, int index, float pixels) const {
   const auto [right, down] = sides_of(x0_ + static_cast<int>(p.pixel) % cell_size,
                                       y0_ + static_cast<int>(p.pixel) / cell_size);
-  const auto& m = frame_->set_from_cam;
-  const auto turned = [&](Vec3f v) {
-    return Vec3f{m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
-                 m[6] * v.x + m[7] * v.y + m[8] * v.z} *
-           pixels;
-  };
   const float far_m = stream_.far_m[static_cast<std::size_t>(index)];
-  arrive(p, {}, {turned(right), turned(down)}, far_m);
+  arrive(p, {}, {frame_->turn.to_set(right) * pixels, frame_->turn.to_set(down) * pixels}, far_m);
 }
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.

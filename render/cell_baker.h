@@ -15,6 +15,12 @@
 
 namespace render {
 
+// A sample's light counts up to so many times display white: a sixteenth of a pixel is then as
+// bright as a display shows.
+inline constexpr float sample_limit = 64;
+// Of a pixel's first further samples, in terms of the effort's.
+inline constexpr float first_tolerance = 0.5F;
+
 // A stream of rays with their hits.
 struct RayStream {
   alignas(64) std::array<float, stream_rays> ox, oy, oz, dx, dy, dz, near_m, far_m, time;
@@ -294,6 +300,9 @@ class CellBaker final : public RaySink {
                        bool one_of_many,
                        Vec3f weight);
 
+  // cell_small_lights.cpp
+  void mark_small_lights();
+
   // cell_edges.cpp
   Met met_at(int i) const;
   // What the centre of a pixel met.
@@ -305,7 +314,6 @@ class CellBaker final : public RaySink {
   void shade_ring();
   bool mirrors_across(int i) const;
   void find_edges();
-  void mark_small_lights();
   void find_glints();
   float light_step(std::size_t a, std::size_t b) const;
   bool lit_unlike(std::size_t a, std::size_t b) const;

@@ -54,12 +54,8 @@ bool CellBaker::add_plate(std::size_t slot,
                           Vec3f weight,
                           std::uint32_t shadow_point) {
   if (!frame_->lens) return false;
-  const auto& m = frame_->set_from_cam;
-  const Vec3f& d = from_camera;
-  const auto q = calibrate::project(
-      *frame_->lens, calibrate::to_double(Vec3f{m[0] * d.x + m[3] * d.y + m[6] * d.z,
-                                                m[1] * d.x + m[4] * d.y + m[7] * d.z,
-                                                m[2] * d.x + m[5] * d.y + m[8] * d.z}));
+  const auto q =
+      calibrate::project(*frame_->lens, calibrate::to_double(frame_->turn.to_camera(from_camera)));
   const auto& whole = frame_->plate_levels.front();
   if (!q || !(q->x >= -0.5 && q->x <= whole.width - 0.5) ||
       !(q->y >= -0.5 && q->y <= whole.height - 0.5)) {

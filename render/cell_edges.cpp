@@ -12,7 +12,6 @@ namespace render {
 namespace {
 
 constexpr float display_limit = 4;  // brighter light than this, in display white, looks alike
-constexpr float sample_limit = 64;  // ... where a sixteenth of a pixel is as bright
 constexpr float plate_contrast =
     0.4F;                         // by which virtual things are taken to differ from the plate
 constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
@@ -25,17 +24,10 @@ constexpr int few_samples = 4;
 constexpr int pattern_middle = 1;
 constexpr std::size_t own_centre = 4;  // of a pixel's neighbours, row by row
 constexpr float blend_parts = 1024;    // of a blend of neighbours, in whole numbers
-// Of a pixel's first further samples, in terms of the effort's.
-constexpr float first_tolerance = 0.5F;
 // Steps of light across the corner of a pixel from one surface to another matter, in terms of those
 // across its sides: a tip that no side shows covers little of it.
 constexpr float corner_contrast = 4;
 
-// Of a small light's place in a pixel: the part that a square covers whose corners lie on a circle
-// of radius 1. Four samples for each such part of the pixel, and their pattern has one in it.
-constexpr float square_in_cone = 2;
-
-float square(float v) { return v * v; }
 Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
   return {std::min(v.x, display_limit), std::min(v.y, display_limit), std::min(v.z, display_limit)};
@@ -182,55 +174,6 @@ void CellBaker::find_edges() {
   mark_small_lights();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!is_inside(k)) edge_[k] = Edge::none;
-  }
-}
-
-// Light between the rays of pixels' centres shows in none of them: pixels that it may shine in take
-// further rays, so many that some meet it.
-void CellBaker::mark_small_lights() {
-  least_samples_.fill(0);
-  if (frame_->small_lights.empty()) return;
-  const auto& table = *frame_->inputs.directions;
-  const auto at = [&](int x, int y) {
-    const std::size_t t = table.index(std::min(y, table.height - 1), std::min(x, table.width - 1));
-    return Vec3f{table.x[t], table.y[t], table.z[t]};
-  };
-  const Vec3f middle = at(x0_ + cell_size / 2, y0_ + cell_size / 2);
-  float reach = 0;
-  for (const int y : {y0_ - 1, y0_ + cell_size}) {
-    for (const int x : {x0_ - 1, x0_ + cell_size})
-      reach = std::max(reach, length(at(x, y) - middle));
-  }
-  constexpr float bent = 1.3F;  // by lenses: more than lies between corners and middle
-  // Less than this, and further samples would not matter either.
-  const float least = first_tolerance * effort_.aa_tolerance;
-  // Where the lens does not see all of a cell, lights may be anywhere.
-  const float near = middle != Vec3f{} && reach < 0.5F ? bent * reach + frame_->pixel_angle : 2;
-  auto first = std::ranges::lower_bound(frame_->small_lights, middle.x - near, {},
-                                        [](const SmallLight& light) { return light.direction.x; });
-  for (; first != frame_->small_lights.end() && first->direction.x <= middle.x + near; ++first) {
-    const SmallLight& light = *first;
-    if (length(light.direction - middle) > near) continue;
-    for (int k = 0; k < static_cast<int>(cell_pixels); ++k) {
-      const int x = k % cell_size, y = k / cell_size;
-      if (!is_inside(static_cast<std::size_t>(k))) continue;
-      const Vec3f off = light.direction - at(x0_ + x, y0_ + y);
-      const auto sides = sides_of(x0_ + x, y0_ + y);
-      const bool crosses =
-          dot(off, off) < 1 && std::ranges::all_of(sides, [&](Vec3f side) {
-            const float width = length(side);
-            return std::abs(dot(off, side)) < (0.5F * width + light.half_rad) * width;
-          });
-      if (!crosses) continue;
-      const float pixel = std::sqrt(length(sides[0]) * length(sides[1]));
-      const float share = std::min(square_in_cone * square(light.half_rad / pixel), 1.0F);
-      if (!(std::min(light.radiance, sample_limit) * share > least)) continue;
-      const auto own = static_cast<std::size_t>(k);
-      edge_[own] = Edge::surface;
-      least_samples_[own] =
-          std::max(least_samples_[own],
-                   static_cast<int>(std::min(4 / share, static_cast<float>(samples_max))));
-    }
   }
 }
 

@@ -142,15 +142,11 @@ void SpaceGrid::mark_bounds(const Scene::Bounds& bounds, Mask& mask) const {
   }
 }
 
-std::vector<CellCone> cell_cones(const calibrate::DirectionTable& table,
-                                 const std::array<float, 9>& m) {
+std::vector<CellCone> cell_cones(const calibrate::DirectionTable& table, const CameraTurn& turn) {
   const auto direction_at = [&](int x, int y) {
     const std::size_t t =
         table.index(std::clamp(y, 0, table.height - 1), std::clamp(x, 0, table.width - 1));
-    const Vec3f v{table.x[t], table.y[t], table.z[t]};
-    return normalize(Vec3f{m[0] * v.x + m[1] * v.y + m[2] * v.z,
-                           m[3] * v.x + m[4] * v.y + m[5] * v.z,
-                           m[6] * v.x + m[7] * v.y + m[8] * v.z});
+    return normalize(turn.to_set(Vec3f{table.x[t], table.y[t], table.z[t]}));
   };
   std::vector<CellCone> cones;
   for (int y0 = 0; y0 < table.height; y0 += cell_size) {

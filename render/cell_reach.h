@@ -10,6 +10,7 @@
 
 #include "calibrate/lens.h"
 #include "render/blocker_boxes.h"
+#include "render/camera_turn.h"
 #include "render/light_gather.h"
 #include "render/light_table.h"
 #include "render/soft_lights.h"
@@ -61,7 +62,7 @@ struct CellCone {
   float half_rad = 10;  // more than a half turn: any direction
 };
 std::vector<CellCone> cell_cones(const calibrate::DirectionTable& directions,
-                                 const std::array<float, 9>& set_from_cam);
+                                 const CameraTurn& turn);
 
 // Whether what moved may have changed what a cell's rays met: things that filled `where`, before
 // or after. Never says no where it is yes.

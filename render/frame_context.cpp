@@ -337,11 +337,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
     for (const capture::Image& level : context.plate_levels) context.levels.push_back(&level);
   }
   add_videos(context);
-  const auto& R = job.cam_from_set.R.m;
-  for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j)
-      context.set_from_cam[i * 3 + j] = static_cast<float>(R[j * 3 + i]);
-  }
+  context.turn = CameraTurn(job.cam_from_set.R);
   context.camera = calibrate::to_float(calibrate::position_of(job.cam_from_set));
   if (!finite(context.camera)) throw std::invalid_argument("the camera's pose is not finite");
   const auto& d = *inputs.directions;
@@ -350,7 +346,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.pixel_angle =
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
   context.small_lights = find_small_lights(inputs.scene->glowing_parts(), context.camera,
-                                           context.set_from_cam, context.pixel_angle);
+                                           context.turn, context.pixel_angle);
   add_caustics(context, *planned_table);
   context.light_rows = LightRows(planned_table->lights);
   context.soft_lights = SoftLights(*planned_table, e.soft_lights);

@@ -78,18 +78,14 @@ std::vector<Part> find_glowing_parts(const Mesh& mesh,
 
 std::vector<SmallLight> find_small_lights(std::span<const Part> parts,
                                           Vec3f camera,
-                                          const std::array<float, 9>& m,
+                                          const CameraTurn& turn,
                                           float pixel_angle) {
   std::vector<SmallLight> lights;
   for (const auto& [box, radiance] : parts) {
     const Vec3f to = (box.lower + box.upper) * 0.5F - camera;
     const float distance = length(to), radius = 0.5F * length(box.upper - box.lower);
     if (!(radius < pixel_angle * distance) || !std::isfinite(distance)) continue;
-    const Vec3f d = to * (1 / distance);
-    lights.push_back({{m[0] * d.x + m[3] * d.y + m[6] * d.z, m[1] * d.x + m[4] * d.y + m[7] * d.z,
-                       m[2] * d.x + m[5] * d.y + m[8] * d.z},
-                      radius / distance,
-                      radiance});
+    lights.push_back({turn.to_camera(to * (1 / distance)), radius / distance, radiance});
   }
   std::ranges::sort(lights, {}, [](const SmallLight& light) { return light.direction.x; });
   return lights;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "render/camera_turn.h"
 #include "render/mesh.h"
 #include "render/scene.h"
 
@@ -29,7 +30,7 @@ struct SmallLight {
 // By the first coordinate of their directions.
 std::vector<SmallLight> find_small_lights(std::span<const Scene::GlowingPart> parts,
                                           Vec3f camera,
-                                          const std::array<float, 9>& set_from_cam,
+                                          const CameraTurn& turn,
                                           float pixel_angle);
 
 }  // namespace render

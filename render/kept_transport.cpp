@@ -58,7 +58,7 @@ void KeptTransport::forget_all(const Scene& scene) {
 void KeptTransport::forget(std::vector<Scene::Bounds> moved,
                            std::vector<Scene::Bounds> relit,
                            const FrameContext& frame) {
-  if (cones_.empty()) cones_ = cell_cones(*frame.inputs.directions, frame.set_from_cam);
+  if (cones_.empty()) cones_ = cell_cones(*frame.inputs.directions, frame.turn);
   SpaceGrid::Mask receivers{};
   for (const Cell& cell : cells_) {
     if (cell.stage == none) continue;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "render/camera_turn.h"
 #include "render/glowing_parts.h"
 #include "render/light_gather.h"
 #include "render/ray_log.h"
@@ -48,9 +49,9 @@ struct FrameContext {
   float brightest_video = 0;  // radiance of a live texture's white, where it is brightest
   // Places of further camera rays in a pixel, -0.5 to 0.5.
   std::array<std::array<float, 2>, samples_max> pattern;
-  std::array<float, 9> set_from_cam{};  // rotation
-  Vec3f camera;                         // its position in the set
-  float pixel_angle = 0;                // radians across a pixel at the picture's centre
+  CameraTurn turn;
+  Vec3f camera;           // its position in the set
+  float pixel_angle = 0;  // radians across a pixel at the picture's centre
   std::vector<SmallLight> small_lights;
 };
 // Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not

@@ -67,7 +67,9 @@ TEST(SmallLights, AreLessThanTwoPixelsWide) {
                                               {{{-1, -1, -1}, {1, 1, 1}}, 5},
                                               {{{3e38F, 3e38F, 0}, {3e38F, 3e38F, 0}}, 5}};
   // The camera looks along y, with x to its right.
-  const auto lights = find_small_lights(parts, {0, 0, 0}, {1, 0, 0, 0, 0, 1, 0, -1, 0}, 0.02F);
+  CameraTurn turn;
+  turn.set_from_cam = {1, 0, 0, 0, 0, 1, 0, -1, 0};
+  const auto lights = find_small_lights(parts, {0, 0, 0}, turn, 0.02F);
   ASSERT_EQ(lights.size(), 1U);
   EXPECT_NEAR(lights[0].direction.z, 1, 1e-6F);
   EXPECT_NEAR(lights[0].half_rad, 0.0173F, 1e-4F);
