@@ -359,16 +359,18 @@ void CellBaker::shade_centres() {
   bounce();
 }
 
-// Which part of wide lights a point looks for. Neighbours share what is found where the points that
-// centres see at once are, and what they mirror smoothly; further samples each take another. What
-// nobody shares, would be grain in parts.
-std::uint8_t CellBaker::part_of(const ShadePoint& p) const {
+// Which part of wide lights a point looks for, that counts a share of its pixel. Neighbours share
+// what is found where the points that centres see at once are, and what they mirror smoothly;
+// further samples each take another. What nobody shares would be grain in parts; but where it is
+// faint, and a few lights stand for all, grain shows less than the edges of their shadows.
+std::uint8_t CellBaker::part_of(const ShadePoint& p, float share) const {
   if (is_further(p.slot)) {
     const std::uint32_t of_pixel = p.pixel * 7 + p.pixel / cell_size * 3;
     return SoftLights::part_of_sample(index_of_slot_[p.slot - cell_pixels] + of_pixel);
   }
-  const bool alone = shades_ring_ || p.kind != RayKind::camera || p.depth > 0;
-  if (alone && !receivers_.mirrored) return SoftLights::middle;
+  const bool alone = p.kind != RayKind::camera || p.depth > 0;
+  const bool faint = effort_.accuracy < 1 && share < few_lights_share;
+  if (shades_ring_ || (alone && !receivers_.mirrored && !faint)) return SoftLights::middle;
   return SoftLights::part_of_pixel(p.pixel % cell_size, p.pixel / cell_size);
 }
 
@@ -391,7 +393,6 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   const bool real = instance.kind == ObjectKind::stand_in;
   r.mask[k] = real ? mask_virtual : mask_virtual | mask_real_blocker;
   r.real_first[k] = real;
-  r.part[k] = part_of(p);
   r.surface[k] = p.hit.instance * 4096 + p.hit.material;
   // Further samples of an edge pixel share its weight.
   const float further_share = 1 / static_cast<float>(effort_.aa_samples);
@@ -401,6 +402,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
     constexpr float grey = 0.25F / std::numbers::pi_v<float>;
     r.share[k] *= std::min(largest(p.diffuse) / grey, 1.0F);
   }
+  r.part[k] = part_of(p, r.share[k]);
 }
 
 // Finds who sees which light, and notes it.

@@ -187,7 +187,7 @@ class CellBaker final : public RaySink {
   void shade_points(int count, bool grid);
   void run_background(std::span<ShadePoint* const> leaving);
   void receive(int count, bool grid);
-  std::uint8_t part_of(const ShadePoint& p) const;
+  std::uint8_t part_of(const ShadePoint& p, float share) const;
   void clear_receivers();
   void set_receiver(std::size_t k, const ShadePoint& p);
   void add_centre(const ShadePoint& p);

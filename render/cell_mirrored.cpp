@@ -69,7 +69,7 @@ bool CellBaker::mirrors_smoothly(std::size_t first) const {
 }
 
 // Lights what of some points needs no light of its own: what centres mirror smoothly, and what
-// further samples see beside that.
+// further samples see beside that, or centres once more, as both faces of a pane do.
 void CellBaker::receive_mirrored(int count, std::span<const std::uint8_t> glossy) {
   std::array<std::uint16_t, stream_rays> points;
   std::size_t n = 0;
@@ -81,9 +81,9 @@ void CellBaker::receive_mirrored(int count, std::span<const std::uint8_t> glossy
     }
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-    if (points_[i].slot >= cell_pixels && !glossy[i] && share_mirrored(i)) {
-      points[n++] = static_cast<std::uint16_t>(i);
-    }
+    const std::uint32_t pixel = points_[i].pixel;
+    const bool has_own = is_first_[i] && in(mirrored, pixel);
+    if (!has_own && !glossy[i] && share_mirrored(i)) points[n++] = static_cast<std::uint16_t>(i);
   }
   for (const std::uint16_t i : std::span(points).first(n)) shares_mirrored_[i] = 1;
   if (n > 0 && !frame_->planned_table->lamps.empty()) receive_lamps(std::span(points).first(n));
@@ -120,8 +120,8 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
   }
 }
 
-// A point that a further sample came to may get its light from the nearest of what the centres
-// about its pixel mirror, of the same surface, where they are all lit alike.
+// A point may get its light from the nearest of what the centres about its pixel mirror, of the
+// same surface, where they are all lit alike.
 bool CellBaker::share_mirrored(std::size_t point) {
   const CellMask& mirrored = transport_->mirrored_receiving;
   const ShadePoint& p = points_[point];

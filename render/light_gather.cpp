@@ -100,7 +100,7 @@ bool can_be_blocked(const LightContext& context, const Scene::Bounds& box, std::
 std::uint32_t stride_of(const Effort& effort, float share) {
   if (share == 0) return 0;
   if (effort.accuracy >= 1 || share >= 0.5F) return 1;
-  const std::uint32_t stride = share >= 0.2F ? 2 : share >= 0.05F ? 4 : 8;
+  const std::uint32_t stride = share >= few_lights_share ? 2 : share >= 0.05F ? 4 : 8;
   return effort.accuracy > rough_accuracy ? stride : 2 * stride;
 }
 

@@ -42,6 +42,9 @@ struct Receivers {
 // The least cosine between normals of one smooth surface, from pixel to pixel.
 inline constexpr float alike_normals = 0.93F;
 
+// A point that counts less of its pixel tests one light of four, or of eight.
+inline constexpr float few_lights_share = 0.2F;
+
 // Structure of arrays of one stream of shadow rays, and scratch of one gather.
 struct GatherWorkspace {
   alignas(64) std::array<float, stream_rays> ox, oy, oz, dx, dy, dz, near_m, far_m, time;

@@ -277,6 +277,81 @@ TEST(SoftLights, AreNotLookedForAgainByFurtherSamplesInAMirror) {
   EXPECT_LT(more(&render::RenderStatistics::shadow_rays), 4 * further);
 }
 
+// A grey floor with a ball over it, seen in a polished black wall of strips that are turned this
+// way and that: hardly any 4x4 pixels mirror one smooth surface.
+MadeShot faint_mirrors() {
+  MadeShot shot = mirrored_shadow();
+  render::SceneDescription scene = shot.scene->description();
+  render::StandardParameters black;
+  std::fill_n(black.base_color, 3, 0.0F);
+  black.roughness = 0;
+  scene.materials[1] = make_standard_material("black", black);
+  auto wall = std::make_shared<render::Mesh>();
+  constexpr int strips = 120;
+  for (int i = 0; i < strips; ++i) {
+    constexpr float width = 18.0F / strips;
+    const float left = -9 + width * static_cast<float>(i), right = left + width;
+    const float y = i % 2 == 0 ? 3.02F : 3, other = 6.02F - y;
+    const auto at = static_cast<std::uint32_t>(wall->positions.size());
+    wall->positions.insert(wall->positions.end(),
+                           {{left, y, -9}, {right, other, -9}, {right, other, 9}, {left, y, 9}});
+    wall->triangles.insert(wall->triangles.end(), {{at, at + 1, at + 2}, {at, at + 2, at + 3}});
+    wall->materials.insert(wall->materials.end(), 2, 1);
+  }
+  scene.meshes[2] = wall;
+  shot.scene = std::make_unique<render::Scene>(std::move(scene));
+  return shot;
+}
+
+// What counts little of a pixel tests a few lights, each pixel others: all of them together.
+TEST(SoftLights, OfFaintMirrorsAreAllOfThemFromPixelToPixel) {
+  MadeShot shot = faint_mirrors();
+  shot.job.lights = make_light_table(made_sky(64, 0.2F, 1), {.count = 256});
+  shot.job.effort.accuracy = 1;
+  const render::FrameResult all = frame_of(shot);
+  shot.job.effort.accuracy = 0.99F;
+  const render::FrameResult few = frame_of(shot);
+  EXPECT_LT(few.statistics.shadow_rays, all.statistics.shadow_rays * 3 / 4);
+  constexpr int group = 8;
+  double squares = 0, truth = 0;
+  for (int y = 0; y < all.rgba.height; y += group) {
+    for (int x = 0; x < all.rgba.width; x += group) {
+      double off = 0, sum = 0;
+      for (int i = 0; i < group * group; ++i) {
+        const std::size_t at = all.rgba.index(y + i / group, x + i % group);
+        const auto light = [at](const render::FrameResult& frame) {
+          return static_cast<double>(float_from_half(frame.rgba.pixels[at]));
+        };
+        off += light(few) - light(all);
+        sum += light(all);
+      }
+      squares += off * off, truth += sum * sum;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / truth), 0.003) << "the brightest of each few alone err by .007";
+}
+
+// What lies under a clear coat mirrors the same as that: it has the light of what that shows.
+TEST(SoftLights, UnderAClearCoatAreLookedForOnce) {
+  const auto rays_of = [](float coat) {
+    MadeShot shot = mirrored_shadow();
+    shot.job.lights = even_sky(64);
+    shot.job.effort.accuracy = 1;
+    render::SceneDescription scene = shot.scene->description();
+    render::StandardParameters polished;
+    std::fill_n(polished.base_color, 3, 0.0F);
+    polished.roughness = 0;
+    polished.clearcoat = coat;
+    polished.clearcoat_roughness = 0;
+    scene.materials[1] = make_standard_material("polished", polished);
+    shot.scene = std::make_unique<render::Scene>(std::move(scene));
+    return frame_of(shot).statistics;
+  };
+  const render::RenderStatistics bare = rays_of(0), coated = rays_of(1);
+  EXPECT_GT(coated.secondary_rays, bare.secondary_rays * 3 / 2);
+  EXPECT_LT(coated.shadow_rays, bare.shadow_rays * 6 / 5);
+}
+
 // A sun's shadows in a mirror are asked for pixel by pixel: they may be as small as a pixel.
 TEST(CompactLights, AreAskedForInMirrorsAsIfThereWereNoGrid) {
   MadeShot shot = mirrored_shadow();
