@@ -14,10 +14,6 @@ namespace render {
 
 inline constexpr std::uint64_t block2 = 0x0000000000030003ULL;  // columns 0-1 of its first two rows
 
-// Lights of the table that are no farther apart than so many times both their radii are side by
-// side.
-inline constexpr float touching = 1.2F;
-
 inline int bit_of(int x, int y) { return (y & 3) * 16 + x; }
 inline int point_of(int word, int bit) { return word * 64 + bit; }
 
@@ -95,7 +91,6 @@ class VisibilityFinder {
       test_first(first, i);
     }
     shoot_rest(first);
-    if (coarse_ && block_ < 4 && !lamps_) look_beside(first, count);
     for (std::size_t i = 0; i < count; ++i) {
       if (!skip_[i]) refine(first, i);
     }
@@ -192,6 +187,11 @@ class VisibilityFinder {
     const int y = ends_down(region) == both_ends ? 3 : outermost(3 - word, any >> 2);
     return bit_of(bx + x, y);
   }
+  // The block's pixel that looks into the quarter of a light opposite to that of another one: what
+  // hides a little of it, or all but a little, is not missed all over a cell.
+  static int other_quarter(int pixel, const Region& region) {
+    return bit_of(region.column + ((pixel % cell_size - region.column) ^ 2), pixel / cell_size);
+  }
   bool asks_twice(bool compact, const Region& region) const {
     const bool narrow = ends_across(region) == both_ends || ends_down(region) == both_ends;
     return block_ < 4 && (compact || narrow);
@@ -246,7 +246,11 @@ class VisibilityFinder {
         if (whole && all && quick_) {
           test_quads(first, i, region);
         } else if (whole && !all) {
-          test(first, i, region.word, first_of_block(light, region));
+          const int one = first_of_block(light, region);
+          test(first, i, region.word, one);
+          if (has_parts(first, i) && block_ < 4) {
+            test(first, i, region.word, other_quarter(one, region));
+          }
           if (asks_twice(compact, region)) {
             test(first, i, region.word, second_of_block(light, region));
           }
@@ -276,41 +280,6 @@ class VisibilityFinder {
       all.tinted |= tinted_[i][wi];
     }
     return all;
-  }
-
-  // What hides a part of a light may hide a little of the one beside it in the sky, or all but a
-  // little, which one pixel a block misses: there another one of each is tested. Lights of other
-  // groups than this are not looked at.
-  void look_beside(std::uint32_t first, std::size_t count) {
-    std::array<std::uint8_t, GatherWorkspace::group> mixed;
-    std::size_t any = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!skip_[i] && has_parts(first, i) && answers(i).disagree()) {
-        mixed[any++] = static_cast<std::uint8_t>(i);
-      }
-    }
-    if (any == 0) return;
-    const auto& lights = context_.table->lights;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (skip_[i] || !has_parts(first, i) || answers(i).disagree()) continue;
-      const DirectionalLight& light = lights[first + i];
-      const bool beside = std::any_of(mixed.begin(), mixed.begin() + any, [&](std::uint8_t j) {
-        const DirectionalLight& other = lights[first + j];
-        const float reach = touching * (light.spread + other.spread);
-        return dot(light.direction, other.direction) > 1 - 0.5F * reach * reach;
-      });
-      if (!beside) continue;
-      const std::uint32_t light_number = first + static_cast<std::uint32_t>(i);
-      for (const Region& region : regions()) {
-        if (!region.whole || (w_.lit[i][region.word] & region.pixels) != region.pixels) continue;
-        test(first, i, region.word, opposite(first_of_block(light_number, region), region.column));
-      }
-    }
-    shoot_rest(first);
-  }
-  // Of a block's pixels, the one two columns and two rows away.
-  static int opposite(int pixel, int bx) {
-    return bit_of(bx + ((pixel % cell_size - bx) ^ 2), (pixel / cell_size) ^ 2);
   }
 
   // Tests pixels one by one, or one of each smooth 2x2 block.

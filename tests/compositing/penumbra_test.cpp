@@ -185,7 +185,9 @@ TEST(Penumbra, IsWhatTheOverlapOfTwoDiscsSaysInTheKernel) {
       const Errors errors =
           errors_of(shot.shares(capture::to_float(result.rgba), irradiance), made, 0);
       EXPECT_LT(errors.rms, 0.01) << rows << " rows, stand-in " << stand_in;
-      EXPECT_LT(errors.most, 0.03) << rows << " rows, stand-in " << stand_in;
+      // In shadows of what is near each pixel goes by its own direction into a light, off the
+      // middle.
+      EXPECT_LT(errors.most, 0.04) << rows << " rows, stand-in " << stand_in;
     }
   }
 }

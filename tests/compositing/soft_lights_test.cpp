@@ -96,10 +96,17 @@ TEST(SoftLights, LookAllOverTheirRegions) {
   for (std::size_t y = 0; y < 5; ++y) {
     for (std::size_t x = 0; x < 5; ++x) {
       std::set<int> parts;
+      std::array<double, 4> along{};  // of both places in the region, with both of the pixels
       for (std::size_t k = 0; k < 16; ++k) {
-        parts.insert(SoftLights::part_of_pixel(x + k % 4, y + k / 4));
+        const int part = SoftLights::part_of_pixel(x + k % 4, y + k / 4);
+        parts.insert(part);
+        const double column = static_cast<double>(k % 4) - 1.5;
+        const double row = static_cast<double>(k / 4) - 1.5;
+        along[0] += column * (part % 4), along[1] += column * (part / 4);
+        along[2] += row * (part % 4), along[3] += row * (part / 4);
       }
       EXPECT_EQ(parts.size(), SoftLights::count) << "of any 4x4 pixels";
+      for (const double sum : along) EXPECT_EQ(sum, 0) << "parts go with no side of the pixels";
     }
   }
   std::set<int> parts, quarters;
@@ -131,8 +138,8 @@ TEST(SoftLights, CastThePenumbraOfADisc) {
         most_hard = std::max(most_hard, std::abs(matte_at(hard, x, y) - truth));
       }
     }
-    EXPECT_LT(std::sqrt(squares), 0.045) << row;
-    EXPECT_LT(most, 0.13) << row;
+    EXPECT_LT(std::sqrt(squares), 0.032) << row;
+    EXPECT_LT(most, 0.09) << row;
     EXPECT_GT(most_hard, 0.45) << "in its middle alone the light ends in a step";
   }
 }
