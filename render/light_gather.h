@@ -132,11 +132,11 @@ struct LightContext {
 
 // Finds what the pixels of a cell see, and adds up their light. Shadow rays go to
 // one pixel of every 4x4 block of a smooth surface first, another for each light, but an outermost
-// one at the cell's border and where the surface ends beside the block, and to two of compact
-// lights and of surfaces that end on both sides; where surfaces meet in a block, to two pixels of
-// each, but of all for lights that are compact or have parts. Where these disagree with their
-// surface's in the blocks around, to their 2x2 blocks or pixels, as the effort's interleave asks;
-// for lights that have parts, all over the surface.
+// one at the cell's border and where the surface ends beside the block, and to two of
+// lights that are compact or have parts, and of surfaces that end on both sides; where surfaces
+// meet in a block, to two pixels of each, but of all for lights that are compact or have parts.
+// Where these disagree with their surface's in the blocks around, to their 2x2 blocks or pixels, as
+// the effort's interleave asks; for lights that have parts, all over the surface.
 void gather_cell(const LightContext& context,
                  Receivers& receivers,
                  GatherWorkspace& workspace,

@@ -38,10 +38,10 @@ class SoftLights {
 
   bool has(std::size_t light) const { return light < regions_.size() && regions_[light].has; }
   // The part that a pixel looks for: those of any 4x4 pixels are all of them, and pixels that are
-  // two columns apart look into opposite quarters of the region, those that are two rows apart into
-  // different ones. In each row and each column of the 4x4, both coordinates of the parts are all
-  // four (they are orthogonal Latin squares, of the field of four elements): so what 4x4 pixels see
-  // together is right to first order where a shadow grows from pixel to pixel.
+  // two columns or two rows apart look into opposite quarters of the region. In each row and each
+  // column of the 4x4, both coordinates of the parts are all four (they are orthogonal Latin
+  // squares, of the field of four elements): so what 4x4 pixels see together is right to first
+  // order where a shadow grows from pixel to pixel.
   static std::uint8_t part_of_pixel(std::size_t x, std::size_t y) {
     constexpr std::array<std::size_t, side> twice{0, 2, 3, 1};  // in that field
     x %= side, y %= side;

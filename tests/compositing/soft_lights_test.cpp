@@ -138,7 +138,7 @@ TEST(SoftLights, CastThePenumbraOfADisc) {
         most_hard = std::max(most_hard, std::abs(matte_at(hard, x, y) - truth));
       }
     }
-    EXPECT_LT(std::sqrt(squares), 0.032) << row;
+    EXPECT_LT(std::sqrt(squares), 0.03) << row;
     EXPECT_LT(most, 0.09) << row;
     EXPECT_GT(most_hard, 0.45) << "in its middle alone the light ends in a step";
   }
