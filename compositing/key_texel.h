@@ -78,11 +78,16 @@ template <bool two_primaries, class V>
   return texel;
 }
 
-// Alpha and share of the plate through the dials.
+// Alpha and share of the plate, as the table has them for a texel of that share, through the dials.
 template <class V>
-[[gnu::always_inline]] inline TexelMatte<V> dialled(V alpha, V plate, const KeyDials& dials) {
+[[gnu::always_inline]] inline TexelMatte<V> dialled(V alpha,
+                                                    V plate,
+                                                    V share,
+                                                    const KeyDials& dials) {
   const V zero = lanes_like(alpha, 0), one = lanes_like(alpha, 1);
   V spill = most(plate - (one - alpha), zero);
+  // Skin keeps what is yellow of itself: before such a wall, what is none of it has little spill.
+  if (dials.tells_skin) spill = least(spill, most(share, lanes_like(alpha, 0.012F)));
   alpha = least(most((alpha - dials.black) * dials.scale, zero), one);
   if (dials.edge != 0) alpha = alpha + dials.edge * alpha * (one - alpha);
   // What the dials have made more of the person than it is keeps no more of the screen for that.
@@ -105,7 +110,7 @@ template <class V>
     alpha = over_excess > 0.0F ? entry.alpha : one;
     plate = over_excess > 0.0F ? entry.plate : zero;
   }
-  return dialled(alpha, plate, dials);
+  return dialled(alpha, plate, texel.share, dials);
 }
 
 // By both parts; `near` as in ScreenNear.
@@ -120,7 +125,7 @@ template <class V>
   const auto close = dials.table->at(texel.square);
   const V alpha = over_excess > 0.0F ? between(deep.alpha, close.alpha, near) : one;
   const V plate = over_excess > 0.0F ? between(deep.plate, close.plate, near) : zero;
-  return dialled(alpha, plate, dials);
+  return dialled(alpha, plate, texel.share, dials);
 }
 
 template <bool two_primaries, class V>

@@ -17,8 +17,13 @@ constexpr float prior_pixels = 4;  // how many pixels the plain ratio counts for
 constexpr double prior_of_all = 8;
 constexpr double share_of_any = 0.3;  // of a pixel whose person wears any colours
 // For how many a pixel counts in which there is both person and screen: few are, and all that is
-// seen of edges. Composite and alpha over all scenes are best at 2 too (1 to 8 were tried).
+// seen of edges. Composite and alpha over all scenes are best at 2, edges and fur at more (1 to 8
+// were tried).
 constexpr double mixed_pixels = 2;
+// Furs differ more from each other than anything else: persons in fur for each seed, and for how
+// many pixels each of theirs counts.
+constexpr std::uint32_t persons_in_fur = 6;
+constexpr double share_of_fur = 1.5;
 
 class Learner {
  public:
@@ -149,6 +154,13 @@ void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learne
   }
 }
 
+void learn_clip(const MadeClip& clip, double pixels, Learners& learners) {
+  std::vector<capture::Image> shots;
+  for (int i = 0; i < 8; ++i) shots.push_back(light_of(clip.plate_shot(i)));
+  PlateLight light(average_plate(shots));
+  for (const int frame : frames_of_a_clip) learn_frame(clip.frame(frame), pixels, light, learners);
+}
+
 }  // namespace
 
 TableCodes train_key_table(std::span<const std::uint32_t> seeds) {
@@ -156,14 +168,12 @@ TableCodes train_key_table(std::span<const std::uint32_t> seeds) {
   for (std::size_t i = 0; i < seeds.size(); ++i) {
     for (MadeScene scene : made_scenes()) {
       if (has_two_primaries(screen_colour_of(scene.screen))) continue;  // uses what others teach
-      scene.actor.any_colours = i % 2 == 1;
-      const MadeClip clip(scene, seeds[i]);
-      std::vector<capture::Image> shots;
-      for (int s = 0; s < 8; ++s) shots.push_back(light_of(clip.plate_shot(s)));
-      PlateLight light(average_plate(shots));
-      const double pixels = scene.actor.any_colours ? share_of_any : 1;
-      for (const int frame : frames_of_a_clip)
-        learn_frame(clip.frame(frame), pixels, light, learners);
+      const bool in_fur = scene.actor.fur > 0;
+      scene.actor.any_colours = i % 2 == 1 && !in_fur;
+      const double pixels = in_fur ? share_of_fur : scene.actor.any_colours ? share_of_any : 1;
+      for (std::uint32_t person = 0; person < (in_fur ? persons_in_fur : 1); ++person) {
+        learn_clip(MadeClip(scene, seeds[i] + 1000 * person), pixels, learners);
+      }
     }
   }
   const Learner::Values of_all = learners.all.values();

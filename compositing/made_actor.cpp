@@ -158,6 +158,55 @@ void paint_hairs(Canvas& canvas,
   }
 }
 
+// Half the width of the shoulders and what is below, where `down` is 0 .. 1 from neck to the edge.
+float half_width(const Build& at, float down) {
+  return at.unit * (0.3F * std::pow(std::min(3 * down, 1.0F), 0.55F) + 0.03F * down);
+}
+
+// Fur is light, in patches: what is dark shows hardly anything of its own colour before a screen.
+// Of any tint, but hardly greener than grey.
+ActorColour patch_of_fur(const Build& at, float x, float y, std::uint32_t seed) {
+  const float patch = 0.06F * at.unit;
+  Draws draws(capture::mixed_bits(capture::mixed_bits(seed, static_cast<std::uint64_t>(x / patch)),
+                                  static_cast<std::uint64_t>(y / patch)));
+  const float light = 0.8F * std::pow(0.25F, draws.next());
+  ActorColour colour{};
+  for (float& c : colour) c = light * (1 + 0.6F * draws.signed_next());
+  colour[1] = std::min(colour[1], 0.6F * (colour[0] + colour[2]));
+  return colour;
+}
+
+// Short hairs all over head and body, combed outwards.
+void paint_fur(Canvas& canvas, Draws& draws, const Build& at, const MadeActor& actor) {
+  const float pi = std::numbers::pi_v<float>;
+  const auto seed = static_cast<std::uint32_t>(0xFFFF * draws.next());
+  const float longest = at.unit * actor.fur * (0.4F + 0.6F * draws.next());
+  for (int i = 0; i < 12000; ++i) {
+    Hair hair{};
+    if (draws.next() < 0.4F) {
+      const float out = 1.02F * std::sqrt(draws.next());
+      hair.angle = 2 * pi * draws.next();
+      hair.x = at.head_x + std::cos(hair.angle) * at.head_rx * out;
+      hair.y = at.head_y + std::sin(hair.angle) * at.head_ry * out;
+    } else {
+      const float down = draws.next(), side = draws.signed_next();
+      hair.x = at.head_x + side * half_width(at, down);
+      hair.y = at.head_y + 1.25F * at.head_ry + down * 0.5F * at.unit;
+      hair.angle = 0.5F * pi - (0.5F * pi - 0.3F) * side;
+      if (down < 0.1F) hair.angle = -hair.angle;  // on the shoulders it stands up
+    }
+    hair.angle += 0.5F * draws.signed_next();
+    hair.length = longest * (0.3F + 0.7F * draws.next());
+    const float thin = draws.next();
+    hair.width = 0.6F + 3 * thin * thin;
+    ActorColour colour =
+        scaled(patch_of_fur(at, std::max(hair.x, 0.0F), std::max(hair.y, 0.0F), seed),
+               0.6F + 0.8F * draws.next());
+    for (float& c : colour) c *= 1 + 0.2F * draws.signed_next();
+    paint_hair(canvas, draws, hair, colour, 0.8F * actor.spill, 0);
+  }
+}
+
 // Spill is strongest at the rim, which faces the screen sideways.
 float rim_spill(float spill, float inside, float unit) {
   return spill * (0.4F + 2 * std::exp(-inside / (0.035F * unit)));
@@ -197,9 +246,7 @@ void paint_body(Canvas& canvas, const Build& at, const MadeActor& actor, std::ui
       }
       const float down = (below - 1.25F * at.head_ry) / (0.5F * at.unit);
       if (down <= 0) continue;
-      const float half =
-          at.unit * (0.3F * std::pow(std::min(3 * down, 1.0F), 0.55F) + 0.03F * down);
-      const float inside = half - side;
+      const float inside = half_width(at, down) - side;
       if (inside <= -1) continue;
       ActorColour colour = wears.jacket;
       if (side < at.unit * (0.16F - 0.16F * down)) colour = wears.shirt;
@@ -326,6 +373,7 @@ Image paint_actor(const MadeActor& actor, std::uint32_t seed, int height, int wi
   paint_head(canvas, at, actor, seed);
   paint_hairs(canvas, draws, at, actor, seed, 450, true);
   paint_hairs(canvas, draws, at, actor, seed, 600, false);
+  if (actor.fur > 0) paint_fur(canvas, draws, at, actor);
   if (actor.veil > 0) paint_veil(canvas, at, actor, seed);
   if (actor.glass) paint_glass(canvas, at);
   Image layer = canvas.take();

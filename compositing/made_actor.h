@@ -17,6 +17,7 @@ struct MadeActor {
   bool any_colours = false;    // skin, hair and clothes of random colours, not too near a screen's
   float spill = 0.03F;         // light of the screen on the person, at rims twice that
   float veil = 0;              // opacity of its folds; 0 = none
+  float fur = 0;               // its longest hairs, in heights of the picture; 0 = none
   bool glass = false;          // a bottle and a pane in front of the chest
 };
 

@@ -39,6 +39,7 @@ std::vector<MadeScene> make_scenes() {
   add("black hair", [](MadeScene& s) { s.actor.hair = MadeHair::black; });
   add("black hair, shadow",
       [](MadeScene& s) { s.actor.hair = MadeHair::black, s.shadow = 0.5F, s.uneven = 0.3F; });
+  add("fur", [](MadeScene& s) { s.actor.fur = 0.12F, s.uneven = 0.4F; });
   add("veil", [](MadeScene& s) { s.actor.veil = 0.7F; });
   add("glass", [](MadeScene& s) { s.actor.glass = true; });
   add("motion blur", [](MadeScene& s) { s.arm = 0.35F; });

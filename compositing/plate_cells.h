@@ -22,7 +22,7 @@ inline constexpr float deep_shadow = 0.25F, black_shadow = 0.03F;
 // How far from screen in sight a place is near it, and from where on deep within what stands before
 // it: in cells of a picture as high as those that the table is learned from. Hair is the wider the
 // higher a picture is.
-inline constexpr float near_cells = 2, deep_cells = 3, learned_height = 270;
+inline constexpr float near_cells = 1, deep_cells = 2, learned_height = 270;
 
 // 1 in the first `count` lanes, 0 beyond.
 inline F8 lanes_below(int count) {

@@ -19,7 +19,7 @@ void print(std::string_view name, const KeyScore& s) {
 
 TEST(KeyQuality, HoldsOnAFewScenesOfOtherSeeds) {
   std::vector<MadeScene> scenes;
-  for (const char* name : {"plain", "blond", "veil", "4:2:0", "green clothes"}) {
+  for (const char* name : {"plain", "blond", "fur", "veil", "4:2:0", "green clothes"}) {
     scenes.push_back(made_scene(name));
   }
   const TrialSize size{270, 480, 12, 6};
