@@ -78,6 +78,10 @@ template <bool two_primaries, class V>
   return texel;
 }
 
+// The most spill, as a share of a yellow plate, on what red and green say is none of it: there
+// skin, dark as it may be, stays within a tenth of itself.
+inline constexpr float most_spill_on_skin = 0.012F;
+
 // Alpha and share of the plate, as the table has them for a texel of that share, through the dials.
 template <class V>
 [[gnu::always_inline]] inline TexelMatte<V> dialled(V alpha,
@@ -86,8 +90,7 @@ template <class V>
                                                     const KeyDials& dials) {
   const V zero = lanes_like(alpha, 0), one = lanes_like(alpha, 1);
   V spill = most(plate - (one - alpha), zero);
-  // Skin keeps what is yellow of itself: before such a wall, what is none of it has little spill.
-  if (dials.tells_skin) spill = least(spill, most(share, lanes_like(alpha, 0.012F)));
+  if (dials.tells_skin) spill = least(spill, most(share, lanes_like(alpha, most_spill_on_skin)));
   alpha = least(most((alpha - dials.black) * dials.scale, zero), one);
   if (dials.edge != 0) alpha = alpha + dials.edge * alpha * (one - alpha);
   // What the dials have made more of the person than it is keeps no more of the screen for that.
