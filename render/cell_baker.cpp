@@ -491,8 +491,14 @@ void CellBaker::add_centre(const ShadePoint& p) {
   CellTransport::Centres& c = transport_->centres.front();
   const std::size_t k = p.pixel;
   c.nx[k] = receivers_.nx[k], c.ny[k] = receivers_.ny[k], c.nz[k] = receivers_.nz[k];
-  c.diffuse.put(k, p.throughput * p.diffuse);
-  if (p.catches_shadow) c.shadow.put(k, p.throughput * p.plate_share);
+  if (const Vec3f diffuse = p.throughput * p.diffuse; diffuse != Vec3f{}) {
+    c.diffuse.put(k, diffuse);
+    c.any_diffuse = true;
+  }
+  if (p.catches_shadow) {
+    c.shadow.put(k, p.throughput * p.plate_share);
+    c.any_shadow = true;
+  }
 }
 
 // Lights of points that are no centres, in the order of `tested_`.

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
+#include <cstring>
 #include <numbers>
 
 #include "render/lanes.h"
@@ -89,17 +91,19 @@ void light_centres(const CellTransport& cell, RelightWorkspace& w, CellPicture& 
     store_eight(&w.arriving.r[k], r.arriving), store_eight(&w.passing.r[k], r.passing);
     store_eight(&w.arriving.g[k], g.arriving), store_eight(&w.passing.g[k], g.passing);
     store_eight(&w.arriving.b[k], b.arriving), store_eight(&w.passing.b[k], b.passing);
-    const auto added =
-        fours_of(load_eight(&c.diffuse.r[k]) * r.arriving, load_eight(&c.diffuse.g[k]) * g.arriving,
-                 load_eight(&c.diffuse.b[k]) * b.arriving, Eight{});
-    const Eight share_r = load_eight(&c.shadow.r[k]) * r.passing,
-                share_g = load_eight(&c.shadow.g[k]) * g.passing,
-                share_b = load_eight(&c.shadow.b[k]) * b.passing;
-    const auto share =
-        fours_of(share_r, share_g, share_b, (share_r + share_g + share_b) * (1.0F / 3));
-    for (std::size_t i = 0; i < 8; ++i) {
-      picture.added[k + i] += added[i];
-      picture.share[k + i] += share[i];
+    if (c.any_diffuse) {
+      const auto added = fours_of(load_eight(&c.diffuse.r[k]) * r.arriving,
+                                  load_eight(&c.diffuse.g[k]) * g.arriving,
+                                  load_eight(&c.diffuse.b[k]) * b.arriving, Eight{});
+      for (std::size_t i = 0; i < 8; ++i) picture.added[k + i] += added[i];
+    }
+    if (c.any_shadow) {
+      const Eight share_r = load_eight(&c.shadow.r[k]) * r.passing,
+                  share_g = load_eight(&c.shadow.g[k]) * g.passing,
+                  share_b = load_eight(&c.shadow.b[k]) * b.passing;
+      const auto share =
+          fours_of(share_r, share_g, share_b, (share_r + share_g + share_b) * (1.0F / 3));
+      for (std::size_t i = 0; i < 8; ++i) picture.share[k + i] += share[i];
     }
   }
 }
@@ -158,6 +162,15 @@ void light_shadow_points(const CellTransport& cell,
     w.passing_at_points[c.point] +=
         brightening(w.open_at_points[c.point], c.factor * light.lamps[c.lamp].intensity);
   }
+}
+
+// The last of the four is not 0.
+Four weight_of(const CellTransport::LightTerm& term) {
+  using Term = CellTransport::LightTerm;
+  static_assert(sizeof(Term) == sizeof(Four) && offsetof(Term, weight) == sizeof(float));
+  Four all;
+  std::memcpy(&all, &term, sizeof all);
+  return after_first(all);
 }
 
 // The pixels of a block show what the one does that has a ray.
@@ -252,14 +265,14 @@ void relight(const CellTransport& cell,
     const std::uint16_t slot = l->slot;
     Four sum = picture.added[slot];
     for (; l != cell.lights.end() && l->slot == slot; ++l) {
-      sum += four_of(l->weight) * four_of(light.lights[l->light].irradiance);
+      sum += weight_of(*l) * light.irradiances[l->light];
     }
     picture.added[slot] = sum;
   }
   for (const CellTransport::LightTerm& l : cell.lamp_terms) {
     picture.added[l.slot] += four_of(l.weight * light.lamps[l.light].intensity);
   }
-  cell.environment.add_light(light.levels, picture.added);
+  cell.environment.add_light(light.environment, picture.added);
   for (const CellTransport::BentPlate& b : cell.bent) {
     const Vec3f share =
         b.point == CellTransport::BentPlate::lit ? Vec3f{1, 1, 1} : w.passing_at_points[b.point];

@@ -60,6 +60,7 @@ struct CellTransport {
     alignas(64) std::array<float, cell_pixels> nx, ny, nz;
     ColourPlanes diffuse;  // radiance per irradiance
     ColourPlanes shadow;   // plate's share, as far as light is seen
+    bool any_diffuse = false, any_shadow = false;
 
     Vec3f normal(std::size_t k) const { return {nx[k], ny[k], nz[k]}; }
   };
@@ -168,9 +169,11 @@ struct CellTransport {
 // The light of one frame, as relight() wants it.
 struct FrameLight {
   std::span<const DirectionalLight> lights;
+  std::span<const Four> irradiances;  // of `lights`
   std::span<const LocalLight> lamps;
   std::span<const capture::Image* const>
       levels;  // of the environment: levels_of(), then the plate's, then those of live textures
+  const BorderedLevels& environment;
 };
 
 // The share of light that is not lost: 1 - lost/open, exactly 1 where nothing is.

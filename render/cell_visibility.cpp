@@ -17,6 +17,9 @@ using Plane = std::array<float, cell_pixels>;
 unsigned bits_at(const CellMask& mask, std::size_t k) {
   return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
 }
+unsigned eight_bits(const CellMask& mask, std::size_t k) {
+  return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & 255;
+}
 
 // Light of many directions together, on surfaces that all of it shines on: each colour's irradiance
 // is the cosine to a vector.
@@ -197,55 +200,97 @@ void put_between_windows(const Plane& of, Plane& between) {
 
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
+// Of windows that lie on one surface whole: which centres they are of, and their top left pixels.
+struct WholeWindows {
+  CellMask centres{}, firsts{};
+
+  explicit WholeWindows(std::span<const ShadowWindow> windows) {
+    const auto add = [](CellMask& mask, std::size_t k) { mask[k / 64] |= 1ULL << (k % 64); };
+    for (const ShadowWindow& window : windows) {
+      if (window.members != whole_window) continue;
+      add(centres, window.centre), add(firsts, window.first);
+    }
+  }
+};
+
 // The share that whole windows lose, in one colour: at their top left, and between them.
 struct WindowShares {
   alignas(64) Plane at, between;
 
-  void find(std::span<const ShadowWindow> windows, const Plane& open, const Plane& own_lost) {
-    alignas(64) Plane open_sums, lost_sums, rows;
+  void find(const CellMask& firsts, const Plane& open, const Plane& own_lost) {
+    alignas(64) Plane open_sums{}, lost_sums{}, rows;
     add_up_windows(open, open_sums);
     add_up_windows(own_lost, lost_sums);
-    at.fill(unknown);
-    for (const ShadowWindow& window : windows) {
-      const std::size_t first = window.first;
-      if (window.members == whole_window) at[first] = lost_sums[first] / open_sums[first];
+    for (std::size_t k = 0; k < cell_pixels; k += 8) {
+      const Eight share = load_eight(&lost_sums[k]) / load_eight(&open_sums[k]);
+      store_eight(&at[k], mask_of_eight(eight_bits(firsts, k)) ? share : eight_of(unknown));
     }
     put_between_windows<1, cell_size>(at, rows);
     put_between_windows<cell_size, 1>(rows, between);
   }
 };
 
+// The same at a cell's border and where a surface ends: a window's own share.
+std::size_t first_of_window(std::size_t centre) {
+  const auto first = [](std::size_t place) {
+    return std::clamp<std::size_t>(place, 1, cell_size - SoftLights::side + 1) - 1;
+  };
+  return first(centre / cell_size) * cell_size + first(centre % cell_size);
+}
+
+// What the centres of whole windows lose, in one colour, in place of what they see themselves.
+void lose_shares(const CellMask& centres,
+                 const WindowShares& shares,
+                 const Plane& open,
+                 const Plane& own_lost,
+                 Plane& lost) {
+  const Eight none{}, whole = eight_of(1);
+  for (std::size_t k = 0; k < cell_pixels; k += 8) {
+    const unsigned asked = eight_bits(centres, k);
+    if (asked == 0) continue;
+    Eight share = load_eight(&shares.between[k]);
+    const unsigned between = bits_of(share == share);
+    share = share < none ? none : share;
+    share = share > whole ? whole : share;
+    for (unsigned left = asked & ~between; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      share[i] = shares.at[first_of_window(k + i)];
+    }
+    const Eight more = load_eight(&open[k]) * share - load_eight(&own_lost[k]);
+    const auto changes = mask_of_eight(asked) & (share == share);
+    store_eight(&lost[k], load_eight(&lost[k]) + (changes ? more : none));
+  }
+}
+
 void share_lost(std::span<const ShadowWindow> windows, const LightSums& soft, LightSums& sums) {
   constexpr std::size_t colours = 3, side = SoftLights::side;
   const std::array<const Plane*, colours> open{&soft.open_r, &soft.open_g, &soft.open_b};
   const std::array<const Plane*, colours> own_lost{&soft.lost_r, &soft.lost_g, &soft.lost_b};
   const std::array<Plane*, colours> lost{&sums.lost_r, &sums.lost_g, &sums.lost_b};
-  std::array<WindowShares, colours> shares;
-  for (std::size_t c = 0; c < colours; ++c) shares[c].find(windows, *open[c], *own_lost[c]);
+  const WholeWindows whole(windows);
+  if (!none(whole.centres)) {
+    WindowShares shares;
+    for (std::size_t c = 0; c < colours; ++c) {
+      shares.find(whole.firsts, *open[c], *own_lost[c]);
+      lose_shares(whole.centres, shares, *open[c], *own_lost[c], *lost[c]);
+    }
+  }
   for (const ShadowWindow& window : windows) {
+    if (window.members == whole_window) continue;
     const std::size_t k = window.centre;
-    std::array<float, colours> share;
-    if (window.members == whole_window) {
+    std::array<float, colours> open_sum{}, lost_sum{};
+    for (unsigned left = window.members; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(left));
+      const std::size_t member = window.first + i / side * cell_size + i % side;
       for (std::size_t c = 0; c < colours; ++c) {
-        const float between = shares[c].between[k];
-        share[c] =
-            between == between ? std::clamp(between, 0.0F, 1.0F) : shares[c].at[window.first];
+        open_sum[c] += (*open[c])[member];
+        lost_sum[c] += (*own_lost[c])[member];
       }
-    } else {
-      std::array<float, colours> open_sum{}, lost_sum{};
-      for (unsigned left = window.members; left != 0; left &= left - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(left));
-        const std::size_t member = window.first + i / side * cell_size + i % side;
-        for (std::size_t c = 0; c < colours; ++c) {
-          open_sum[c] += (*open[c])[member];
-          lost_sum[c] += (*own_lost[c])[member];
-        }
-      }
-      for (std::size_t c = 0; c < colours; ++c) share[c] = lost_sum[c] / open_sum[c];
     }
     for (std::size_t c = 0; c < colours; ++c) {
-      const bool any_open = share[c] == share[c];
-      if (any_open) (*lost[c])[k] += (*open[c])[k] * share[c] - (*own_lost[c])[k];
+      const float share = lost_sum[c] / open_sum[c];
+      const bool any_open = share == share;
+      if (any_open) (*lost[c])[k] += (*open[c])[k] * share - (*own_lost[c])[k];
     }
   }
 }

@@ -5,8 +5,6 @@
 #include <bit>
 #include <cmath>
 
-#include "render/environment.h"
-
 namespace render {
 namespace {
 
@@ -57,12 +55,13 @@ EightWords load_eight(const std::array<std::uint32_t, 8>& words) {
   return std::bit_cast<EightWords>(words);
 }
 
-// What one term does, when all eight are worked out.
-struct Unpacked {
-  alignas(32) Eight red, green, blue;  // weights
-  Eight top_left, top_right, bottom_left, bottom_right;
-  EightWords slot, texel, outside;
-};
+constexpr std::ptrdiff_t ahead = 20;  // blocks: they come from memory while others are lit
+
+template <class T>
+void call_for(const T& what) {
+  const char* at = reinterpret_cast<const char*>(&what);
+  for (std::size_t i = 0; i < sizeof(T); i += 64) __builtin_prefetch(at + i);
+}
 
 }  // namespace
 
@@ -97,45 +96,30 @@ void EnvironmentTerms::pack(std::span<const EnvironmentTerm> terms,
   }
 }
 
-void EnvironmentTerms::add_light(std::span<const capture::Image* const> levels,
-                                 std::span<Four, slots> added) const {
+void EnvironmentTerms::add_light(const BorderedLevels& levels, std::span<Four, slots> added) const {
   const Block* block = blocks_.data();
   for (const Level& of : levels_) {
-    const capture::Image& level = *levels[of.number];
-    const float* pixels = level.pixels.data();
-    const std::ptrdiff_t row = std::ptrdiff_t{level.width} * 3;
+    const BorderedLevels::Level level = levels.at(of.number);
     const float step_x = step_of(level.width), step_y = step_of(level.height);
     for (const Block* end = block + of.blocks; block != end; ++block) {
+      if (blocks_.data() + blocks_.size() - block > ahead) call_for(block[ahead]);
       const EightWords a = load_eight(block->words[0]), b = load_eight(block->words[1]),
                        c = load_eight(block->words[2]);
-      Unpacked u;
-      const auto scale = std::bit_cast<Eight>((a >> 9 & 255) << 23);
-      u.red = to_floats(a >> 17) * scale;
-      u.green = to_floats(b >> 17) * scale;
-      u.blue = to_floats(c >> 17) * scale;
-      u.slot = a & 511;
+      const Eight scale = std::bit_cast<Eight>((a >> 9 & 255) << 23) * level.scale;
+      const std::array<Four, 8> weights =
+          fours_of(to_floats(a >> 17) * scale, to_floats(b >> 17) * scale,
+                   to_floats(c >> 17) * scale, Eight{});
       const Eight x = to_floats(b & 0xFFFF) * step_x, y = to_floats(c & 0xFFFF) * step_y;
       const EightWords column = __builtin_convertvector(x, EightWords),
                        line = __builtin_convertvector(y, EightWords);
       const Eight fx = x - to_floats(column), fy = y - to_floats(line);
-      u.top_left = (1 - fx) * (1 - fy), u.top_right = fx * (1 - fy);
-      u.bottom_left = (1 - fx) * fy, u.bottom_right = fx * fy;
-      u.texel = ((line - 1) * level.width + column - 1) * 3;
-      u.outside = (column < 1) | (line < 1) | (column >= level.width) | (line >= level.height);
+      const EightWords texel = line * level.row + column * 4, slot = a & 511;
       for (std::size_t i = 0; i < 8; ++i) {
-        Four light;
-        if (u.outside[i]) {  // across a pole or the seam
-          light = four_of(radiance_at(level, x[i] - 1, y[i] - 1));
-        } else {
-          const float* top = pixels + u.texel[i];
-          const float* bottom = top + row;
-          // The last texel's fourth value may be beyond the picture.
-          light = load_four(top) * u.top_left[i] + load_four(top + 3) * u.top_right[i] +
-                  load_four(bottom) * u.bottom_left[i] +
-                  after_first(load_four(bottom + 2)) * u.bottom_right[i];
-        }
-        added[static_cast<std::size_t>(u.slot[i])] +=
-            Four{u.red[i], u.green[i], u.blue[i], 0} * light;
+        const capture::Half* top = level.texels + texel[i];
+        const Eight above = eight_of_halves(top), below = eight_of_halves(top + level.row);
+        const Eight both = above + (below - above) * fy[i];
+        const Four left = first_four(both), right = last_four(both);
+        added[static_cast<std::size_t>(slot[i])] += weights[i] * (left + (right - left) * fx[i]);
       }
     }
   }

@@ -10,6 +10,7 @@
 
 #include "calibrate/vec.h"
 #include "capture/image.h"
+#include "render/bordered_levels.h"
 #include "render/environment.h"
 #include "render/lanes.h"
 
@@ -41,7 +42,7 @@ class EnvironmentTerms {
   void pack(std::span<const EnvironmentTerm> terms, std::span<const capture::Image* const> levels);
 
   // Adds to the slots what comes from the levels of an environment of the same size.
-  void add_light(std::span<const capture::Image* const> levels, std::span<Four, slots> added) const;
+  void add_light(const BorderedLevels& levels, std::span<Four, slots> added) const;
 
  private:
   // Eight terms: each has 15 bits of red, 8 of the exponent and 9 of the slot; 16 of green and 16

@@ -314,6 +314,13 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   context.planned_levels = levels_of(*context.planned);
   context.first_plate_level = context.planned_levels.size();
   context.levels = levels_of(*inputs.environment);
+  const auto bordered =
+      inputs.kept ? inputs.kept->bordered_levels() : std::make_shared<BorderedLevels>();
+  bordered->begin(context.levels);
+  context.bordered = bordered;
+  for (const DirectionalLight& light : job.lights.lights) {
+    context.irradiances.push_back(four_of(light.irradiance));
+  }
   auto planned_table = std::make_shared<LightTable>(job.lights);
   for (std::size_t i = 0; i < planned_table->lights.size(); ++i) {
     DirectionalLight& light = planned_table->lights[i];

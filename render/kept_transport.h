@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "capture/half.h"
+#include "render/bordered_levels.h"
 #include "render/caustics.h"
 #include "render/cell_transport.h"
 
@@ -70,6 +71,8 @@ class KeptTransport {
   std::vector<int> stages() const;
 
   CausticFollower& caustics() { return caustics_; }
+  // Of each frame in turn.
+  const std::shared_ptr<BorderedLevels>& bordered_levels() const { return bordered_levels_; }
 
   // What cells mark where they reach in; stays while any cell is kept.
   const SpaceGrid& grid() const { return grid_; }
@@ -108,6 +111,7 @@ class KeptTransport {
               const FrameContext& frame);
 
   CausticFollower caustics_;
+  std::shared_ptr<BorderedLevels> bordered_levels_ = std::make_shared<BorderedLevels>();
   std::shared_ptr<const Caustics> shown_caustics_;  // of the frame before
   FrameKeys keys_;
   bool light_stays_ = false;  // the same as in the frame before

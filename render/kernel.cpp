@@ -84,8 +84,10 @@ void TileWorkspace::Impl::light(const FrameContext& frame,
     picture.seen.fill(1);
     return;
   }
-  render::relight(cell, {frame.job->lights.lights, frame.lamps, frame.levels}, plate, relight,
-                  picture, statistics);
+  render::relight(
+      cell,
+      {frame.job->lights.lights, frame.irradiances, frame.lamps, frame.levels, *frame.bordered},
+      plate, relight, picture, statistics);
 }
 
 // with_light() of stand_in_parameters.h, of colours in four lanes.

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "render/bordered_levels.h"
 #include "render/camera_turn.h"
 #include "render/glowing_parts.h"
 #include "render/light_gather.h"
@@ -23,7 +24,9 @@ struct FrameContext {
   const FrameJob* job = nullptr;
   const Environment* planned = nullptr;  // its light decides
   std::vector<const capture::Image*> levels, planned_levels;
+  std::shared_ptr<const BorderedLevels> bordered;   // those of the environment in `levels`
   std::shared_ptr<const LightTable> planned_table;  // the job's, with its planned irradiances
+  std::vector<Four> irradiances;                    // of the job's lights
   // The job's lamps, and one for each light of the caustics: its intensity is the irradiance of
   // that light, planned or as it is.
   std::shared_ptr<const Caustics> caustics;  // or null

@@ -13,6 +13,7 @@
 #endif
 
 #include "calibrate/vec.h"
+#include "capture/half.h"
 
 namespace render {
 
@@ -84,6 +85,11 @@ inline unsigned bits_of(std::int32_t __attribute__((vector_size(32))) mask) {
   return bits_one_by_one<8>(mask);
 #endif
 }
+// And back.
+inline std::int32_t __attribute__((vector_size(32))) mask_of_eight(unsigned bits) {
+  using Words = std::int32_t __attribute__((vector_size(32)));
+  return ((Words{} + static_cast<std::int32_t>(bits)) & Words{1, 2, 4, 8, 16, 32, 64, 128}) != 0;
+}
 // The places of the bits that are set, in order, before anything.
 constexpr std::array<std::array<std::uint8_t, 8>, 256> places_of_bits() {
   std::array<std::array<std::uint8_t, 8>, 256> places{};
@@ -151,6 +157,27 @@ inline unsigned bits_of(std::int32_t __attribute__((vector_size(16))) mask) {
 }
 inline Four four_of(calibrate::Vec3f v) { return Four{v.x, v.y, v.z, 0}; }
 inline calibrate::Vec3f three_of(Four v) { return {v[0], v[1], v[2]}; }
+inline Four first_four(Eight v) { return __builtin_shufflevector(v, v, 0, 1, 2, 3); }
+inline Four last_four(Eight v) { return __builtin_shufflevector(v, v, 4, 5, 6, 7); }
+inline Eight eight_of_halves(const capture::Half* at) {
+  Eight v;
+#if defined(__F16C__) && defined(__AVX2__)
+  __m128i halves;
+  std::memcpy(&halves, at, sizeof halves);
+  v = std::bit_cast<Eight>(_mm256_cvtph_ps(halves));
+#else
+  for (int i = 0; i < 8; ++i) v[i] = capture::float_from_half(at[i]);
+#endif
+  return v;
+}
+inline void put_halves(Four v, capture::Half* to) {
+#if defined(__F16C__)
+  const __m128i halves = _mm_cvtps_ph(std::bit_cast<__m128>(v), _MM_FROUND_TO_NEAREST_INT);
+  std::memcpy(to, &halves, 4 * sizeof *to);
+#else
+  for (int i = 0; i < 4; ++i) to[i] = capture::half_from_float(v[i]);
+#endif
+}
 // Eight colours, from each of the four values of all.
 inline std::array<Four, 8> fours_of(Eight r, Eight g, Eight b, Eight rest) {
   const auto by_two = [](Eight v, Eight w) {
@@ -163,10 +190,8 @@ inline std::array<Four, 8> fours_of(Eight r, Eight g, Eight b, Eight rest) {
   };
   const auto red_green = by_two(r, g), blue_rest = by_two(b, rest);
   const auto low = by_four(red_green[0], blue_rest[0]), high = by_four(red_green[1], blue_rest[1]);
-  const auto first = [](Eight v) { return __builtin_shufflevector(v, v, 0, 1, 2, 3); };
-  const auto second = [](Eight v) { return __builtin_shufflevector(v, v, 4, 5, 6, 7); };
-  return {first(low[0]),  first(low[1]),  first(high[0]),  first(high[1]),
-          second(low[0]), second(low[1]), second(high[0]), second(high[1])};
+  return {first_four(low[0]), first_four(low[1]), first_four(high[0]), first_four(high[1]),
+          last_four(low[0]),  last_four(low[1]),  last_four(high[0]),  last_four(high[1])};
 }
 
 inline Lanes dot(Lanes ax, Lanes ay, Lanes az, calibrate::Vec3f b) {

@@ -31,8 +31,10 @@ using Slots = std::array<Four, EnvironmentTerms::slots>;
 Slots lit(const std::vector<EnvironmentTerm>& terms, const Sky& sky) {
   EnvironmentTerms packed;
   packed.pack(terms, sky.levels);
+  BorderedLevels levels;
+  levels.begin(sky.levels);
   Slots added{};
-  packed.add_light(sky.levels, added);
+  packed.add_light(levels, added);
   return added;
 }
 
