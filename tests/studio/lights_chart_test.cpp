@@ -40,9 +40,7 @@ double figure(const std::vector<std::pair<std::string, double>>& figures, const 
   return found == figures.end() ? -1 : found->second;
 }
 
-// Tests run in processes of their own, and each takes the whole chart: this one looks at all
-// points.
-TEST(LightsChart, HasEveryMethodErringLessWithMoreLightsAndCalmWhereLightIsFollowed) {
+void expect_less_error_with_more_lights_and_calm_where_light_is_followed() {
   std::map<std::string, std::set<std::string>> variants;
   const std::vector<ChartPoint> points = points_of_tables();
   for (const ChartPoint& p : points) {
@@ -73,7 +71,7 @@ TEST(LightsChart, HasEveryMethodErringLessWithMoreLightsAndCalmWhereLightIsFollo
 }
 
 // The promise that a show relies on: the estimate warns before the error comes.
-TEST(LightsChart, ExpectsMoreErrorThanThereIsUnderEverySkyAndNumberOfLights) {
+void expect_estimates_above_errors_under_every_sky_and_number_of_lights() {
   int swept = 0;
   double worst = 0;
   for (const Stressor& stressor : quick_chart().stressors) {
@@ -104,6 +102,12 @@ TEST(LightsChart, ExpectsMoreErrorThanThereIsUnderEverySkyAndNumberOfLights) {
     EXPECT_GT(needed, 0);
     before = lights;
   }
+}
+
+// Tests run in processes of their own, and the whole chart takes long: it is looked at once.
+TEST(LightsChart, HasLessErrorWithMoreLightsAndExpectsMoreThanThereIs) {
+  expect_less_error_with_more_lights_and_calm_where_light_is_followed();
+  expect_estimates_above_errors_under_every_sky_and_number_of_lights();
 }
 
 TEST(LightsChart, HasScreensErringLessWithMoreLampsAndLittleByDefault) {
