@@ -71,7 +71,7 @@ void BorderedLevels::fill(Slot& slot) {
     const int row = std::clamp(y, 0, level.height - 1);
     const float* from = &level.pixels[level.index(row, 0)];
     const auto put = [&](Four texel) {
-      put_halves(counted(texel) * per_radiance, to);
+      store_halves(counted(texel) * per_radiance, to);
       to += 4;
     };
     const auto put_one = [&](int column) {

@@ -14,11 +14,9 @@ constexpr std::uint16_t whole_window = 0xFFFF;
 
 using Plane = std::array<float, cell_pixels>;
 
+template <std::size_t count = lanes>
 unsigned bits_at(const CellMask& mask, std::size_t k) {
-  return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << lanes) - 1);
-}
-unsigned eight_bits(const CellMask& mask, std::size_t k) {
-  return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & 255;
+  return static_cast<unsigned>(mask[k / 64] >> (k % 64)) & ((1U << count) - 1);
 }
 
 // Light of many directions together, on surfaces that all of it shines on: each colour's irradiance
@@ -223,7 +221,7 @@ struct WindowShares {
     add_up_windows(own_lost, lost_sums);
     for (std::size_t k = 0; k < cell_pixels; k += 8) {
       const Eight share = load_eight(&lost_sums[k]) / load_eight(&open_sums[k]);
-      store_eight(&at[k], mask_of_eight(eight_bits(firsts, k)) ? share : eight_of(unknown));
+      store_eight(&at[k], mask_of_eight(bits_at<8>(firsts, k)) ? share : eight_of(unknown));
     }
     put_between_windows<1, cell_size>(at, rows);
     put_between_windows<cell_size, 1>(rows, between);
@@ -246,10 +244,10 @@ void lose_shares(const CellMask& centres,
                  Plane& lost) {
   const Eight none{}, whole = eight_of(1);
   for (std::size_t k = 0; k < cell_pixels; k += 8) {
-    const unsigned asked = eight_bits(centres, k);
+    const unsigned asked = bits_at<8>(centres, k);
     if (asked == 0) continue;
     Eight share = load_eight(&shares.between[k]);
-    const unsigned between = bits_of(share == share);
+    const unsigned between = bits_of(share == share);  // not where it is unknown
     share = share < none ? none : share;
     share = share > whole ? whole : share;
     for (unsigned left = asked & ~between; left != 0; left &= left - 1) {

@@ -20,9 +20,11 @@ float step_of(int size) {
   return static_cast<float>(std::bit_ceil(static_cast<std::uint32_t>(size) + 1)) / 65536;
 }
 
+// No farther than the border: add_light() reads what this says.
 std::uint32_t packed_place(float at, int size) {
-  const float steps = (at + 1) / step_of(size) + 0.5F;
-  return static_cast<std::uint32_t>(std::min(std::max(0.0F, steps), 65535.0F));
+  const float inside = std::min(std::max(-1.0F, at), static_cast<float>(size));
+  const float steps = (inside + 1) / step_of(size) + 0.5F;
+  return static_cast<std::uint32_t>(std::min(steps, 65535.0F));
 }
 
 std::array<std::uint32_t, 3> packed(const EnvironmentTerm& term, const capture::Image& level) {

@@ -170,7 +170,7 @@ inline Eight eight_of_halves(const capture::Half* at) {
 #endif
   return v;
 }
-inline void put_halves(Four v, capture::Half* to) {
+inline void store_halves(Four v, capture::Half* to) {
 #if defined(__F16C__)
   const __m128i halves = _mm_cvtps_ph(std::bit_cast<__m128>(v), _MM_FROUND_TO_NEAREST_INT);
   std::memcpy(to, &halves, 4 * sizeof *to);

@@ -157,5 +157,20 @@ TEST(EnvironmentTerms, CountNothingThatIsNoNumber) {
   EXPECT_TRUE(std::isfinite(added[4][0]));
 }
 
+// Nothing is read that is no texel, wherever a place is.
+TEST(EnvironmentTerms, LookNoFartherThanTheBorder) {
+  const Sky sky;
+  constexpr float inf = std::numeric_limits<float>::infinity();
+  for (std::uint16_t level = 0; level < sky.levels.size(); ++level) {
+    const auto width = static_cast<float>(sky.images[level].width);
+    const auto height = static_cast<float>(sky.images[level].height);
+    const Slots beyond =
+        lit({{{1, 1, 1}, inf, 1e6F, 0, level}, {{1, 1, 1}, -inf, -9, 1, level}}, sky);
+    const Slots at =
+        lit({{{1, 1, 1}, width, height, 0, level}, {{1, 1, 1}, -1, -1, 1, level}}, sky);
+    for (const std::size_t slot : {0, 1}) EXPECT_EQ(three_of(beyond[slot]), three_of(at[slot]));
+  }
+}
+
 }  // namespace
 }  // namespace render
