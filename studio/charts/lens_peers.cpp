@@ -8,11 +8,11 @@
 #include <vector>
 
 #include <opencv2/calib3d.hpp>
-#include <opencv2/ccalib/omnidir.hpp>
 
 #include "calibrate/lens.h"
 #include "capture/sandbox.h"
-#include "studio/charts/mrcal_wire.h"
+#include "studio/charts/board_corners.h"
+#include "studio/charts/solver_wire.h"
 
 #include <sys/mman.h>
 #include <unistd.h>
@@ -24,28 +24,6 @@ using calibrate::Lens;
 using calibrate::LensProblem;
 using calibrate::Vec2;
 using calibrate::Vec3;
-
-template <class Point3, class Point2>
-struct Corners {
-  std::vector<std::vector<Point3>> board;
-  std::vector<std::vector<Point2>> picture;
-
-  explicit Corners(const LensProblem& problem) {
-    for (const calibrate::BoardView& view : problem.views) {
-      board.emplace_back();
-      picture.emplace_back();
-      for (std::size_t i = 0; i < view.corners.size(); ++i) {
-        if (!view.corners[i]) continue;
-        const Vec3 p = corner_of(problem.board, i);
-        using Scalar3 = decltype(Point3::x);
-        using Scalar2 = decltype(Point2::x);
-        board.back().emplace_back(static_cast<Scalar3>(p.x), static_cast<Scalar3>(p.y), Scalar3{});
-        picture.back().emplace_back(static_cast<Scalar2>(view.corners[i]->x),
-                                    static_cast<Scalar2>(view.corners[i]->y));
-      }
-    }
-  }
-};
 
 double now_ms() {
   return std::chrono::duration<double, std::milli>(
@@ -60,7 +38,7 @@ void answer(LensPeerResult& result, Lens lens) {
 }
 
 void by_camera(const LensProblem& problem, bool rational, LensPeerResult& result) {
-  const Corners<cv::Point3f, cv::Point2f> corners(problem);
+  const BoardCorners<cv::Point3f, cv::Point2f> corners(problem);
   cv::Mat K, distortion;
   std::vector<cv::Mat> turns, moves;
   const double begin = now_ms();
@@ -76,7 +54,7 @@ void by_camera(const LensProblem& problem, bool rational, LensPeerResult& result
 }
 
 void by_fisheye(const LensProblem& problem, LensPeerResult& result) {
-  const Corners<cv::Point3d, cv::Point2d> corners(problem);
+  const BoardCorners<cv::Point3d, cv::Point2d> corners(problem);
   cv::Mat K, distortion;
   std::vector<cv::Mat> turns, moves;
   const double begin = now_ms();
@@ -90,31 +68,6 @@ void by_fisheye(const LensProblem& problem, LensPeerResult& result) {
             {K.at<double>(0, 0), K.at<double>(1, 1), K.at<double>(0, 2), K.at<double>(1, 2)}};
   for (int i = 0; i < 4; ++i) lens.parameters.push_back(distortion.at<double>(i));
   answer(result, std::move(lens));
-}
-
-// Mei and Rives's model: onto the unit sphere, then a pinhole xi behind its centre.
-void by_omnidir(const LensProblem& problem, LensPeerResult& result) {
-  const Corners<cv::Point3d, cv::Point2d> corners(problem);
-  cv::Mat K, xi, distortion, turns, moves, used;
-  const double begin = now_ms();
-  cv::omnidir::calibrate(corners.board, corners.picture, {problem.width, problem.height}, K, xi,
-                         distortion, turns, moves, cv::omnidir::CALIB_FIX_SKEW,
-                         cv::TermCriteria(3, 200, 1e-8), used);
-  result.time_ms = now_ms() - begin;
-  result.parameters = 9;
-  const double x = xi.at<double>(0);
-  result.unproject = [K, distortion, x](Vec2 q) -> std::optional<Vec3> {
-    const std::vector<cv::Point2d> pixel{{q.x, q.y}};
-    std::vector<cv::Point2d> ideal;
-    cv::undistortPoints(pixel, ideal, K, distortion);
-    const double u = ideal[0].x;
-    const double v = ideal[0].y;
-    const double r2 = u * u + v * v;
-    const double under = 1 + (1 - x * x) * r2;
-    if (!(under >= 0)) return std::nullopt;
-    const double scale = (x + std::sqrt(under)) / (r2 + 1);
-    return calibrate::normalize(Vec3{scale * u, scale * v, scale - x});
-  };
 }
 
 // A file in memory that a child may read.
@@ -136,27 +89,14 @@ class MemoryFile {
   int fd_;
 };
 
-void by_mrcal(const LensProblem& problem,
-              bool splined,
-              double time_limit_s,
-              LensPeerResult& result) {
-  std::vector<double> question{splined ? 1.0 : 0.0,
-                               static_cast<double>(problem.width),
-                               static_cast<double>(problem.height),
-                               static_cast<double>(problem.board.columns),
-                               static_cast<double>(problem.board.rows),
-                               problem.board.square_m,
-                               static_cast<double>(problem.views.size())};
-  for (const calibrate::BoardView& view : problem.views) {
-    for (const auto& q : view.corners) {
-      question.push_back(q ? q->x : 0);
-      question.push_back(q ? q->y : 0);
-      question.push_back(q ? 1 : -1);
-    }
-  }
-  const MemoryFile file(question);
+// The parameters that one of the helpers answers with.
+std::vector<double> by_solver(const char* program,
+                              SolverQuestion question,
+                              double time_limit_s,
+                              LensPeerResult& result) {
+  const MemoryFile file(to_doubles(question));
   capture::SandboxedChild child(
-      capture::helper_path("platelight-mrcal"), file.fd(),
+      capture::helper_path(program), file.fd(),
       std::chrono::milliseconds(static_cast<std::int64_t>(1000 * time_limit_s)));
   std::array<double, 2> head{};  // milliseconds, number of parameters
   if (!child.read(std::as_writable_bytes(std::span(head)))) {
@@ -169,8 +109,37 @@ void by_mrcal(const LensProblem& problem,
     throw std::runtime_error("half an answer");
   }
   result.time_ms = head[0];
+  return parameters;
+}
+
+void by_mrcal(const LensProblem& problem,
+              bool splined,
+              double time_limit_s,
+              LensPeerResult& result) {
   answer(result, {splined ? mrcal_splined_model : mrcal_opencv_model, problem.width, problem.height,
-                  std::move(parameters)});
+                  by_solver("platelight-mrcal", {splined, problem}, time_limit_s, result)});
+}
+
+// Mei and Rives's model: onto the unit sphere, then a pinhole xi behind its centre.
+void by_omnidir(const LensProblem& problem, double time_limit_s, LensPeerResult& result) {
+  const std::vector<double> p = by_solver("platelight-omnidir", {0, problem}, time_limit_s, result);
+  if (p.size() != 9) throw std::runtime_error("half an answer");
+  result.parameters = p.size();
+  result.unproject = [p](Vec2 q) -> std::optional<Vec3> {
+    const cv::Matx33d K(p[0], 0, p[2], 0, p[1], p[3], 0, 0, 1);
+    const std::vector<double> distortion(p.begin() + 5, p.end());
+    const std::vector<cv::Point2d> pixel{{q.x, q.y}};
+    std::vector<cv::Point2d> ideal;
+    cv::undistortPoints(pixel, ideal, K, distortion);
+    const double x = p[4];
+    const double u = ideal[0].x;
+    const double v = ideal[0].y;
+    const double r2 = u * u + v * v;
+    const double under = 1 + (1 - x * x) * r2;
+    if (!(under >= 0)) return std::nullopt;
+    const double scale = (x + std::sqrt(under)) / (r2 + 1);
+    return calibrate::normalize(Vec3{scale * u, scale * v, scale - x});
+  };
 }
 
 // The first line, and not more than fits beside a mark.
@@ -213,7 +182,7 @@ LensPeerResult calibrate_with(LensPeer peer, const LensProblem& problem, double 
         by_fisheye(problem, result);
         break;
       case LensPeer::opencv_omnidir:
-        by_omnidir(problem, result);
+        by_omnidir(problem, time_limit_s, result);
         break;
       case LensPeer::mrcal_opencv5:
       case LensPeer::mrcal_splined:

@@ -29,7 +29,8 @@ struct LensPeerResult {
 };
 
 // All corners of all views, with each tool's own defaults for its start and its outliers. mrcal's
-// solver runs in a process of its own, which it may abort; `time_limit_s` ends it.
+// solver, which may abort, and cv::omnidir's run in processes of their own; `time_limit_s` ends
+// them.
 LensPeerResult calibrate_with(LensPeer peer,
                               const calibrate::LensProblem& problem,
                               double time_limit_s = 120);

@@ -2,58 +2,20 @@
 // aborts on some input, so it is a program of its own.
 #include <chrono>
 #include <cmath>
-#include <cstddef>
 #include <cstdio>
-#include <optional>
 #include <random>
-#include <span>
 #include <vector>
 
 #include "calibrate/lens_seed.h"
 #include "calibrate/lens_solve.h"
 #include "calibrate/rotation_vector.h"
-#include "studio/charts/mrcal_wire.h"
+#include "studio/charts/solver_wire.h"
 
 extern "C" {  // mrcal's headers do not say so themselves
 #include <mrcal/mrcal.h>
 }
 
 namespace {
-
-struct Question {
-  bool splined = false;
-  calibrate::LensProblem problem;
-};
-
-std::optional<Question> read_question() {
-  std::vector<double> head(7);
-  if (std::fread(head.data(), sizeof(double), head.size(), stdin) != head.size()) {
-    return std::nullopt;
-  }
-  Question question;
-  question.splined = head[0] > 0;
-  calibrate::LensProblem& problem = question.problem;
-  problem.width = static_cast<int>(head[1]);
-  problem.height = static_cast<int>(head[2]);
-  problem.board = {calibrate::Board::Kind::chessboard,
-                   static_cast<int>(head[3]),
-                   static_cast<int>(head[4]),
-                   head[5],
-                   0,
-                   ""};
-  problem.views.resize(static_cast<std::size_t>(head[6]));
-  for (calibrate::BoardView& view : problem.views) {
-    std::vector<double> corners(3 * problem.board.corner_count());
-    if (std::fread(corners.data(), sizeof(double), corners.size(), stdin) != corners.size()) {
-      return std::nullopt;
-    }
-    for (std::size_t i = 0; i < corners.size(); i += 3) {
-      view.corners.emplace_back();
-      if (corners[i + 2] > 0) view.corners.back() = calibrate::Vec2{corners[i], corners[i + 1]};
-    }
-  }
-  return question;
-}
 
 // One camera at the origin, boards before it.
 struct MrcalProblem {
@@ -99,9 +61,10 @@ double optimise(MrcalProblem& p, const Moves& moves) {
 }
 
 // mrcal's own way of several stages; its seed is in Python only, so it begins where ours does.
-std::vector<double> solve(const Question& question) {
+std::vector<double> solve(const studio::SolverQuestion& question) {
+  const bool splined = question.model == 1;
   const calibrate::LensStarts starts = calibrate::start_lens(question.problem);
-  const calibrate::LensStart& start = question.splined ? starts.equidistant : starts.pinhole;
+  const calibrate::LensStart& start = splined ? starts.equidistant : starts.pinhole;
   MrcalProblem p;
   p.problem = &question.problem;
   for (std::size_t view = 0; view < question.problem.views.size(); ++view) {
@@ -115,16 +78,15 @@ std::vector<double> solve(const Question& question) {
   }
   const double focal = start.bundle.free[0];
   p.intrinsics = {focal, focal, start.bundle.free[1], start.bundle.free[2]};
-  mrcal_lensmodel_from_name(&p.model,
-                            question.splined ? "LENSMODEL_STEREOGRAPHIC" : "LENSMODEL_PINHOLE");
+  mrcal_lensmodel_from_name(&p.model, splined ? "LENSMODEL_STEREOGRAPHIC" : "LENSMODEL_PINHOLE");
   if (!(optimise(p, {}) >= 0) || !(optimise(p, {.core = true}) >= 0)) return {};
-  mrcal_lensmodel_from_name(
-      &p.model, question.splined ? studio::mrcal_splined_model : studio::mrcal_opencv_model);
+  mrcal_lensmodel_from_name(&p.model,
+                            splined ? studio::mrcal_splined_model : studio::mrcal_opencv_model);
   std::mt19937 random(7);
   std::uniform_real_distribution<double> tiny(-1e-6, 1e-6);
   p.intrinsics.resize(static_cast<std::size_t>(mrcal_lensmodel_num_params(&p.model)));
   for (std::size_t i = 4; i < p.intrinsics.size(); ++i) p.intrinsics[i] = tiny(random);
-  const bool core = !question.splined;
+  const bool core = !splined;
   if (!(optimise(p, {.core = core, .distortions = true}) >= 0)) return {};
   if (!(optimise(p, {.core = core, .distortions = true, .bend = true}) >= 0)) return {};
   return p.intrinsics;
@@ -133,14 +95,12 @@ std::vector<double> solve(const Question& question) {
 }  // namespace
 
 int main() {
-  const auto question = read_question();
+  const auto question = studio::read_question(stdin);
   if (!question) return 1;
   const auto begin = std::chrono::steady_clock::now();
   const std::vector<double> parameters = solve(*question);
   const double time_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
-  const double head[2] = {time_ms, static_cast<double>(parameters.size())};
-  std::fwrite(head, sizeof(double), 2, stdout);
-  std::fwrite(parameters.data(), sizeof(double), parameters.size(), stdout);
+  studio::write_answer(stdout, time_ms, parameters);
   return 0;
 }

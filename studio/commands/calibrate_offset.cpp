@@ -29,7 +29,7 @@ using Json = nlohmann::ordered_json;
 constexpr double default_length_s = 20;
 constexpr double aimed_at_s = 1e-3;
 // Of a board, as small pictures: half a gigabyte.
-constexpr std::size_t most_pictures = 1500;
+constexpr std::size_t most_watched_pictures = 1500;
 constexpr std::size_t fewest_places = 40;
 
 struct OffsetOptions {
@@ -81,7 +81,7 @@ Watched watch(capture::Camera& camera, double length_s, double exposure_s, bool 
     last_s = time_s;
     if (for_board) {
       watched.pictures.push_back({time_s, small_picture(*frame->image)});
-      if (watched.pictures.size() == most_pictures) break;
+      if (watched.pictures.size() == most_watched_pictures) break;
     } else {
       watched.brightness.push_back({time_s, brightness_of(*frame->image),
                                     frame->exposure_s > 0 ? frame->exposure_s : exposure_s});

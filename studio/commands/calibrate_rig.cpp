@@ -34,7 +34,7 @@ using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 using calibrate::degree;
-constexpr std::size_t most_pictures = 500;  // of a camera
+constexpr std::size_t most_camera_pictures = 500;
 
 struct RigOptions {
   std::vector<std::string> sources;    // NAME=DIRECTORY or NAME=VIDEO
@@ -141,9 +141,9 @@ struct Pictures {
 Pictures read_pictures(const Source& source, std::int64_t every) {
   Pictures pictures;
   const auto add = [&](std::string instant, const capture::Image& image) {
-    if (pictures.grey.size() == most_pictures) {
-      throw std::runtime_error(
-          fmt::format("{}: more than {} pictures; take fewer", source.pictures, most_pictures));
+    if (pictures.grey.size() == most_camera_pictures) {
+      throw std::runtime_error(fmt::format("{}: more than {} pictures; take fewer", source.pictures,
+                                           most_camera_pictures));
     }
     pictures.instants.push_back(std::move(instant));
     pictures.grey.push_back(calibrate::grey_picture(image));
