@@ -21,7 +21,7 @@
 #include "tests/calibrate/made_board_picture.h"
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::board_detector_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -397,4 +397,4 @@ TEST(DetectBoard, FindsTheBoardInEveryPictureOfAGoPro) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::board_detector_test

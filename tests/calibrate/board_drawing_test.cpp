@@ -13,7 +13,7 @@
 
 #include "calibrate/charuco.h"
 
-namespace calibrate {
+namespace calibrate::board_drawing_test {
 namespace {
 
 using testing::HasSubstr;
@@ -172,4 +172,4 @@ TEST(BlackParts, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::board_drawing_test

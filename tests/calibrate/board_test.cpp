@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace calibrate {
+namespace calibrate::board_test {
 namespace {
 
 TEST(Board, CountsItsCornersRowByRow) {
@@ -59,4 +59,4 @@ TEST(Board, IsRefusedIfItCannotBe) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::board_test

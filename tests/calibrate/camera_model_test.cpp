@@ -13,7 +13,7 @@ extern "C" {
 #include <mrcal/mrcal.h>
 }
 
-namespace calibrate {
+namespace calibrate::camera_model_test {
 namespace {
 
 CameraModel made_model() {
@@ -182,4 +182,4 @@ TEST(ReadCameraModel, EndsAtEveryTruncationAndEveryFlippedByte) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::camera_model_test

@@ -9,7 +9,7 @@
 #include "calibrate/angles.h"
 #include "tests/calibrate/made_board_picture.h"
 
-namespace calibrate {
+namespace calibrate::corner_refinement_test {
 namespace {
 
 const Board board{Board::Kind::chessboard, 7, 5, .04, 0, ""};
@@ -105,4 +105,4 @@ TEST(RefineCorners, RefusesWhatDoesNotBelongTogether) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::corner_refinement_test

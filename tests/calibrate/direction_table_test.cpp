@@ -4,7 +4,7 @@
 #include "calibrate/angles.h"
 #include "calibrate/lens.h"
 
-namespace calibrate {
+namespace calibrate::direction_table_test {
 namespace {
 
 void expect_table_of(const Lens& lens, int step) {
@@ -47,4 +47,4 @@ TEST(MakeDirectionTable, HoldsMrcalsDirections) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::direction_table_test

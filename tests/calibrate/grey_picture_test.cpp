@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace calibrate {
+namespace calibrate::grey_picture_test {
 namespace {
 
 // x + 2 y, which every interpolation must keep.
@@ -62,4 +62,4 @@ TEST(CheckGreyPicture, RefusesSizesThatDoNotMatch) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::grey_picture_test

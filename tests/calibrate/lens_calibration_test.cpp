@@ -10,7 +10,7 @@
 #include "calibrate/angles.h"
 #include "calibrate/made_boards.h"
 
-namespace calibrate {
+namespace calibrate::lens_calibration_test {
 namespace {
 
 using ::testing::AnyOf;
@@ -228,4 +228,4 @@ TEST(CalibrateLens, GivesTheSameLensEveryTime) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::lens_calibration_test

@@ -12,7 +12,7 @@
 #include "calibrate/rotation_fit.h"
 #include "tests/calibrate/made_markers.h"
 
-namespace calibrate {
+namespace calibrate::lens_error_in_pose_test {
 namespace {
 
 constexpr double noise_px = 0.05;  // so small that the lens's error is most of the pose's
@@ -118,4 +118,4 @@ TEST(RegisterCamera, TellsWhatTheLensIsOffBy) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::lens_error_in_pose_test

@@ -6,7 +6,7 @@
 #include "calibrate/lens.h"
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::lens_file_test {
 namespace {
 
 TEST(WriteLens, IsUndoneByReadLens) {
@@ -73,4 +73,4 @@ TEST(ReadLens, RefusesEveryBadTomlFileWithLineColumnAndReason) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::lens_file_test

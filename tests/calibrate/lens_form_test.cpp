@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace calibrate {
+namespace calibrate::lens_form_test {
 namespace {
 
 struct Sample {
@@ -127,4 +127,4 @@ TEST(FreeCount, RefusesModelsThatCannotBeSolvedFor) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::lens_form_test

@@ -10,7 +10,7 @@
 
 #include "calibrate/angles.h"
 
-namespace calibrate {
+namespace calibrate::lens_test {
 namespace {
 
 using std::numbers::pi;
@@ -238,4 +238,4 @@ TEST(Check, RefusesWhatIsNoLens) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::lens_test

@@ -9,7 +9,7 @@
 
 #include "tests/calibrate/made_markers.h"
 
-namespace calibrate {
+namespace calibrate::light_gain_test {
 namespace {
 
 using testing::ElementsAre;
@@ -165,4 +165,4 @@ TEST(FitLightGain, RefusesNoPairsAndWhatIsNoLight) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::light_gain_test

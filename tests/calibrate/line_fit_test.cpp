@@ -14,7 +14,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::line_fit_test {
 namespace {
 
 using made::degree;
@@ -249,4 +249,4 @@ TEST(ReadLineMarks, HasTheDesksLinesWhereItsPictureIsSteepest) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::line_fit_test

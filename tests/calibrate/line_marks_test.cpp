@@ -7,7 +7,7 @@
 
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::line_marks_test {
 namespace {
 
 TEST(ReadLineMarks, ReadsWhatIsWritten) {
@@ -70,4 +70,4 @@ TEST(ReadLineMarks, RefusesEveryBadFileWithPlaceAndReason) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::line_marks_test

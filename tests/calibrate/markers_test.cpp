@@ -8,7 +8,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::markers_test {
 namespace {
 
 using testing::HasSubstr;
@@ -101,4 +101,4 @@ TEST(SightsOf, NamesTheMarkerThatTheLensDoesNotSee) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::markers_test

@@ -13,7 +13,7 @@
 
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::opencv_lens_test {
 namespace {
 
 using testing::HasSubstr;
@@ -270,4 +270,4 @@ TEST(ReadOpencvLens, SurvivesDamagedFiles) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::opencv_lens_test

@@ -6,7 +6,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::pose_file_test {
 namespace {
 
 TEST(WritePose, IsUndoneByReadPoseInBothKindsOfFile) {
@@ -48,4 +48,4 @@ TEST(ReadPose, RefusesEveryBadFileWithPlaceAndReason) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::pose_file_test

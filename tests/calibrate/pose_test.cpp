@@ -10,7 +10,7 @@
 #include "calibrate/angles.h"
 #include "calibrate/track.h"
 
-namespace calibrate {
+namespace calibrate::pose_test {
 namespace {
 
 Vec3 random_vector(std::mt19937& random, double sigma) {
@@ -113,4 +113,4 @@ TEST(PoseFromRotation, RefusesMirrorsAndSqueezes) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::pose_test

@@ -11,7 +11,7 @@
 
 #include "tests/calibrate/made_markers.h"
 
-namespace calibrate {
+namespace calibrate::registration_test {
 namespace {
 
 using made::degree;
@@ -249,4 +249,4 @@ TEST(SightOf, TellsPixelsToFirstOrder) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::registration_test

@@ -6,7 +6,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::rig_file_test {
 namespace {
 
 TEST(WriteRig, IsUndoneByReadRig) {
@@ -60,4 +60,4 @@ TEST(ReadRig, RefusesEveryBadFileWithPlaceAndReason) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::rig_file_test

@@ -9,7 +9,7 @@
 
 #include "tests/calibrate/made_markers.h"
 
-namespace calibrate {
+namespace calibrate::rig_test {
 namespace {
 
 using made::degree;
@@ -191,4 +191,4 @@ TEST(FitRig, RefusesWhatIsNoRig) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::rig_test

@@ -9,7 +9,7 @@
 
 #include "tests/calibrate/made_markers.h"
 
-namespace calibrate {
+namespace calibrate::rotation_fit_test {
 namespace {
 
 using testing::HasSubstr;
@@ -124,4 +124,4 @@ TEST(DirectionsFrom, KeepsThePixelsThatTheLensGives) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::rotation_fit_test

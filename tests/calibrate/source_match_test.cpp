@@ -8,7 +8,7 @@
 
 #include "tests/calibrate/made_lamps.h"
 
-namespace calibrate {
+namespace calibrate::source_match_test {
 namespace {
 
 using made::degree;
@@ -147,4 +147,4 @@ TEST(MatchSources, IsLessSureWhereLampsAreNear) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::source_match_test

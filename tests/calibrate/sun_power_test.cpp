@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-namespace calibrate {
+namespace calibrate::sun_power_test {
 namespace {
 
 // Patches as a floor of any albedo and a plate of any gain show them.
@@ -75,4 +75,4 @@ TEST(SolveSunPower, RefusesPatchesThatTellNoSun) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::sun_power_test

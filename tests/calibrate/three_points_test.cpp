@@ -5,7 +5,7 @@
 
 #include "tests/calibrate/made_markers.h"
 
-namespace calibrate {
+namespace calibrate::three_points_test {
 namespace {
 
 struct Triple {
@@ -63,4 +63,4 @@ TEST(SolveThreePoints, GivesNothingForPointsOnALine) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::three_points_test

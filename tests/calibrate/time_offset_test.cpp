@@ -13,7 +13,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/calibrate/made_motion.h"
 
-namespace calibrate {
+namespace calibrate::time_offset_test {
 namespace {
 
 using testing::HasSubstr;
@@ -23,7 +23,7 @@ constexpr double frame_s = 0.04;
 struct Clocks {
   double begin_s = 0;   // the first frame, on the true clock
   double offset_s = 0;  // of the camera's own
-  double frame_s = calibrate::frame_s;
+  double frame_s = time_offset_test::frame_s;
   double exposure_s = 0.02;
 };
 
@@ -352,4 +352,4 @@ TEST(FindTimeOffset, RefusesNumbersThatAreNone) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::time_offset_test

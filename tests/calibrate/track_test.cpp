@@ -10,7 +10,7 @@
 
 #include "tests/made_files.h"
 
-namespace calibrate {
+namespace calibrate::track_test {
 namespace {
 
 using std::numbers::pi;
@@ -126,4 +126,4 @@ TEST(ReadTrack, RefusesEveryBadFileWithLineAndReason) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::track_test

@@ -11,7 +11,7 @@
 #include "calibrate/angles.h"
 #include "calibrate/vignetting.h"
 
-namespace calibrate {
+namespace calibrate::vignetting_fit_test {
 namespace {
 
 Lens fish_eye() { return {"equisolid", 200, 200, {70, 99.5, 99.5}, 85 * degree}; }
@@ -134,4 +134,4 @@ TEST(FitVignetting, RefusesWhatTellsNothing) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::vignetting_fit_test

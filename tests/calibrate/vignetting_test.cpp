@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace calibrate {
+namespace calibrate::vignetting_test {
 namespace {
 
 TEST(Sensitivity, IsOneOnTheAxisAndEverywhereForAnEvenLens) {
@@ -39,4 +39,4 @@ TEST(CheckVignetting, RefusesALensThatIsBlindBeforeItsRim) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::vignetting_test

@@ -18,7 +18,7 @@
 #include "capture/made_gige.h"
 #include "tests/capture/telling_shot.h"
 
-namespace capture {
+namespace capture::aravis_camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -501,4 +501,4 @@ TEST(AravisCameraSoak, NeitherLeaksNorStallsWhilePacketsAreLost) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::aravis_camera_test

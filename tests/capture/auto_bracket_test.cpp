@@ -16,7 +16,7 @@
 #include "capture/live_merge.h"
 #include "tests/capture/made_light_camera.h"
 
-namespace capture {
+namespace capture::auto_bracket_test {
 namespace {
 
 using made::LightCamera;
@@ -229,4 +229,4 @@ TEST(AutoBracket, StaysWithinWhatFramesHaveRoomFor) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::auto_bracket_test

@@ -17,7 +17,7 @@
 
 #include "tests/capture/made_light_camera.h"
 
-namespace capture {
+namespace capture::auto_exposures_test {
 namespace {
 
 using made::LightCamera;
@@ -304,4 +304,4 @@ TEST(AutoExposures, RefuseWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::auto_exposures_test

@@ -15,7 +15,7 @@
 
 #include "tests/capture/made_exposure_stream.h"
 
-namespace capture {
+namespace capture::bracketed_camera_test {
 namespace {
 
 using made::ExposureStream;
@@ -188,4 +188,4 @@ TEST(BracketedCamera, RefusesWhatTheCameraCannotDo) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::bracketed_camera_test

@@ -11,7 +11,7 @@
 #include "capture/png.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::camera_response_test {
 namespace {
 
 CameraResponse made_linear() {
@@ -119,4 +119,4 @@ TEST(ReadResponse, RefusesCurvesThatFallOrEndFarFromWhite) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::camera_response_test

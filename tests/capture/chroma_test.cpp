@@ -6,7 +6,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace capture {
+namespace capture::chroma_test {
 namespace {
 
 constexpr Siting sitings[] = {Siting::first, Siting::middle, Siting::last};
@@ -61,4 +61,4 @@ TEST(ChromaSteps, RefusesOtherFactors) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::chroma_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace capture {
+namespace capture::colour_test {
 namespace {
 
 constexpr std::array transfers{Transfer::rec1886, Transfer::srgb, Transfer::rec709_camera,
@@ -75,4 +75,4 @@ TEST(TransferFromName, ListsTheNamesWhenItRefuses) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::colour_test

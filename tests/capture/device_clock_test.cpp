@@ -7,7 +7,7 @@
 
 #include "capture/counter_random.h"
 
-namespace capture {
+namespace capture::device_clock_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -58,4 +58,4 @@ TEST(DeviceClock, GivesStampsUpThatJump) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::device_clock_test

@@ -11,7 +11,7 @@
 
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::exif_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -145,4 +145,4 @@ TEST(ExposureSOf, NamesTheFileWithoutATime) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::exif_test

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace capture {
+namespace capture::exposure_choice_test {
 namespace {
 
 constexpr ChoiceSettings camera{.noise = {.read = 1e-6, .shot = 5e-5},
@@ -98,4 +98,4 @@ TEST(ChooseExposures, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::exposure_choice_test

@@ -13,7 +13,7 @@
 
 #include "tests/capture/label_trial.h"
 
-namespace capture {
+namespace capture::exposure_labels_test {
 namespace {
 
 using made::ExposureStream;
@@ -211,4 +211,4 @@ TEST(ExposureLabeller, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::exposure_labels_test

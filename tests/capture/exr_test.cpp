@@ -17,7 +17,7 @@
 #include "capture/primaries.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::exr_test {
 namespace {
 
 // What an independent tool prints.
@@ -277,4 +277,4 @@ TEST(ReadExr, OutlivesDamageAnywhereInEveryCompression) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::exr_test

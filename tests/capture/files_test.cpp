@@ -8,7 +8,7 @@
 
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::files_test {
 namespace {
 
 TEST(WriteFile, IsReadBackAndLeavesNothingBeside) {
@@ -40,4 +40,4 @@ TEST(ReadFile, RefusesDirectoriesMissingAndLargeFiles) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::files_test

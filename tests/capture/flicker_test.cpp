@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace capture {
+namespace capture::flicker_test {
 namespace {
 
 const std::vector<double> bracket_s{1e-4, 2e-3, 5e-4};
@@ -97,4 +97,4 @@ TEST(FlickerWatch, NeedsAWhileAndSaneValues) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::flicker_test

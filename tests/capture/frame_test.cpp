@@ -6,7 +6,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace capture {
+namespace capture::frame_test {
 namespace {
 
 TEST(TimeOfFrame, DoesNotDriftOverYears) {
@@ -45,4 +45,4 @@ TEST(FrameAt, RefusesARateOfZero) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::frame_test

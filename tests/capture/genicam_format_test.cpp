@@ -9,7 +9,7 @@
 #include "capture/counter_random.h"
 #include "capture/v4l2_format.h"
 
-namespace capture {
+namespace capture::genicam_format_test {
 namespace {
 
 using testing::ElementsAre;
@@ -70,4 +70,4 @@ TEST(PackGenicam, LaysBitsOutAsTheStandardDoes) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::genicam_format_test

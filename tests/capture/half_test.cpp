@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-namespace capture {
+namespace capture::half_test {
 namespace {
 
 TEST(FloatFromHalf, IsTheSameInSoftwareForEveryBitPattern) {
@@ -74,4 +74,4 @@ TEST(HalfFromFloat, OverflowsToInfinityAndKeepsNan) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::half_test

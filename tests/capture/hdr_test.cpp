@@ -13,7 +13,7 @@
 
 #include "tests/capture/made_bracket.h"
 
-namespace capture {
+namespace capture::hdr_test {
 namespace {
 
 Image sample_shot(
@@ -414,4 +414,4 @@ TEST(ResponseCodeTable, TakesCodesFromAFullWellOnForSaturated) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::hdr_test

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace capture {
+namespace capture::light_meter_test {
 namespace {
 
 // Values 0.1, but for a darker share of the rows at the top.
@@ -71,4 +71,4 @@ TEST(LightMeter, RefusesWhatMakesNoSense) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::light_meter_test

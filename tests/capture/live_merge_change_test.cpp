@@ -13,7 +13,7 @@
 #include "capture/made_sensor.h"
 #include "tests/capture/made_window.h"
 
-namespace capture {
+namespace capture::live_merge_change_test {
 namespace {
 
 using namespace made_window;
@@ -227,4 +227,4 @@ TEST(MergeWindow, LevelsFlicker) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::live_merge_change_test

@@ -36,7 +36,7 @@ std::atomic<long> allocations{0};
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 #endif
 
-namespace capture {
+namespace capture::live_merge_test {
 namespace {
 
 using namespace made_window;
@@ -390,4 +390,4 @@ TEST(MergeWindow, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::live_merge_test

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <thread>
 
-namespace capture {
+namespace capture::live_reader_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -85,4 +85,4 @@ TEST(LiveReader, RefusesToKeepNothing) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::live_reader_test

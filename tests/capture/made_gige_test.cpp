@@ -12,7 +12,7 @@
 #include "tests/capture/gige_client.h"
 #include "tests/capture/telling_shot.h"
 
-namespace capture {
+namespace capture::made_gige_test {
 namespace {
 
 using made::ClientFrame;
@@ -321,4 +321,4 @@ TEST(MadePicture, IsWhatTheSensorSees) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::made_gige_test

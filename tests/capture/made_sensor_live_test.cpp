@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace capture {
+namespace capture::made_sensor_live_test {
 namespace {
 
 struct Moments {
@@ -79,4 +79,4 @@ TEST(LiveSensor, RefusesWhatTheExactOneRefuses) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::made_sensor_live_test

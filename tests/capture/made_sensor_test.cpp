@@ -9,7 +9,7 @@
 
 #include "capture/counter_random.h"
 
-namespace capture {
+namespace capture::made_sensor_test {
 namespace {
 
 constexpr double exposure_s = 0.01;
@@ -129,4 +129,4 @@ TEST(Expose, RefusesWhatNoCameraIs) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::made_sensor_test

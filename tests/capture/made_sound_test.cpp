@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace capture {
+namespace capture::made_sound_test {
 namespace {
 
 TEST(MakeClap, HasItsLoudestSampleWhereTheClapBegins) {
@@ -38,4 +38,4 @@ TEST(MakeClap, RefusesWhatIsNoSound) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::made_sound_test

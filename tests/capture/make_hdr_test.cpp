@@ -14,7 +14,7 @@
 #include "tests/capture/made_bracket.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::make_hdr_test {
 namespace {
 
 std::string message_of(const std::vector<std::string>& paths, const HdrOptions& options = {}) {
@@ -152,4 +152,4 @@ TEST(RangeStops, IsTheRatioOfBrightestToFaintest) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::make_hdr_test

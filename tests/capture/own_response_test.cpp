@@ -12,7 +12,7 @@
 #include "capture/response.h"
 #include "tests/capture/made_bracket.h"
 
-namespace capture {
+namespace capture::own_response_test {
 namespace {
 
 // Patches evenly over `stops` below `brightest`, each of a slight ramp.
@@ -133,4 +133,4 @@ TEST(OwnResponse, MergesALiveBracketOf14StopsTo3HundredthsOfAStop) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::own_response_test

@@ -10,7 +10,7 @@
 
 #include "capture/made_sensor.h"
 
-namespace capture {
+namespace capture::photon_transfer_test {
 namespace {
 
 // Patches over eight stops up to `brightest`, each of a slight ramp and of grain that stays.
@@ -348,4 +348,4 @@ TEST(MeasurePhotonTransfer, RefusesShotsThatDoNotFitTogether) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::photon_transfer_test

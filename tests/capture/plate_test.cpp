@@ -9,7 +9,7 @@
 #include "tests/independent_plate.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::plate_test {
 namespace {
 
 // A moving test card under noise strong enough that codes go beyond their legal range.
@@ -198,4 +198,4 @@ TEST(PlateInTheLongTests, TakesATenthOfAFrameAt25PerSecond) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::plate_test

@@ -5,7 +5,7 @@
 
 #include <stdexcept>
 
-namespace capture {
+namespace capture::primaries_test {
 namespace {
 
 constexpr Primaries rec2020{{0.708, 0.292}, {0.170, 0.797}, {0.131, 0.046}, {0.3127, 0.3290}};
@@ -52,4 +52,4 @@ TEST(ConvertToRec709, LeavesAlphaAlone) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::primaries_test

@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace capture {
+namespace capture::raw_test {
 namespace {
 
 constexpr std::array patterns{BayerPattern::rggb, BayerPattern::grbg, BayerPattern::gbrg,
@@ -279,4 +279,4 @@ TEST(MarkSaturated, KeepsWhatIsSaturatedAllAround) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::raw_test

@@ -15,7 +15,7 @@
 #include "capture/v4l2_camera.h"
 #include "tests/capture/fake_v4l2.h"
 
-namespace capture {
+namespace capture::recording_test {
 namespace {
 
 using testing::HasSubstr;
@@ -192,4 +192,4 @@ TEST_F(RecordingTest, RefusesDamagedPictures) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::recording_test

@@ -10,7 +10,7 @@
 #include "capture/png.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::replay_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -174,4 +174,4 @@ TEST(ReplayOnRealData, HasTheExposuresOfTheBracket) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::replay_test

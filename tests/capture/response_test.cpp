@@ -14,7 +14,7 @@
 #include "tests/capture/made_bracket.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::response_test {
 namespace {
 
 using Curve = std::function<double(double)>;
@@ -324,4 +324,4 @@ TEST(ReadRsp, RefusesEveryBadFileWithItsReason) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::response_test

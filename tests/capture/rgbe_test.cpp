@@ -14,7 +14,7 @@
 #include "capture/exr.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::rgbe_test {
 namespace {
 
 constexpr char head[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n";
@@ -218,4 +218,4 @@ TEST(ReadRgbe, SurvivesDamageAnywhere) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::rgbe_test

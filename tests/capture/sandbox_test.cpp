@@ -15,7 +15,7 @@
 
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::sandbox_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -147,4 +147,4 @@ TEST(HelperPath, FindsTheDecoder) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::sandbox_test

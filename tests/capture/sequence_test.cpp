@@ -11,7 +11,7 @@
 #include "capture/rgbe.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::sequence_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -189,4 +189,4 @@ TEST(RegisterCamera, AddsAScheme) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::sequence_test

@@ -8,7 +8,7 @@
 #include "tests/independent_plate.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::sound_test {
 namespace {
 
 constexpr double flash_s = 0.48;  // frame 12 at 25 fps
@@ -156,4 +156,4 @@ TEST_F(Clap, OfASilentFileIsNothing) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::sound_test

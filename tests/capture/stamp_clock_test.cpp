@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace capture {
+namespace capture::stamp_clock_test {
 namespace {
 
 TEST(StampClock, TakesOutTheRoundingOfMatroska) {
@@ -59,4 +59,4 @@ TEST(StampClock, CountsFramesThatHaveNoStamp) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::stamp_clock_test

@@ -8,7 +8,7 @@
 #include "capture/files.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::still_size_test {
 namespace {
 
 using namespace std::string_literals;
@@ -37,4 +37,4 @@ TEST(ClaimedSize, IsNothingWhereTheHeaderEndsOrIsNone) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::still_size_test

@@ -17,7 +17,7 @@
 #include "tests/independent_plate.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::still_test {
 namespace {
 
 class TemporaryFile {
@@ -199,4 +199,4 @@ TEST(WritePng, NamesTheFolderThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::still_test

@@ -11,7 +11,7 @@
 #include "capture/coded_picture.h"
 #include "tests/capture/fake_v4l2.h"
 
-namespace capture {
+namespace capture::v4l2_camera_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -460,4 +460,4 @@ TEST(OpenCamera, KnowsV4l2) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::v4l2_camera_test

@@ -9,7 +9,7 @@
 #include "tests/independent_plate.h"
 #include "tests/made_files.h"
 
-namespace capture {
+namespace capture::video_file_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -382,4 +382,4 @@ TEST(VideoFileOnRealData, PlaysTheStreet) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::video_file_test

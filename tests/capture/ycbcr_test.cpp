@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace capture {
+namespace capture::ycbcr_test {
 namespace {
 
 struct Case {
@@ -99,4 +99,4 @@ TEST(YcbcrMatrix, RefusesDepthsThatThereAreNot) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::ycbcr_test

@@ -8,7 +8,7 @@
 
 #include "compositing/made_walker.h"
 
-namespace compositing {
+namespace compositing::billboard_place_test {
 namespace {
 
 Vec3 at(const BillboardPlace& place, double x, double z) {
@@ -116,4 +116,4 @@ TEST(Parallax, IsThatOfAPointOffThePlane) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::billboard_place_test

@@ -16,7 +16,7 @@
 #include "render/reference.h"
 #include "render/trace.h"
 
-namespace compositing {
+namespace compositing::billboard_test {
 namespace {
 
 using render::Vec3f;
@@ -493,4 +493,4 @@ TEST(Billboard, RefusesWhatCannotBeShown) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::billboard_test

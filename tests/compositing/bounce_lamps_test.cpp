@@ -11,7 +11,7 @@
 #include "render/kept_transport.h"
 #include "render/reference.h"
 
-namespace compositing {
+namespace compositing::bounce_lamps_test {
 namespace {
 
 using render::Vec3f;
@@ -228,4 +228,4 @@ TEST(BounceLampsInAPicture, FollowTheFrameOfALivePicture) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::bounce_lamps_test

@@ -5,7 +5,7 @@
 
 #include "made_shot.h"
 
-namespace compositing {
+namespace compositing::bounced_light_test {
 namespace {
 
 constexpr int width = 48, height = 32;
@@ -69,4 +69,4 @@ TEST(GatherPoints, GivesPointsThatTestAShareOfTheLightsAllOfItWhereNothingIsHidd
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::bounced_light_test

@@ -9,7 +9,7 @@
 #include "tests/render/plain_shapes.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace compositing {
+namespace compositing::caustics_test {
 namespace {
 
 using render::Vec3f;
@@ -20,7 +20,7 @@ struct BallShot {
   calibrate::Lens lens;
 
   explicit BallShot(int size, const render::GlassParameters& glass = {.index = 1.5F}) {
-    render::SceneDescription scene = made_scene(false);
+    render::SceneDescription scene = shot_scene(false);
     scene.materials[2] = render::make_glass_material("glass", glass);
     scene.meshes.push_back(made_ball({0, 0, 0}, 0.4F, 2));
     render::StandardParameters dull;
@@ -249,4 +249,4 @@ TEST(Caustics, RefuseMorePhotonsThanThereMayBe) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::caustics_test

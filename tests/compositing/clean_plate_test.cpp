@@ -12,7 +12,7 @@
 #include "capture/counter_random.h"
 #include "compositing/made_clip.h"
 
-namespace compositing {
+namespace compositing::clean_plate_test {
 namespace {
 
 using capture::Image;
@@ -126,4 +126,4 @@ TEST(PlateLight, RefusesAFrameOfAnotherSizeNamingBoth) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::clean_plate_test

@@ -9,7 +9,7 @@
 #include "tests/compositing/made_glass.h"
 #include "tests/render/plain_shapes.h"
 
-namespace compositing {
+namespace compositing::cut_rays_test {
 namespace {
 
 // A room of varnished walls, open towards the camera only, under an even light. What its walls
@@ -51,4 +51,4 @@ TEST(CutRays, DoNotSeeTheSkyThroughWalls) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::cut_rays_test

@@ -10,7 +10,7 @@
 #include "made_room.h"
 #include "render/scene.h"
 
-namespace compositing {
+namespace compositing::deforming_things_test {
 namespace {
 
 using render::Mesh;
@@ -207,7 +207,7 @@ TEST(DeformingMesh, LooksAsAMeshThatWasBuiltAsItIs) {
 
 // What a deformed thing does to what is about it is there in the very same frame.
 TEST(DeformingMesh, CastsItsShadowAndIsMirroredInTheSameFrame) {
-  SceneDescription scene = made_scene(false);
+  SceneDescription scene = shot_scene(false);
   render::StandardParameters chrome;
   chrome.metallic = 1;
   chrome.roughness = 0;
@@ -309,4 +309,4 @@ TEST(DeformingMesh, MustMoveAndHaveAllItsVerticesAtRest) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::deforming_things_test

@@ -14,7 +14,7 @@
 
 #include "capture/colour.h"
 
-namespace compositing {
+namespace compositing::display_test {
 namespace {
 
 std::string data_dir() {
@@ -294,4 +294,4 @@ TEST(ListDisplays, StartsWithTheDefault) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::display_test

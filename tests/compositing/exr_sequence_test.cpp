@@ -14,7 +14,7 @@
 
 #include "take.h"
 
-namespace compositing {
+namespace compositing::exr_sequence_test {
 namespace {
 
 using ExrSequenceTest = TakeTest;
@@ -131,4 +131,4 @@ TEST_F(ExrSequenceTest, RefusesUnknownCompressionAndFoldersThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::exr_sequence_test

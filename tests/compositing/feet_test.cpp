@@ -12,7 +12,7 @@
 #include "compositing/made_walker.h"
 #include "tests/made_files.h"
 
-namespace compositing {
+namespace compositing::feet_test {
 namespace {
 
 constexpr double frame_s = 0.04;
@@ -303,4 +303,4 @@ TEST(Feet, OfTheDancerAreHisAndNotTheAxes) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::feet_test

@@ -10,7 +10,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace compositing {
+namespace compositing::fill_and_key_test {
 namespace {
 
 using capture::HalfImage;
@@ -234,4 +234,4 @@ TEST(FillAndKey, RefusesPicturesOfTwoSizesAndNoDisplay) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::fill_and_key_test

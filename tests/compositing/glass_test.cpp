@@ -16,7 +16,7 @@
 #include "tests/render/plain_shapes.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace compositing {
+namespace compositing::glass_test {
 namespace {
 
 using render::Vec3f;
@@ -340,7 +340,7 @@ TEST(Glass, LeavesAWhiteRoughThingInAWhiteWorldWhite) {
 
 // A glass ball on a stand-in floor, before a plate.
 MadeShot ball_on_plate(int size) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   scene.materials[2] = render::make_glass_material("glass", {.index = 1.5F});
   scene.meshes[2] = made_ball({0.5F, -0.9F, 0.4F}, 0.4F, 2);
   scene.instances.erase(scene.instances.begin() + 1);  // the red ball
@@ -465,4 +465,4 @@ TEST(Glass, IsTheSameWhateverTheTilesAndWhatIsKept) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::glass_test

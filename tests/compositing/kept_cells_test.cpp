@@ -10,7 +10,7 @@
 #include "render/kept_transport.h"
 #include "render/renderer.h"
 
-namespace compositing {
+namespace compositing::kept_cells_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -203,4 +203,4 @@ TEST(RefineCells, FindsCellsAheadAsTheFrameWouldShowThem) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::kept_cells_test

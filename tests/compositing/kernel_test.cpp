@@ -33,7 +33,7 @@ thread_local bool counting = false;
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 #endif
 
-namespace compositing {
+namespace compositing::kernel_test {
 namespace {
 
 using capture::float_from_half;
@@ -46,7 +46,7 @@ FrameResult render(const MadeShot& shot) {
 }
 
 TEST(RenderFrame, LeavesThePlateBitForBitWhereNothingIsVirtual) {
-  const MadeShot shot = made_shot(100, 70, made_scene(false));
+  const MadeShot shot = made_shot(100, 70, shot_scene(false));
   const FrameResult result = render(shot);
   for (std::size_t i = 0; i < shot.plate.pixels.size() / 3; ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -58,7 +58,7 @@ TEST(RenderFrame, LeavesThePlateBitForBitWhereNothingIsVirtual) {
 }
 
 TEST(RenderFrame, LeavesThePlateBitForBitFarFromTheObjects) {
-  const MadeShot shot = made_shot(160, 120, made_scene());
+  const MadeShot shot = made_shot(160, 120, shot_scene());
   const FrameResult result = render(shot);
   std::size_t untouched = 0;
   for (std::size_t i = 0; i < shot.plate.pixels.size() / 3; ++i) {
@@ -72,7 +72,7 @@ TEST(RenderFrame, LeavesThePlateBitForBitFarFromTheObjects) {
 }
 
 TEST(RenderFrame, DoesNotDependOnTilesOrThreads) {
-  MadeShot shot = made_shot(150, 110, made_scene());
+  MadeShot shot = made_shot(150, 110, shot_scene());
   for (const int interleave : {1, 2, 4}) {
     shot.job.effort.interleave = interleave;
     shot.job.effort.tile_size = 64;
@@ -92,7 +92,7 @@ TEST(RenderFrame, DoesNotDependOnTilesOrThreads) {
 
 // Lights' energies, camera and effort change from frame to frame; kept transport must not show.
 TEST(RenderFrame, IsTheSameColdAndWarm) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   render::Instance real = scene.instances[1];  // a real ball, which shades the floor too
   real.kind = render::ObjectKind::stand_in;
   real.set_from_object[3] = -1.2F;
@@ -129,7 +129,7 @@ TEST(RenderFrame, IsTheSameColdAndWarm) {
 // Objects move from frame to frame, in random steps; what is kept, and shared between scenes, must
 // not show.
 TEST(RenderFrame, IsTheSameColdAndWarmWhileThingsMove) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   scene.instances[2].moves = true;
   MadeShot shot = made_shot(96, 64, scene);
   render::KeptTransport kept;
@@ -159,7 +159,7 @@ TEST(RenderFrame, IsTheSameColdAndWarmWhileThingsMove) {
 }
 
 TEST(RenderFrame, RestoresThePictureFromPlateMatteAndFill) {
-  const MadeShot shot = made_shot(120, 90, made_scene());
+  const MadeShot shot = made_shot(120, 90, shot_scene());
   const FrameResult result = render(shot);
   for (std::size_t i = 0; i < shot.plate.pixels.size() / 3; ++i) {
     const float matte = float_from_half(result.matte.pixels[i]);
@@ -172,7 +172,7 @@ TEST(RenderFrame, RestoresThePictureFromPlateMatteAndFill) {
 
 TEST(RenderFrame, IsWhiteInAWhiteFurnace) {
   for (const float roughness : {0.0F, 0.3F, 1.0F}) {
-    render::SceneDescription scene = made_scene(false);
+    render::SceneDescription scene = shot_scene(false);
     scene.background = "environment";
     scene.instances.clear();
     render::StandardParameters white;
@@ -203,7 +203,7 @@ TEST(RenderFrame, IsWhiteInAWhiteFurnace) {
 }
 
 TEST(RenderFrame, PutsTheShadowWhereTheSunSaysAndAsDeep) {
-  MadeShot shot = made_shot(200, 150, made_scene());
+  MadeShot shot = made_shot(200, 150, shot_scene());
   // A sun of 3 parts and a sky of 1 part straight above: the shadow keeps a quarter.
   shot.job.lights.lights = {{normalize(render::Vec3f{0, 1, 1}), {3 * 1.41421356F, 3, 3}, 0},
                             {{0, 0, 1}, {1, 1, 1}, 0}};
@@ -247,7 +247,7 @@ struct RoughPlate {
     return float_from_half(result.rgba.pixels[result.rgba.index(32, 32, 1)]);
   }
   static render::SceneDescription describe(bool with_roof) {
-    render::SceneDescription scene = made_scene(false);
+    render::SceneDescription scene = shot_scene(false);
     scene.instances.clear();
     render::StandardParameters metal;
     metal.metallic = 1;
@@ -286,7 +286,7 @@ TEST(RenderFrame, MirrorsASunInARoughPlateOnlyWhereItShines) {
 
 // A mirror ball under a small sun, whose picture in it is a few pixels or less.
 MadeShot made_glint(int size) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   scene.instances.clear();
   render::StandardParameters chrome;
   chrome.metallic = 1;
@@ -362,7 +362,7 @@ struct SunnyBalls {
     }
   }
   static MadeShot make_shot() {
-    render::SceneDescription scene = made_scene(false);
+    render::SceneDescription scene = shot_scene(false);
     const auto add = [&](render::Vec3f centre, float roughness, float metallic) {
       render::StandardParameters p;
       p.roughness = roughness;
@@ -405,7 +405,7 @@ TEST(RenderTile, DoesNotAllocate) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   GTEST_SKIP() << "a sanitizer allocates by itself";
 #endif
-  const MadeShot shot = made_shot(128, 96, made_scene());
+  const MadeShot shot = made_shot(128, 96, shot_scene());
   for (const bool count_rays : {false, true}) {
     render::FrameInputs inputs = shot.inputs();
     inputs.count_rays = count_rays;
@@ -449,7 +449,7 @@ TEST(RenderTile, DoesNotAllocateUnderLiveVideo) {
 }
 
 TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
-  MadeShot shot = made_shot(32, 32, made_scene());
+  MadeShot shot = made_shot(32, 32, shot_scene());
   const auto refuse = [&](auto&& change) {
     const render::FrameJob before = shot.job;
     change(shot.job);
@@ -480,11 +480,11 @@ TEST(MakeFrameContext, RefusesEffortsThatMakeNoSense) {
 }
 
 TEST(RenderFrame, RefusesAPlateOfAnotherSize) {
-  const MadeShot shot = made_shot(32, 32, made_scene());
+  const MadeShot shot = made_shot(32, 32, shot_scene());
   FrameResult result;
   EXPECT_THROW(render_frame(shot.inputs(), shot.job, made_plate(32, 33), result),
                std::invalid_argument);
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::kernel_test

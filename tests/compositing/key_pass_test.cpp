@@ -12,7 +12,7 @@
 #include "compositing/background_subtraction.h"
 #include "compositing/keyer.h"
 
-namespace compositing {
+namespace compositing::key_pass_test {
 namespace {
 
 using capture::HalfImage;
@@ -254,4 +254,4 @@ TEST(Keyer, LeavesNothingOfAPersonWhoHasLeft) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::key_pass_test

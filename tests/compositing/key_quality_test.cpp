@@ -6,7 +6,7 @@
 
 #include "compositing/key_trial.h"
 
-namespace compositing {
+namespace compositing::key_quality_test {
 namespace {
 
 // Not those of the table (31 to 36), nor of the dials (21, 22).
@@ -97,4 +97,4 @@ TEST(KeyQuality, HoldsOverAllScenesSeedsAndFrames) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::key_quality_test

@@ -11,7 +11,7 @@
 #include "compositing/made_clip.h"
 #include "compositing/picture_window.h"
 
-namespace compositing {
+namespace compositing::keyed_picture_test {
 namespace {
 
 std::shared_ptr<const TexelKeyedPicture> picture_of(const char* scene,
@@ -79,4 +79,4 @@ TEST(TexelKeyedPicture, LooksUpNothingOfNowhere) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::keyed_picture_test

@@ -17,7 +17,7 @@
 #include "compositing/made_clip.h"
 #include "render/video_texture.h"
 
-namespace compositing {
+namespace compositing::keyed_texture_test {
 namespace {
 
 capture::Image random_picture(int height, int width, int channels, unsigned seed) {
@@ -232,4 +232,4 @@ TEST(KeyedTexture, TakesPicturesThatAreNotKeyed) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::keyed_texture_test

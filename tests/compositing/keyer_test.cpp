@@ -14,7 +14,7 @@
 #include "compositing/key_training.h"
 #include "compositing/made_clip.h"
 
-namespace compositing {
+namespace compositing::keyer_test {
 namespace {
 
 using capture::HalfImage;
@@ -343,4 +343,4 @@ TEST(Keyer, RefusesWhatDoesNotFitNamingBoth) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::keyer_test

@@ -9,7 +9,7 @@
 #include "tests/render/plain_shapes.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace compositing {
+namespace compositing::lens_image_test {
 namespace {
 
 using render::Mesh;
@@ -215,4 +215,4 @@ TEST(GlassLens, ThrowsARealImageOnAScreen) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::lens_image_test

@@ -7,7 +7,7 @@
 #include "render/kept_transport.h"
 #include "render/reference.h"
 
-namespace compositing {
+namespace compositing::live_light_test {
 namespace {
 
 using capture::float_from_half;
@@ -205,4 +205,4 @@ TEST(VideoLight, RefusesLampsThatAreNotFinite) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::live_light_test

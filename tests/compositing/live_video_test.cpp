@@ -6,7 +6,7 @@
 #include "render/kept_transport.h"
 #include "render/reference.h"
 
-namespace compositing {
+namespace compositing::live_video_test {
 namespace {
 
 using capture::float_from_half;
@@ -129,4 +129,4 @@ TEST(LiveVideo, MustBeThereForEveryTextureOfTheScene) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::live_video_test

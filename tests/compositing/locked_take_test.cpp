@@ -15,7 +15,7 @@
 #include "compositing/recorder.h"
 #include "take.h"
 
-namespace compositing {
+namespace compositing::locked_take_test {
 namespace {
 
 // Which of both files is the larger one.
@@ -341,4 +341,4 @@ TEST_F(LockedTakeTest, RefusesFramesWithoutAPlate) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::locked_take_test

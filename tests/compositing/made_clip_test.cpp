@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace compositing {
+namespace compositing::made_clip_test {
 namespace {
 
 TEST(MadeClip, IsThePersonOverTheScreenSeenThroughTheCamera) {
@@ -69,4 +69,4 @@ TEST(MadeClip, RefusesPicturesTooSmallForAPerson) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::made_clip_test

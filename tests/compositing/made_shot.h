@@ -89,7 +89,7 @@ inline capture::HalfImage made_plate(int height, int width) {
 }
 
 // Objects: a red ball with clear coat, a thin glass ball, on a floor; or the floor alone.
-inline render::SceneDescription made_scene(bool objects = true) {
+inline render::SceneDescription shot_scene(bool objects = true) {
   register_shaders();
   render::SceneDescription scene;
   scene.background = "plate";

@@ -9,7 +9,7 @@
 
 #include "capture/camera.h"
 
-namespace compositing {
+namespace compositing::made_walker_camera_test {
 namespace {
 
 std::unique_ptr<capture::Camera> open(const std::string& uri, std::int64_t frame = 0) {
@@ -62,4 +62,4 @@ TEST(MadeWalkerCamera, RefusesWhatItDoesNotKnow) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::made_walker_camera_test

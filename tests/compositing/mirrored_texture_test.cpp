@@ -10,7 +10,7 @@
 #include "render/reference.h"
 #include "render/texture.h"
 
-namespace compositing {
+namespace compositing::mirrored_texture_test {
 namespace {
 
 constexpr int width = 64, height = 48;
@@ -278,4 +278,4 @@ TEST(NormalMap, NeverSendsBackMoreThanItGets) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::mirrored_texture_test

@@ -8,7 +8,7 @@
 #include "render/area_light.h"
 #include "render/cell_reach.h"
 
-namespace compositing {
+namespace compositing::moving_things_test {
 namespace {
 
 using render::Scene;
@@ -162,7 +162,7 @@ TEST(MovingThings, ShowAtOnceInEveryCellThatSeesThem) {
 
 // A small thing in a corner leaves most of a wide picture as it is.
 TEST(MovingThings, LeaveCellsFarAwayAsTheyAre) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   render::StandardParameters paint;
   paint.clearcoat = 1;
   scene.materials.push_back(render::make_standard_material("paint", paint));
@@ -196,4 +196,4 @@ TEST(MovingThings, LeaveCellsFarAwayAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::moving_things_test

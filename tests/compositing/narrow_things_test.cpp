@@ -11,7 +11,7 @@
 #include "made_shot.h"
 #include "render/kept_transport.h"
 
-namespace compositing {
+namespace compositing::narrow_things_test {
 namespace {
 
 using capture::float_from_half;
@@ -40,7 +40,7 @@ render::FrameResult frame_of(const MadeShot& shot) {
 
 // A slab on the floor, half a pixel high, that covers all of the picture from behind row `row` on.
 MadeShot beside_slab(int row) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   auto slab = std::make_shared<render::Mesh>();
   const float edge = metres_up(row + 0.5), height = 0.005F;
   slab->positions = {{-5, -5, height},   {5, -5, height}, {5, edge, height},
@@ -92,7 +92,7 @@ TEST(NarrowTips, AreSeenWhereNoPixelsSideShowsThem) {
   for (const auto& [across, down] :
        {std::array<double, 2>{0.3, 0.3}, {0.4, 0.2}, {0.15, 0.45}, {0.45, 0.45}}) {
     for (const int at : {20, 22, 25}) {
-      render::SceneDescription scene = made_scene(false);
+      render::SceneDescription scene = shot_scene(false);
       render::StandardParameters bright;
       std::fill_n(bright.base_color, 3, 0.0F);
       bright.specular = 0;
@@ -124,7 +124,7 @@ TEST(NarrowTips, AreSeenWhereNoPixelsSideShowsThem) {
 enum class Source { sun, lamp, many_lamps };
 
 MadeShot under_a_roof(Source source, float roughness) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   scene.instances.clear(), scene.meshes.clear();
   render::StandardParameters grey;
   std::fill_n(grey.base_color, 3, 0.5F);
@@ -194,7 +194,7 @@ TEST(SharpShadows, EndWithinPixelsAlsoWhereTheyAreFaint) {
 
 // A sheet of bare metal in the sun, whose end is rounded within less than half a pixel.
 MadeShot of_a_sheet(double column, double zoom, float roughness) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   render::StandardParameters metal;
   metal.metallic = 1;
   metal.roughness = roughness;
@@ -333,4 +333,4 @@ TEST(SmallLights, AreFoundAnewWhereTheyMove) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::narrow_things_test

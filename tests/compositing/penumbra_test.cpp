@@ -13,7 +13,7 @@
 #include "tests/render/plain_shapes.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace compositing {
+namespace compositing::penumbra_test {
 namespace {
 
 using calibrate::Vec3;
@@ -267,4 +267,4 @@ TEST(Penumbra, IsWhatTheOverlapSaysUnderAGlowingBall) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::penumbra_test

@@ -11,7 +11,7 @@
 #include "calibrate/angles.h"
 #include "compositing/made_walker.h"
 
-namespace compositing {
+namespace compositing::person_box_test {
 namespace {
 
 using calibrate::degree;
@@ -125,4 +125,4 @@ TEST(OutlineBox, IsOfAllThatMayBeSomebody) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::person_box_test

@@ -11,7 +11,7 @@
 
 #include "calibrate/angles.h"
 
-namespace compositing {
+namespace compositing::person_shape_test {
 namespace {
 
 using calibrate::degree;
@@ -151,4 +151,4 @@ TEST(ChooseShape, LeavesOutCamerasThatAreNotGood) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::person_shape_test

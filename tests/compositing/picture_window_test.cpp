@@ -9,7 +9,7 @@
 
 #include "compositing/keyed_picture.h"
 
-namespace compositing {
+namespace compositing::picture_window_test {
 namespace {
 
 // Somebody of alpha .8 in the middle third.
@@ -65,4 +65,4 @@ TEST(PictureWindow, RefusesWhatIsNoPart) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::picture_window_test

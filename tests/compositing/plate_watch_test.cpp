@@ -13,7 +13,7 @@
 #include "compositing/made_clip.h"
 #include "compositing/made_video_camera.h"
 
-namespace compositing {
+namespace compositing::plate_watch_test {
 namespace {
 
 using capture::Image;
@@ -174,4 +174,4 @@ TEST(PlateWatch, MakesTheKeyNoSurerOfAMovedCameraWhenACrowdHidesIt) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::plate_watch_test

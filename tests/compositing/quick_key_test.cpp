@@ -12,7 +12,7 @@
 #include "compositing/keyer.h"
 #include "compositing/made_clip.h"
 
-namespace compositing {
+namespace compositing::quick_key_test {
 namespace {
 
 using capture::HalfImage;
@@ -194,4 +194,4 @@ TEST(QuickKey, RefusesWhatTheFullOneRefuses) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::quick_key_test

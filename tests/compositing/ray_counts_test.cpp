@@ -10,7 +10,7 @@
 #include "render/glass.h"
 #include "render/kept_transport.h"
 
-namespace compositing {
+namespace compositing::ray_counts_test {
 namespace {
 
 using render::FrameResult;
@@ -18,7 +18,7 @@ using render::RayCount;
 
 // All kinds of rays: edges and glints, mirrors, glass, a real ball that shades, a lamp.
 MadeShot busy_shot(int width = 120, int height = 80) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   render::Instance real = scene.instances[1];
   real.kind = render::ObjectKind::stand_in;
   real.set_from_object[3] = -1.2F;
@@ -104,7 +104,7 @@ TEST(CountRays, TellsTheSameOfWhatIsKept) {
 }
 
 TEST(CountRays, IsOneRayWhereThereIsOnlyThePlate) {
-  MadeShot shot = made_shot(64, 48, made_scene(false));
+  MadeShot shot = made_shot(64, 48, shot_scene(false));
   shot.job.cam_from_set = calibrate::look_at({3, -3, 1.5}, {1, 0, -1}, 0);  // below the horizon
   for (const RayCount& pixel : render(shot, true).rays.pixels) {
     ASSERT_EQ(pixel, (RayCount{.rays = 1, .shadow_rays = 0, .depth = 0, .error = 0}));
@@ -164,4 +164,4 @@ TEST(CountRays, EstimatesAnErrorWhereFurtherSamplesAreAndLessTheMoreThereAre) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::ray_counts_test

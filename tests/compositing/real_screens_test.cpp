@@ -15,7 +15,7 @@
 #include "compositing/made_video_camera.h"
 #include "tests/made_files.h"
 
-namespace compositing {
+namespace compositing::real_screens_test {
 namespace {
 
 using capture::Image;
@@ -172,4 +172,4 @@ TEST(RealScreens, AYellowWallsEdgesAreCleanAndThePersonWhole) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::real_screens_test

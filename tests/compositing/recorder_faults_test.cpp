@@ -15,7 +15,7 @@
 #include "compositing/recorder.h"
 #include "take.h"
 
-namespace compositing {
+namespace compositing::recorder_faults_test {
 namespace {
 
 using RecorderFaultsTest = TakeTest;
@@ -219,4 +219,4 @@ TEST_F(RecorderFaultsTest, RefusesFramesThatLackWhatIsRecorded) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::recorder_faults_test

@@ -13,7 +13,7 @@
 
 #include "take.h"
 
-namespace compositing {
+namespace compositing::recorder_test {
 namespace {
 
 using RecorderTest = TakeTest;
@@ -260,4 +260,4 @@ TEST_F(RecorderTest, RecordsWithoutTimecodeWhereTheRateHasNone) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::recorder_test

@@ -10,6 +10,7 @@
 #include "calibrate/angles.h"
 #include "compositing/stand_in.h"
 
+namespace compositing::reference_test {
 namespace {
 
 using namespace render;  // the reference is render's; only its stand-ins need this folder
@@ -162,3 +163,4 @@ TEST(RenderReference, HidesVirtualObjectsBehindStandInsUnlessTheyDoNotOcclude) {
 }
 
 }  // namespace
+}  // namespace compositing::reference_test

@@ -11,7 +11,7 @@
 #include "made_shot.h"
 #include "render/kept_transport.h"
 
-namespace compositing {
+namespace compositing::refinement_test {
 namespace {
 
 using render::FrameResult;
@@ -37,7 +37,7 @@ Stages all_at(int stage, std::size_t cells_n = cells) {
 }
 
 TEST(Refinement, EndsWithTheSameBitsAsAtOnce) {
-  const MadeShot shot = made_shot(96, 64, made_scene());
+  const MadeShot shot = made_shot(96, 64, shot_scene());
   const FrameResult at_once = render_at(shot, {});
   render::KeptTransport kept;
   FrameResult last;
@@ -52,7 +52,7 @@ TEST(Refinement, EndsWithTheSameBitsAsAtOnce) {
 }
 
 TEST(Refinement, TakesRaysOnlyForCellsThatGoOn) {
-  const MadeShot shot = made_shot(96, 64, made_scene());
+  const MadeShot shot = made_shot(96, 64, shot_scene());
   render::KeptTransport kept;
   const auto rays = [&](const Stages& stages) {
     return render_at(shot, stages, &kept).statistics.primary_rays;
@@ -74,7 +74,7 @@ TEST(Refinement, TakesRaysOnlyForCellsThatGoOn) {
 
 // Plate, light and what is moved change between frames, and so does how sharp they are.
 TEST(Refinement, IsTheSameColdAndWarm) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   scene.instances[2].moves = true;
   MadeShot shot = made_shot(96, 64, scene);
   for (render::DirectionalLight& light : shot.job.lights.lights) light.planned = light.irradiance;
@@ -101,7 +101,7 @@ TEST(Refinement, IsTheSameColdAndWarm) {
 }
 
 TEST(Refinement, BringsThePictureNearerToTheFinishedOneInEveryStage) {
-  const MadeShot shot = made_shot(192, 128, made_scene());
+  const MadeShot shot = made_shot(192, 128, shot_scene());
   const capture::Image finished = capture::to_float(render_at(shot, {}).rgba);
   double before = 1e9;
   for (int stage = 0; stage < render::finished_stage; ++stage) {
@@ -121,7 +121,7 @@ TEST(Refinement, BringsThePictureNearerToTheFinishedOneInEveryStage) {
 // Where pixels share a camera ray, also in cells that the picture's border cuts, each shows its own
 // plate and what its block's ray met.
 TEST(Refinement, SharesARayInBlocks) {
-  const MadeShot shot = made_shot(90, 61, made_scene());
+  const MadeShot shot = made_shot(90, 61, shot_scene());
   const FrameResult fine = render_at(shot, all_at(render::one_ray_stage));
   for (int stage = 0; stage < render::one_ray_stage; ++stage) {
     const int size = render::block_of_stage(stage);
@@ -143,7 +143,7 @@ TEST(Refinement, SharesARayInBlocks) {
 }
 
 TEST(Refinement, SmoothsEdgesAndHardlyShadesMore) {
-  const MadeShot shot = made_shot(192, 128, made_scene());
+  const MadeShot shot = made_shot(192, 128, shot_scene());
   const FrameResult finished = render_at(shot, {});
   const FrameResult hard = render_at(shot, all_at(render::one_ray_stage, 4 * cells));
   const FrameResult smooth = render_at(shot, all_at(render::smoothed_stage, 4 * cells));
@@ -169,7 +169,7 @@ TEST(Refinement, SmoothsEdgesAndHardlyShadesMore) {
 
 // What is smoothed lies between what the pixel and those around it showed.
 TEST(Refinement, SmoothsWithinWhatNeighboursShow) {
-  MadeShot shot = made_shot(96, 64, made_scene());
+  MadeShot shot = made_shot(96, 64, shot_scene());
   std::ranges::fill(shot.plate.pixels, capture::Half{0});
   const auto hard = capture::to_float(render_at(shot, all_at(render::one_ray_stage)).rgba);
   const auto smooth = capture::to_float(render_at(shot, all_at(render::smoothed_stage)).rgba);
@@ -195,10 +195,10 @@ TEST(Refinement, SmoothsWithinWhatNeighboursShow) {
 }
 
 TEST(Refinement, RefusesStagesThatAreNotThere) {
-  const MadeShot shot = made_shot(96, 64, made_scene());
+  const MadeShot shot = made_shot(96, 64, shot_scene());
   EXPECT_THROW(render_at(shot, all_at(0, cells - 1)), std::invalid_argument);
   EXPECT_THROW(render_at(shot, all_at(render::finished_stage + 1)), std::invalid_argument);
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::refinement_test

@@ -10,6 +10,7 @@
 #include "compositing/stand_in.h"
 #include "render/reference.h"
 
+namespace compositing::sampled_light_test {
 namespace {
 
 using namespace render;  // only its stand-ins need this folder
@@ -138,3 +139,4 @@ TEST(RenderSampledLight, RefusesWhatItCannotShow) {
 }
 
 }  // namespace
+}  // namespace compositing::sampled_light_test

@@ -10,7 +10,7 @@
 #include "compositing/made_clip.h"
 #include "compositing/screen_near.h"
 
-namespace compositing {
+namespace compositing::screen_near_test {
 namespace {
 
 TEST(ScreenNear, FallsWithTheDistanceFromTheNearestCellThatShowsTheScreen) {
@@ -81,4 +81,4 @@ TEST(ScreenNear, FollowsThePersonInEachFrame) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::screen_near_test

@@ -7,7 +7,7 @@
 
 #include "made_shot.h"
 
-namespace compositing {
+namespace compositing::shadow_edges_test {
 namespace {
 
 using capture::float_from_half;
@@ -15,7 +15,7 @@ using capture::float_from_half;
 // A floor seen from straight above, 100 pixels a metre, half of it in the shadow of a wide roof
 // under a sun straight above: the shadow's edge is the picture's row `row`, less `slope` a column.
 MadeShot half_shaded(float row, float slope) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   auto roof = std::make_shared<render::Mesh>();
   // Behind the camera, as wide as all the picture and more: y is up in it.
   const auto y_at = [&](float column) { return (31.5F - row + slope * column) / 100; };
@@ -115,7 +115,7 @@ TEST(RenderFrame, IsSmoothWhereAMirroredEdgeLiesOnTheBorderOfCells) {
 
 // What a lamp adds on the real floor is no mirrored light that a cell's neighbours would lack.
 TEST(RenderFrame, TakesNoMoreSamplesOnTheBordersOfCellsWhereALampShines) {
-  MadeShot shot = made_shot(64, 64, made_scene(false));
+  MadeShot shot = made_shot(64, 64, shot_scene(false));
   shot.job.cam_from_set = calibrate::look_at({0, 0, 3}, {0, 0, 0}, 0);
   render::LocalLight lamp;
   lamp.position = {0.3F, 0, 1.5F};
@@ -127,7 +127,7 @@ TEST(RenderFrame, TakesNoMoreSamplesOnTheBordersOfCellsWhereALampShines) {
 }
 
 TEST(RenderFrame, MakesSoftShadowsWithoutSeamsBetweenCells) {
-  MadeShot shot = made_shot(192, 144, made_scene(), 256);
+  MadeShot shot = made_shot(192, 144, shot_scene(), 256);
   render::FrameResult adaptive, all;
   render_frame(shot.inputs(), shot.job, shot.plate, adaptive);
   shot.job.effort.adaptive_visibility = false;
@@ -155,4 +155,4 @@ TEST(RenderFrame, MakesSoftShadowsWithoutSeamsBetweenCells) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::shadow_edges_test

@@ -15,7 +15,7 @@
 #include "render/soft_lights.h"
 #include "render/texture.h"
 
-namespace compositing {
+namespace compositing::soft_lights_test {
 namespace {
 
 using capture::float_from_half;
@@ -30,7 +30,7 @@ constexpr double metres_a_pixel = 0.01;
 // A floor seen from straight above, under one light, and a board `height` above it that covers what
 // is below row `row` of the picture.
 MadeShot under_board(double row, float height, const render::DirectionalLight& light) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   auto board = std::make_shared<render::Mesh>();
   const auto edge = static_cast<float>((31.5 - row) * metres_a_pixel);
   board->positions = {{-5, -5, height}, {5, -5, height}, {5, edge, height}, {-5, edge, height}};
@@ -189,7 +189,7 @@ double rms_of_shadows(const render::FrameResult& a, const render::FrameResult& b
 }
 
 TEST(SoftLights, ComeNearerToAnEvenSkyThanAsManyHardOnes) {
-  MadeShot shot = made_shot(320, 240, made_scene());
+  MadeShot shot = made_shot(320, 240, shot_scene());
   const render::Environment sky = made_sky(64, 0.2F, 1);
   shot.job.effort.aa_samples = 1;
   const auto frame_under = [&](int count, bool soft) {
@@ -428,7 +428,7 @@ TEST(SoftLights, StandSideBySideInTheOrderOfTheirPlaces) {
 // A matte wall under a roof that hides some of the lights, and how much the wall's light differs
 // from pixel to pixel in a part of the picture, as a share of its most.
 render::SceneDescription wall_under_roof() {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   scene.instances.clear();
   render::StandardParameters wall;
   wall.roughness = 1;
@@ -502,7 +502,7 @@ TEST(SoftLights, ShowNoGrainBehindHaze) {
 
 TEST(SoftLights, AreCulledOnlyWhereNoPartOfThemIsHidden) {
   for (const int count : {1, 3, 12, 64}) {
-    MadeShot shot = made_shot(160, 96, made_scene());
+    MadeShot shot = made_shot(160, 96, shot_scene());
     shot.job.lights = even_sky(count);
     shot.job.effort.aa_samples = 1;
     const render::FrameResult culled = frame_of(shot);
@@ -515,7 +515,7 @@ TEST(SoftLights, AreCulledOnlyWhereNoPartOfThemIsHidden) {
 }
 
 TEST(SoftLights, LeaveThePlateItsBitsWhereNothingIsHidden) {
-  MadeShot shot = made_shot(96, 64, made_scene(false));
+  MadeShot shot = made_shot(96, 64, shot_scene(false));
   shot.job.lights = even_sky(16);
   const render::FrameResult frame = frame_of(shot);
   for (int y = 0; y < 64; ++y) {
@@ -533,7 +533,7 @@ TEST(SoftLights, StayFiniteHoweverWideTheyAre) {
   for (const float spread :
        {-1.0F, 1e-30F, 1e-6F, 0.5F, 1.0F, 1.6F, 3.0F, 100.0F,
         std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {
-    MadeShot shot = made_shot(96, 64, made_scene());
+    MadeShot shot = made_shot(96, 64, shot_scene());
     shot.job.lights = even_lights(8);
     shot.job.lights.lights.push_back({{0, 0, -1}, {1, 1, 1}, spread});
     for (render::DirectionalLight& light : shot.job.lights.lights) light.spread = spread;
@@ -548,4 +548,4 @@ TEST(SoftLights, StayFiniteHoweverWideTheyAre) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::soft_lights_test

@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace compositing {
+namespace compositing::sound_track_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -103,4 +103,4 @@ TEST(SoundTrack, RefusesNoChannelsAndNoRate) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::sound_track_test

@@ -11,7 +11,7 @@
 #include "made_shot.h"
 #include "render/reference.h"
 
-namespace compositing {
+namespace compositing::stand_in_test {
 namespace {
 
 using capture::float_from_half;
@@ -37,7 +37,7 @@ render::Instance& add(render::SceneDescription& scene, std::shared_ptr<const ren
 // A ball half below the floor and one behind a wall, which is twice there: floor and the first wall
 // may let them be seen.
 MadeShot half_hidden(bool floor_occludes, bool wall_occludes) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   scene.instances[0].occludes = floor_occludes;
   add(scene, made_ball({0, 0, 0}, 0.7F, 1));
   add(scene, made_ball({-3, 3, 1}, 0.7F, 1));
@@ -81,7 +81,7 @@ TEST(StandIn, HidesOrShowsWhatIsBehindItAsInTheReference) {
 }
 
 TEST(StandIn, CatchesShadowWhetherItOccludesOrNot) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   const MadeShot hiding = made_shot(160, 120, scene);
   scene.instances[0].occludes = false;
   const MadeShot catching = made_shot(160, 120, std::move(scene));
@@ -92,7 +92,7 @@ TEST(StandIn, CatchesShadowWhetherItOccludesOrNot) {
 TEST(StandIn, IsSeenBehindAnotherThatDoesNotOcclude) {
   // A ball under the floor, with a plate between them that does occlude: all is as if the ball were
   // not there, but for light.
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   scene.instances[0].occludes = false;
   render::Instance& plate = add(scene, made_floor(3, 0));
   plate.kind = render::ObjectKind::stand_in;
@@ -106,7 +106,7 @@ TEST(StandIn, IsSeenBehindAnotherThatDoesNotOcclude) {
 
 // A black ball over a glossy floor under a bright sky, on a plate of a given darkness.
 MadeShot dark_reflection(float plate) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   render::StandInParameters mirror;
   mirror.catches_shadow = 0;
   mirror.catches_reflection = 1;
@@ -150,7 +150,7 @@ TEST(StandIn, TakesAwayTheMirroredSkyWhereThePlateIsBrightEnough) {
 
 TEST(RenderFrame, DimsVirtualThingsAsTheLensDimsThePlate) {
   // A lamp over a floor that tells no albedo, and a glowing ball, through an even lens and another.
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   render::StandardParameters glow;
   glow.emission[0] = glow.emission[1] = glow.emission[2] = 2;
   scene.materials[1] = render::make_standard_material("glow", glow);
@@ -179,4 +179,4 @@ TEST(RenderFrame, DimsVirtualThingsAsTheLensDimsThePlate) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::stand_in_test

@@ -8,7 +8,7 @@
 #include "tests/render/plain_shapes.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace compositing {
+namespace compositing::sun_through_glass_test {
 namespace {
 
 using render::Vec3f;
@@ -91,4 +91,4 @@ TEST(SunThroughGlass, ShowsInABallOnlyWhereItIs) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::sun_through_glass_test

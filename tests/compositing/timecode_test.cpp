@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace compositing {
+namespace compositing::timecode_test {
 namespace {
 
 constexpr capture::Rational ntsc{30000, 1001};
@@ -104,4 +104,4 @@ TEST(ParseTimecode, RefusesLabelsThatDoNotExist) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::timecode_test

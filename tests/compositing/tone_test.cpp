@@ -10,7 +10,7 @@
 
 #include "compositing/display.h"
 
-namespace compositing {
+namespace compositing::tone_test {
 namespace {
 
 capture::HalfImage half_image(int height, int width) {
@@ -201,4 +201,4 @@ TEST(CurveFor, IsACurveForAnyLevels) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::tone_test

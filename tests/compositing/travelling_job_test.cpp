@@ -10,7 +10,7 @@
 #include "made_shot.h"
 #include "render/environment_bytes.h"
 
-namespace compositing {
+namespace compositing::travelling_job_test {
 namespace {
 
 void append(std::vector<std::byte>& to, std::span<const std::byte> block) {
@@ -22,7 +22,7 @@ void append(std::vector<std::byte>& to, std::span<const std::byte> block) {
 
 TEST(FrameJob, RendersTheSameBitsInAnotherProcess) {
   const int width = 96, height = 64;
-  MadeShot shot = made_shot(width, height, made_scene());
+  MadeShot shot = made_shot(width, height, shot_scene());
   shot.job.frame = 7;
   shot.job.effort.interleave = 2;
   std::vector<std::byte> bytes;
@@ -65,7 +65,7 @@ TEST(FrameJob, RendersTheSameBitsInAnotherProcess) {
 // However tiles are cut, with or without more of the plate about them.
 TEST(TileJob, IsRenderedAsTheFrameIs) {
   const int width = 90, height = 52;
-  MadeShot shot = made_shot(width, height, made_scene());
+  MadeShot shot = made_shot(width, height, shot_scene());
   shot.directions.sensitivity.resize(shot.directions.z.size());
   for (std::size_t i = 0; i < shot.directions.sensitivity.size(); ++i) {
     shot.directions.sensitivity[i] = 1 - 0.3F * static_cast<float>(i % 7);
@@ -102,7 +102,7 @@ TEST(TileJob, IsRenderedAsTheFrameIs) {
 }
 
 TEST(RenderFrame, RefusesAPlateOfAnotherSizeThanItsPicture) {
-  const MadeShot shot = made_shot(96, 64, made_scene());
+  const MadeShot shot = made_shot(96, 64, shot_scene());
   const auto context = prepare_frame(shot.inputs(), shot.job, shot.plate);
   render::FrameResult result;
   EXPECT_THROW(render_frame(*context, made_plate(64, 80), result), std::invalid_argument);
@@ -114,4 +114,4 @@ TEST(RenderFrame, RefusesAPlateOfAnotherSizeThanItsPicture) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::travelling_job_test

@@ -19,7 +19,7 @@
 #include "render/reference.h"
 #include "render/trace.h"
 
-namespace compositing {
+namespace compositing::visual_hull_test {
 namespace {
 
 using render::Vec3f;
@@ -496,4 +496,4 @@ TEST(Hull, RefusesWhatCannotBeShown) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::visual_hull_test

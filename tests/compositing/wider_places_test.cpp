@@ -7,7 +7,7 @@
 
 #include "tests/compositing/made_shot.h"
 
-namespace compositing {
+namespace compositing::wider_places_test {
 namespace {
 
 // The evenly grey sky that was planned for, and a lamp in it.
@@ -28,7 +28,7 @@ render::Environment made_sky_with_lamp(float lamp) {
 
 // Balls of white metal that mirror each other and the sky, more or less sharply.
 MadeShot mirroring_balls() {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   std::size_t i = 0;
   for (const float roughness : {0.05F, 0.3F}) {
     render::StandardParameters metal;
@@ -76,4 +76,4 @@ TEST(WiderPlaces, ShowALampThatWasNotPlannedForWhereItIs) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::wider_places_test

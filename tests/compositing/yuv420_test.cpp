@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace compositing {
+namespace compositing::yuv420_test {
 namespace {
 
 struct Planes {
@@ -79,4 +79,4 @@ TEST(Yuv420Converter, RefusesOddSizesAndWrongLengths) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::yuv420_test

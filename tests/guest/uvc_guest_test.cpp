@@ -19,7 +19,7 @@
 #include "tests/guest/uvc_camera.h"
 #include "tests/guest/uvc_picture.h"
 
-namespace capture {
+namespace capture::uvc_guest_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -309,4 +309,4 @@ TEST_F(UvcCameraTest, ReturnsWithTheExposureThatWasAskedForLast) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::uvc_guest_test

@@ -15,7 +15,7 @@
 #include "capture/v4l2_device.h"
 #include "capture/v4l2_io.h"
 
-namespace capture {
+namespace capture::v4l2_guest_test {
 namespace {
 
 using testing::HasSubstr;
@@ -183,4 +183,4 @@ TEST(GuestCamera, ReturnsAfterItWasUnplugged) {
 }
 
 }  // namespace
-}  // namespace capture
+}  // namespace capture::v4l2_guest_test

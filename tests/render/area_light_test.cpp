@@ -8,7 +8,7 @@
 
 #include "plain_shapes.h"
 
-namespace render {
+namespace render::area_light_test {
 namespace {
 
 using std::numbers::pi;
@@ -187,4 +187,4 @@ TEST(LampsOf, TakeNoLightAwayWhereVideoIsBelowBlack) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::area_light_test

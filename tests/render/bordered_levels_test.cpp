@@ -9,7 +9,7 @@
 
 #include "render/environment.h"
 
-namespace render {
+namespace render::bordered_levels_test {
 namespace {
 
 using calibrate::Vec3f;
@@ -103,4 +103,4 @@ TEST(BorderedLevels, AreThoseOfTheLastBegin) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::bordered_levels_test

@@ -8,7 +8,7 @@
 #include "plain_shapes.h"
 #include "render/bounced_light.h"
 
-namespace render {
+namespace render::bounce_lamps_test {
 namespace {
 
 using std::numbers::pi;
@@ -260,4 +260,4 @@ TEST(BounceLamps, AreFoundAnewWhereSomethingMovesOrThePlanChanges) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::bounce_lamps_test

@@ -9,7 +9,7 @@
 #include "render/frame_job.h"
 #include "render/scene.h"
 
-namespace render {
+namespace render::bytes_test {
 namespace {
 
 FrameJob made_job() {
@@ -201,4 +201,4 @@ TEST(ParseEnvironment, RefusesDamage) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::bytes_test

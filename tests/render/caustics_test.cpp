@@ -10,7 +10,7 @@
 #include "render/caustics.h"
 #include "render/glass.h"
 
-namespace render {
+namespace render::caustics_test {
 namespace {
 
 using std::numbers::pi;
@@ -303,4 +303,4 @@ TEST(Caustics, StayFiniteWhateverTheBody) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::caustics_test

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace render {
+namespace render::cell_visibility_test {
 namespace {
 
 struct MadeCell {
@@ -111,4 +111,4 @@ TEST(AddUpLight, LosesExactlyNothingWhereNothingIsHidden) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::cell_visibility_test

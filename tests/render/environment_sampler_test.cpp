@@ -8,7 +8,7 @@
 #include "render/sample_sequence.h"
 #include "sun_and_sky.h"
 
-namespace render {
+namespace render::environment_sampler_test {
 namespace {
 
 TEST(EnvironmentSampler, EstimatesIrradianceWithoutBiasWhateverTheSun) {
@@ -84,4 +84,4 @@ TEST(EnvironmentSampler, TakesNotANumberAndNegativeLightAsBlack) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::environment_sampler_test

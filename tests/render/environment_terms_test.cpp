@@ -9,7 +9,7 @@
 
 #include "render/environment.h"
 
-namespace render {
+namespace render::environment_terms_test {
 namespace {
 
 using calibrate::Vec3f;
@@ -173,4 +173,4 @@ TEST(EnvironmentTerms, LookNoFartherThanTheBorder) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::environment_terms_test

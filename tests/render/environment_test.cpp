@@ -19,7 +19,7 @@
 #include "render/standard.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::environment_test {
 namespace {
 
 using calibrate::pi_f;
@@ -447,4 +447,4 @@ TEST(AreaAveraged, KeepsThePowerOfAnyMapAtAnySize) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::environment_test

@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 
-namespace render {
+namespace render::false_colour_test {
 namespace {
 
 using Rgb = std::array<int, 3>;
@@ -131,4 +131,4 @@ TEST(RayViewNamed, KnowsItsNamesOnly) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::false_colour_test

@@ -8,7 +8,7 @@
 
 #include "tests/render/plain_shapes.h"
 
-namespace render {
+namespace render::glowing_parts_test {
 namespace {
 
 constexpr std::array<float, 12> unmoved{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
@@ -76,4 +76,4 @@ TEST(SmallLights, AreLessThanTwoPixelsWide) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::glowing_parts_test

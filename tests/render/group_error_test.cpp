@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace render {
+namespace render::group_error_test {
 namespace {
 
 capture::Image grey(int height, int width, float value, int channels = 3) {
@@ -86,4 +86,4 @@ TEST(GroupErrors, RefusesPicturesOfOtherSizes) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::group_error_test

@@ -5,7 +5,7 @@
 
 #include "render/standard.h"
 
-namespace render {
+namespace render::join_scenes_test {
 namespace {
 
 // One triangle with one texture of a grey of its own.
@@ -70,4 +70,4 @@ TEST(Join, LeavesATextureThatIsNoneNone) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::join_scenes_test

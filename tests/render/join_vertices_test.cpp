@@ -8,7 +8,7 @@
 #include <numbers>
 #include <set>
 
-namespace render {
+namespace render::join_vertices_test {
 namespace {
 
 // Every triangle with corners of its own.
@@ -127,4 +127,4 @@ TEST(JoinVertices, GivesTrianglesWithoutAreaSomeNormal) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::join_vertices_test

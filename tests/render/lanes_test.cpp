@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace render {
+namespace render::lanes_test {
 namespace {
 
 TEST(FoursOf, TakesEachColourFromItsPlaces) {
@@ -50,4 +50,4 @@ TEST(Root, IsThatOfEveryLane) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::lanes_test

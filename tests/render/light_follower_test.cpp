@@ -6,7 +6,7 @@
 #include "tests/render/made_shading.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::light_follower_test {
 namespace {
 
 void dim(Environment& env, float factor) {
@@ -190,4 +190,4 @@ TEST(LightFollower, TakesNewSettingsAtOnce) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::light_follower_test

@@ -14,7 +14,7 @@
 #include "render/trace.h"
 #include "render/visibility_finder.h"
 
-namespace render {
+namespace render::light_gather_test {
 namespace {
 
 class LightGather : public testing::Test {
@@ -374,4 +374,4 @@ TEST_F(LightGather, HasWaysOfEightPointsAsOfOne) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::light_gather_test

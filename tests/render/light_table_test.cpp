@@ -11,7 +11,7 @@
 #include "tests/render/made_shading.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::light_table_test {
 namespace {
 
 constexpr LightMethod methods[] = {LightMethod::median_cut, LightMethod::split};
@@ -183,4 +183,4 @@ TEST(MakeLightTable, MakesAsManyAsFourThousandLights) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::light_table_test

@@ -14,6 +14,7 @@
 #include "render/standard.h"
 #include "tests/made_files.h"
 
+namespace render::load_mesh_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -239,3 +240,4 @@ TEST(LoadModel, CutsMaskedAlphaAndLetsThinGlassThrough) {
 }
 
 }  // namespace
+}  // namespace render::load_mesh_test

@@ -12,7 +12,7 @@
 
 #include "tests/made_files.h"
 
-namespace render {
+namespace render::load_shape_test {
 namespace {
 
 using testing::AllOf, testing::HasSubstr;
@@ -157,4 +157,4 @@ TEST_F(LoadShapeTest, RefusesAFileThatIsNotThere) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::load_shape_test

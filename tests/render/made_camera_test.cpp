@@ -9,7 +9,7 @@
 
 #include "capture/camera.h"
 
-namespace render {
+namespace render::made_camera_test {
 namespace {
 
 std::unique_ptr<capture::Camera> open(const std::string& rest,
@@ -89,4 +89,4 @@ TEST(MadeCamera, RefusesWhatItIsNot) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::made_camera_test

@@ -11,7 +11,7 @@
 #include "render/standard.h"
 #include "render/trace.h"
 
-namespace render {
+namespace render::made_car_test {
 namespace {
 
 const SceneDescription& car() {
@@ -170,4 +170,4 @@ TEST(MadeCar, TakesTheGainOfItsLamps) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::made_car_test

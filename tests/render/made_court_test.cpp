@@ -7,7 +7,7 @@
 
 #include "render/standard.h"
 
-namespace render {
+namespace render::made_court_test {
 namespace {
 
 MadeCourtSettings small() { return {.texture_size = 64}; }
@@ -65,4 +65,4 @@ TEST(MakeCourt, RepeatsItself) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::made_court_test

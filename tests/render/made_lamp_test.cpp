@@ -11,7 +11,7 @@
 #include "render/made_shapes.h"
 #include "render/photograph_view.h"
 
-namespace render {
+namespace render::made_lamp_test {
 namespace {
 
 Environment darkness() {
@@ -69,4 +69,4 @@ TEST(LightsOfMadeLamp, HaveTheDiscsPowerWhateverTheirNumber) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::made_lamp_test

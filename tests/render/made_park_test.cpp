@@ -8,7 +8,7 @@
 
 #include "render/environment.h"
 
-namespace render {
+namespace render::made_park_test {
 namespace {
 
 MadeStudioSettings small() {
@@ -104,4 +104,4 @@ TEST(MakePark, RefusesAMapWithoutLight) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::made_park_test

@@ -8,7 +8,7 @@
 
 #include "render/environment.h"
 
-namespace render {
+namespace render::made_sky_test {
 namespace {
 
 MadeSkySettings small() {
@@ -75,4 +75,4 @@ TEST(MakeSky, RefusesMapsThatCannotHoldTheSun) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::made_sky_test

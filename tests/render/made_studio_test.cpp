@@ -13,7 +13,7 @@
 #include "render/made_shapes.h"
 #include "render/standard.h"
 
-namespace render {
+namespace render::made_studio_test {
 namespace {
 
 MadeStudioSettings small() {
@@ -250,4 +250,4 @@ TEST(MakeStudio, RefusesPicturesTooSmallToSee) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::made_studio_test

@@ -10,7 +10,7 @@
 #include "calibrate/angles.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::match_test {
 namespace {
 
 using calibrate::pi_f;
@@ -152,4 +152,4 @@ TEST(MatchByMatrix, IsTheMatrixTimesTheExposureAndTheGainOfGrey) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::match_test

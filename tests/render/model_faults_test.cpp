@@ -17,7 +17,7 @@
 #include "tests/made_files.h"
 #include "tests/made_model_bytes.h"
 
-namespace render {
+namespace render::model_faults_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -326,4 +326,4 @@ TEST(ModelFaults, RefusesTexturesThatTogetherTakeTooMuch) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::model_faults_test

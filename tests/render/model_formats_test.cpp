@@ -22,7 +22,7 @@
 #include "tests/made_fbx.h"
 #include "tests/made_files.h"
 
-namespace render {
+namespace render::model_formats_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -269,4 +269,4 @@ TEST(LoadModel, ReadsTheMadeHeadlightBackFromPly) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::model_formats_test

@@ -19,7 +19,7 @@
 #include "render/standard.h"
 #include "tests/made_files.h"
 
-namespace render {
+namespace render::model_memory_test {
 namespace {
 
 constexpr int width = 640, height = 480;
@@ -174,4 +174,4 @@ TEST(ModelMemory, OfTheHeadlightIsBelow400MegabytesInAll) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::model_memory_test

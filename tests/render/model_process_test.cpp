@@ -15,7 +15,7 @@
 #include "tests/made_files.h"
 #include "tests/made_model_bytes.h"
 
-namespace render {
+namespace render::model_process_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -162,4 +162,4 @@ TEST(ReadModelConfined, BelievesNothingThatItsReaderSends) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::model_process_test

@@ -8,7 +8,7 @@
 
 #include "render/reference.h"
 
-namespace render {
+namespace render::paired_error_test {
 namespace {
 
 constexpr int side = 32;
@@ -106,4 +106,4 @@ TEST(PairedError, RefusesPicturesOfTwoSizes) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::paired_error_test

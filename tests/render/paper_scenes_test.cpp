@@ -18,7 +18,7 @@
 #include "render/standard.h"
 #include "render/trace.h"
 
-namespace render {
+namespace render::paper_scenes_test {
 namespace {
 
 const PaperScene& made(const std::string& name) {
@@ -379,4 +379,4 @@ TEST(MakeHeadlight, HasABulbThatMovesAsOneAndSitsInTheFocus) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::paper_scenes_test

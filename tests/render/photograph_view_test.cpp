@@ -8,7 +8,7 @@
 #include "render/made_scene.h"
 #include "render/made_shapes.h"
 
-namespace render {
+namespace render::photograph_view_test {
 namespace {
 
 // A grey floor, and a box over its middle.
@@ -58,4 +58,4 @@ TEST(PhotographView, RefusesNothingToLookAt) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::photograph_view_test

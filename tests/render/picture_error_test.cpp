@@ -8,7 +8,7 @@
 
 #include "render/reference.h"
 
-namespace render {
+namespace render::picture_error_test {
 namespace {
 
 capture::Image grey(float value, int width = 10, int height = 10) {
@@ -122,4 +122,4 @@ TEST(PictureError, RefusesPicturesOfTwoSizes) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::picture_error_test

@@ -11,7 +11,7 @@
 #include "calibrate/angles.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::probe_test {
 namespace {
 
 using calibrate::Lens;
@@ -274,4 +274,4 @@ TEST(ProbeMapper, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::probe_test

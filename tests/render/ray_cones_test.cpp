@@ -11,7 +11,7 @@
 #include "tests/render/plain_shapes.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::ray_cones_test {
 namespace {
 
 struct Pushed final : RaySink {
@@ -104,4 +104,4 @@ TEST(RayCone, SeesTheSameByAnyOfItsDiameters) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::ray_cones_test

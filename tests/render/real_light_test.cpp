@@ -14,7 +14,7 @@
 #include "render/probe.h"
 #include "tests/render/made_shading.h"
 
-namespace render {
+namespace render::real_light_test {
 namespace {
 
 using calibrate::degree;
@@ -112,4 +112,4 @@ TEST(RealBracket, HasItsWindowsWhereTheyWereMeasured) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::real_light_test

@@ -15,7 +15,7 @@
 #include "render/reference.h"
 #include "sun_and_sky.h"
 
-namespace render {
+namespace render::reference_proof_test {
 namespace {
 
 using std::numbers::pi;
@@ -333,4 +333,4 @@ TEST(Photograph, LightsAFloorByAGlowingBallAndSquareAsTheirClosedFormsSay) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::reference_proof_test

@@ -11,7 +11,7 @@
 #include "plain_shapes.h"
 #include "sun_and_sky.h"
 
-namespace render {
+namespace render::reference_test {
 namespace {
 
 using calibrate::pi_f;
@@ -324,4 +324,4 @@ TEST(RenderReference, RefusesAPlateOfAnotherSizeAndNoSamples) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::reference_test

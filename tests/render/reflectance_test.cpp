@@ -11,7 +11,7 @@
 
 #include "render/standard.h"
 
-namespace render {
+namespace render::reflectance_test {
 namespace {
 
 using std::numbers::pi;
@@ -243,4 +243,4 @@ TEST(StandardSurface, IsNotReciprocalElsewhereByNoMoreThanStated) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::reflectance_test

@@ -11,7 +11,7 @@
 #include "render/soft_lights.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::region_parts_test {
 namespace {
 
 std::vector<RegionParts> parts_of(const LightRegions& regions, const capture::Image& map) {
@@ -170,4 +170,4 @@ TEST(RegionParts, StayAsLongAsDirectionsDo) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::region_parts_test

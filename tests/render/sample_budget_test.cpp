@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace render {
+namespace render::sample_budget_test {
 namespace {
 
 constexpr int width = 40;
@@ -76,4 +76,4 @@ TEST(ShareSamples, RefusesBoundsAndWidthsThatDoNotFit) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::sample_budget_test

@@ -11,7 +11,7 @@
 #include "render/standard.h"
 #include "render/trace.h"
 
-namespace render {
+namespace render::scene_test {
 namespace {
 
 std::shared_ptr<Mesh> square(float z, std::uint32_t material) {
@@ -235,4 +235,4 @@ TEST(Scene, RefusesWhatDoesNotFitTogether) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::scene_test

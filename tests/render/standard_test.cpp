@@ -12,6 +12,7 @@
 #include "render/scene.h"
 #include "render/texture.h"
 
+namespace render::standard_test {
 namespace {
 
 using calibrate::Vec3f;
@@ -264,3 +265,4 @@ TEST(StandardSurface, IsRougherTheMoreNormalsAFootprintHolds) {
 }
 
 }  // namespace
+}  // namespace render::standard_test

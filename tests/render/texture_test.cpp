@@ -9,6 +9,7 @@
 
 #include "capture/colour.h"
 
+namespace render::texture_test {
 namespace {
 
 using render::footprint_grid;
@@ -187,3 +188,4 @@ TEST(Texture, RefusesWrongSizes) {
 }
 
 }  // namespace
+}  // namespace render::texture_test

@@ -8,7 +8,7 @@
 
 #include "capture/rgbe.h"
 
-namespace render {
+namespace render::video_texture_test {
 namespace {
 
 capture::Image noise(int height, int width, int channels = 3) {
@@ -213,4 +213,4 @@ TEST(MeanOver, TellsOnePartFromAnother) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::video_texture_test

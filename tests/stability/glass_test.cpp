@@ -8,7 +8,7 @@
 #include "tests/compositing/made_glass.h"
 #include "tests/render/plain_shapes.h"
 
-namespace compositing {
+namespace compositing::glass_stability_test {
 namespace {
 
 using render::GlassParameters;
@@ -164,4 +164,4 @@ TEST(GlassAtTheEdge, StaysFiniteWhenLightJumpsByAMillion) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::glass_stability_test

@@ -6,7 +6,7 @@
 
 #include "tests/compositing/made_shot.h"
 
-namespace compositing {
+namespace compositing::kernel_stability_test {
 namespace {
 
 using capture::float_from_half;
@@ -42,7 +42,7 @@ TEST(KernelAtTheEdge, ShowsThePlateWithoutObjectsOrStandIns) {
 }
 
 TEST(KernelAtTheEdge, ShowsThePlateWhenTheObjectIsBehindTheCamera) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   for (std::size_t i = 1; i < scene.instances.size(); ++i) {
     scene.instances[i].set_from_object[3] += 60;
     scene.instances[i].set_from_object[7] -= 60;
@@ -54,7 +54,7 @@ TEST(KernelAtTheEdge, ShowsThePlateWhenTheObjectIsBehindTheCamera) {
 }
 
 TEST(KernelAtTheEdge, IsAllObjectWhenTheCameraIsInsideIt) {
-  MadeShot shot = made_shot(50, 40, made_scene());
+  MadeShot shot = made_shot(50, 40, shot_scene());
   shot.job.cam_from_set = calibrate::look_at({0, 0, 0.5}, {0, 1, 0.5}, 0);
   const FrameResult result = render(shot);
   for (std::size_t i = 3; i < result.rgba.pixels.size(); i += 4) {
@@ -63,7 +63,7 @@ TEST(KernelAtTheEdge, IsAllObjectWhenTheCameraIsInsideIt) {
 }
 
 TEST(KernelAtTheEdge, ShowsThePlateOnAStandInSeenEdgeOn) {
-  MadeShot shot = made_shot(60, 45, made_scene(false));
+  MadeShot shot = made_shot(60, 45, shot_scene(false));
   for (const double height : {0.0, 1e-9, 1e-6, 1e-3}) {
     shot.job.cam_from_set = calibrate::look_at({3, -3, height}, {0, 0, height}, 0);
     EXPECT_TRUE(is_plate(shot, render(shot))) << height;
@@ -72,7 +72,7 @@ TEST(KernelAtTheEdge, ShowsThePlateOnAStandInSeenEdgeOn) {
 
 TEST(KernelAtTheEdge, RendersPicturesOfOnePixelAndOddSizes) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 50}, {17, 3}, {15, 33}}) {
-    const MadeShot shot = made_shot(width, height, made_scene());
+    const MadeShot shot = made_shot(width, height, shot_scene());
     const FrameResult result = render(shot);
     EXPECT_EQ(result.rgba.width, width);
     EXPECT_EQ(result.rgba.height, height);
@@ -80,14 +80,14 @@ TEST(KernelAtTheEdge, RendersPicturesOfOnePixelAndOddSizes) {
 }
 
 TEST(KernelAtTheEdge, RendersAnEightKPicture) {
-  MadeShot shot = made_shot(7680, 4320, made_scene(), 2);
+  MadeShot shot = made_shot(7680, 4320, shot_scene(), 2);
   shot.job.effort.aa_samples = 1;
   const FrameResult result = render(shot);
   EXPECT_GT(result.statistics.virtual_pixels, 1000000U);
 }
 
 TEST(KernelAtTheEdge, TakesAThousandInstances) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   for (int i = 0; i < 1000; ++i) {
     render::Instance ball = scene.instances[1];
     ball.set_from_object[3] = static_cast<float>(i % 32) - 16;
@@ -99,7 +99,7 @@ TEST(KernelAtTheEdge, TakesAThousandInstances) {
 }
 
 TEST(KernelAtTheEdge, TakesTrianglesWithoutAreaAndVerticesThatAreNotFinite) {
-  render::SceneDescription scene = made_scene();
+  render::SceneDescription scene = shot_scene();
   auto mesh = std::make_shared<render::Mesh>(*scene.meshes[1]);
   for (std::uint32_t i = 0; i < mesh->triangles.size(); i += 3)
     mesh->triangles[i][1] = mesh->triangles[i][0];
@@ -110,7 +110,7 @@ TEST(KernelAtTheEdge, TakesTrianglesWithoutAreaAndVerticesThatAreNotFinite) {
 }
 
 TEST(KernelAtTheEdge, ShowsBlackObjectsAndTheWholePlateInTheDark) {
-  MadeShot shot = made_shot(80, 60, made_scene());
+  MadeShot shot = made_shot(80, 60, shot_scene());
   shot.environment = made_sky(32, 0, 0);
   shot.job.lights.lights.clear();
   const FrameResult result = render(shot);
@@ -124,7 +124,7 @@ TEST(KernelAtTheEdge, ShowsBlackObjectsAndTheWholePlateInTheDark) {
 }
 
 TEST(KernelAtTheEdge, ClampsSunsBeyondHalfAndCountsThem) {
-  MadeShot shot = made_shot(80, 60, made_scene());
+  MadeShot shot = made_shot(80, 60, shot_scene());
   shot.environment.radiance.at(3, 20, 0) = shot.environment.radiance.at(3, 20, 1) = 1e9F;
   shot.environment.smoothed.clear();
   smooth_for_reflections(shot.environment);
@@ -134,7 +134,7 @@ TEST(KernelAtTheEdge, ClampsSunsBeyondHalfAndCountsThem) {
 }
 
 TEST(KernelAtTheEdge, CountsTheDepthLimitInAHallOfMirrors) {
-  render::SceneDescription scene = made_scene(false);
+  render::SceneDescription scene = shot_scene(false);
   scene.instances.clear();
   render::StandardParameters mirror;
   mirror.metallic = 1;
@@ -157,4 +157,4 @@ TEST(KernelAtTheEdge, CountsTheDepthLimitInAHallOfMirrors) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::kernel_stability_test

@@ -11,7 +11,7 @@
 #include "compositing/keyer.h"
 #include "compositing/made_clip.h"
 
-namespace compositing {
+namespace compositing::keying_stability_test {
 namespace {
 
 using capture::Image;
@@ -237,4 +237,4 @@ TEST(Keying, KeysTwoPersonsWhoCross) {
 }
 
 }  // namespace
-}  // namespace compositing
+}  // namespace compositing::keying_stability_test

@@ -13,7 +13,7 @@
 #include "calibrate/made_boards.h"
 #include "calibrate/rotation_fit.h"
 
-namespace calibrate {
+namespace calibrate::lens_stability_test {
 namespace {
 
 using ::testing::Contains;
@@ -275,4 +275,4 @@ TEST(CalibrateLensAtItsLimits, LosesAccuracySmoothlyAsCornersGetNoisier) {
 }
 
 }  // namespace
-}  // namespace calibrate
+}  // namespace calibrate::lens_stability_test

@@ -12,7 +12,7 @@
 #include "tests/render/made_shading.h"
 #include "tests/render/sun_and_sky.h"
 
-namespace render {
+namespace render::lights_stability_test {
 namespace {
 
 constexpr float degree = std::numbers::pi_v<float> / 180;
@@ -122,4 +122,4 @@ TEST(LightsStability, EverySunFromNothingToAHundredMillionGivesSoundLights) {
 }
 
 }  // namespace
-}  // namespace render
+}  // namespace render::lights_stability_test

@@ -24,7 +24,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/studio/command_line.h"
 
-namespace studio {
+namespace studio::calibrate_commands_test {
 namespace {
 
 using testing::HasSubstr;
@@ -369,4 +369,4 @@ TEST_F(CalibrateLight, FindsTheGainFromAGreyCard) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::calibrate_commands_test

@@ -22,7 +22,7 @@
 #include "tests/calibrate/made_motion.h"
 #include "tests/studio/command_line.h"
 
-namespace studio {
+namespace studio::calibrate_offset_test {
 namespace {
 
 using testing::HasSubstr;
@@ -162,4 +162,4 @@ TEST_F(CalibrateOffset, ComesFromAMovingBoardAtTwoRates) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::calibrate_offset_test

@@ -27,7 +27,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/studio/command_line.h"
 
-namespace studio {
+namespace studio::calibrated_set_test {
 namespace {
 
 using calibrate::Vec2;
@@ -213,4 +213,4 @@ TEST_F(CalibratedSet, PutsTheCarWhereTheTruthHasIt) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::calibrated_set_test

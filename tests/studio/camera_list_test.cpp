@@ -8,7 +8,7 @@
 
 #include "tests/capture/fake_v4l2.h"
 
-namespace studio {
+namespace studio::camera_list_test {
 namespace {
 
 using testing::Contains;
@@ -93,4 +93,4 @@ TEST(CamerasJson, HoldsNetworkCameras) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::camera_list_test

@@ -13,7 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace studio {
+namespace studio::chart_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -188,4 +188,4 @@ TEST(WriteChart, NamesADirectoryThatCannotBeMade) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::chart_test

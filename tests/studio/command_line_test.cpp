@@ -17,7 +17,7 @@
 #include "tests/studio/command_line.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::command_line_test {
 namespace {
 
 using testing::HasSubstr;
@@ -503,4 +503,4 @@ TEST_F(CommandLine, DrawsABoard) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::command_line_test

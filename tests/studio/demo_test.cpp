@@ -21,7 +21,7 @@
 #include "studio/set.h"
 #include "studio/start.h"
 
-namespace studio {
+namespace studio::demo_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -237,4 +237,4 @@ TEST(MakeDemoStudio, NamesAMapThatCannotLightThePark) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::demo_test

@@ -11,7 +11,7 @@
 
 #include "studio/machine.h"
 
-namespace studio {
+namespace studio::effort_points_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -121,4 +121,4 @@ TEST_F(EffortPointsFile, IsRefusedWithTheCommandThatMakesItAnew) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::effort_points_test

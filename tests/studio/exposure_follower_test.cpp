@@ -9,7 +9,7 @@
 
 #include "tests/calibrate/made_markers.h"
 
-namespace studio {
+namespace studio::exposure_follower_test {
 namespace {
 
 using testing::HasSubstr;
@@ -114,4 +114,4 @@ TEST(ExposureFollower, MeasuresWhereTheCalibratedExposureIsToldAndThePlatesIsNot
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::exposure_follower_test

@@ -7,7 +7,7 @@
 
 #include "tests/studio/quick_chart.h"
 
-namespace studio {
+namespace studio::glass_chart_test {
 namespace {
 
 double against_reference(const ChartPoint& p) {
@@ -44,4 +44,4 @@ TEST(GlassChart, ErrsLessTheFurtherRaysAreFollowedAndLessThanWithDarkCuts) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::glass_chart_test

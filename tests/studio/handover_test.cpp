@@ -7,7 +7,7 @@
 #include <chrono>
 #include <thread>
 
-namespace studio {
+namespace studio::handover_test {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -74,4 +74,4 @@ TEST(Handover, LetsNobodyWaitOnceClosed) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::handover_test

@@ -9,7 +9,7 @@
 
 #include "tests/studio/quick_chart.h"
 
-namespace studio {
+namespace studio::hdr_chart_test {
 namespace {
 
 const Chart& quick_chart() {
@@ -65,4 +65,4 @@ TEST(HdrChart, SaysWhereItFails) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::hdr_chart_test

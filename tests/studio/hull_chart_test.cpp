@@ -9,7 +9,7 @@
 #include "studio/charts/silhouette.h"
 #include "tests/studio/quick_chart.h"
 
-namespace studio {
+namespace studio::hull_chart_test {
 namespace {
 
 TEST(HullChart, HasAHullThatErrsLessThanBillboardsFromThirtyDegreesOn) {
@@ -59,4 +59,4 @@ TEST(PersonError, IsHowFarASquareWasMoved) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::hull_chart_test

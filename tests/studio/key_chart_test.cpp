@@ -7,7 +7,7 @@
 
 #include "tests/studio/quick_chart.h"
 
-namespace studio {
+namespace studio::key_chart_test {
 namespace {
 
 TEST(KeyChart, HasADefaultThatErrsLessThanEachOtherToolAndSaysWhenItIsUnsure) {
@@ -32,4 +32,4 @@ TEST(KeyChart, HasADefaultThatErrsLessThanEachOtherToolAndSaysWhenItIsUnsure) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::key_chart_test

@@ -11,7 +11,7 @@
 #include "compositing/made_clip.h"
 #include "tests/studio/command_line.h"
 
-namespace studio {
+namespace studio::key_command_test {
 namespace {
 
 using testing::HasSubstr;
@@ -115,4 +115,4 @@ TEST_F(KeyCommand, RefusesWhatIsNoVideo) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::key_command_test

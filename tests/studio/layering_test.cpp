@@ -14,7 +14,7 @@
 #include <string_view>
 #include <vector>
 
-namespace studio {
+namespace studio::layering_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -175,4 +175,4 @@ TEST(Tree, HasScriptsThatShellsCanReadAndRun) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::layering_test

@@ -12,7 +12,7 @@
 #include "studio/charts/lens_peers.h"
 #include "tests/studio/quick_chart.h"
 
-namespace studio {
+namespace studio::lens_chart_test {
 namespace {
 
 using calibrate::calibrate_lens;
@@ -117,4 +117,4 @@ TEST(LensChart, ShowsWhatIsAskedOfIt) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::lens_chart_test

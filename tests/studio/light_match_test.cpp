@@ -18,7 +18,7 @@
 #include "tests/calibrate/made_lamps.h"
 #include "tests/studio/command_line.h"
 
-namespace studio {
+namespace studio::light_match_test {
 namespace {
 
 using calibrate::Vec3;
@@ -219,4 +219,4 @@ TEST_F(LightMatch, SaysThatNothingIsSeenByBoth) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::light_match_test

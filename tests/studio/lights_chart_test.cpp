@@ -15,7 +15,7 @@
 #include "studio/charts/screen_lamps.h"
 #include "tests/studio/quick_chart.h"
 
-namespace studio {
+namespace studio::lights_chart_test {
 namespace {
 
 const Chart& quick_chart() {
@@ -148,4 +148,4 @@ TEST(LightsChart, HasABallOfGlassNearTheReferenceWithPhotonsAndFarWithout) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::lights_chart_test

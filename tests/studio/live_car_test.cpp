@@ -15,7 +15,7 @@
 #include "studio/start.h"
 #include "tests/made_files.h"
 
-namespace studio {
+namespace studio::live_car_test {
 namespace {
 
 const std::string live_car = std::string(PLATELIGHT_SOURCE_DIR) + "/studio/sets/live_car.toml";
@@ -120,4 +120,4 @@ TEST_F(LiveCarTest, GoesOnWhilePacketsAreLost) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::live_car_test

@@ -12,7 +12,7 @@
 #include "capture/exr.h"
 #include "render/load_mesh.h"
 
-namespace studio {
+namespace studio::peer_scene_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -83,4 +83,4 @@ TEST_F(PeerSceneTest, RefusesScenesThatThereAreNotAndFoldersThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::peer_scene_test

@@ -20,7 +20,7 @@
 #include "studio/show.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::person_hull_test {
 namespace {
 
 using testing::Contains;
@@ -400,4 +400,4 @@ TEST_F(PersonHullTest, RefusesWhatDoesNotFitTogetherAllAtOnce) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::person_hull_test

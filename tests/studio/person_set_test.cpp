@@ -12,7 +12,7 @@
 #include "studio/show.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::person_set_test {
 namespace {
 
 using testing::HasSubstr;
@@ -376,4 +376,4 @@ TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::person_set_test

@@ -12,7 +12,7 @@
 
 #include "studio/start.h"
 
-namespace studio {
+namespace studio::photograph_trial_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -124,4 +124,4 @@ TEST(ReadDemoTruth, RefusesWhatNoDemoWrote) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::photograph_trial_test

@@ -18,7 +18,7 @@
 #include "studio/rolling_bracket.h"
 #include "tests/capture/made_light_camera.h"
 
-namespace studio {
+namespace studio::probe_source_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -286,4 +286,4 @@ TEST(RollingBracket, KeepsAShotThatDoesNotComeAgainForTwoCycles) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::probe_source_test

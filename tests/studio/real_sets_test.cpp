@@ -17,7 +17,7 @@
 #include "studio/set.h"
 #include "studio/start.h"
 
-namespace studio {
+namespace studio::real_sets_test {
 namespace {
 
 using calibrate::Vec3;
@@ -247,4 +247,4 @@ TEST(RealCar, StandsAtItsRealSizeOnTheFreeSpot) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::real_sets_test

@@ -11,7 +11,7 @@
 
 #include "tests/studio/quick_chart.h"
 
-namespace studio {
+namespace studio::render_chart_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -74,4 +74,4 @@ TEST(RenderChart, TellsErrorAndTimeOfEverySceneAndWhereItErrs) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::render_chart_test

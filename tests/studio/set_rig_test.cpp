@@ -15,7 +15,7 @@
 #include "tests/calibrate/made_markers.h"
 #include "tests/made_files.h"
 
-namespace studio {
+namespace studio::set_rig_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -191,4 +191,4 @@ TEST_F(SetRig, RefusesFilesOfTheRigThatCannotBeUsed) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::set_rig_test

@@ -12,7 +12,7 @@
 
 #include "calibrate/angles.h"
 
-namespace studio {
+namespace studio::set_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -324,4 +324,4 @@ INSTANTIATE_TEST_SUITE_P(Files, BadSet, testing::ValuesIn(bad_sets()), [](const 
 });
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::set_test

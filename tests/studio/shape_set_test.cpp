@@ -16,7 +16,7 @@
 #include "studio/show.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::shape_set_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -300,4 +300,4 @@ TEST_F(ShapeSetTest, WaitsForTheShapeThatIsDueInAShowThatIsNotLive) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::shape_set_test

@@ -9,7 +9,7 @@
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::sharpening_test {
 namespace {
 
 constexpr int none = render::KeptTransport::none;
@@ -196,4 +196,4 @@ TEST_F(SharpeningShow, ShowsAMoveAtOnceAndIsSharpASecondLater) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::sharpening_test

@@ -12,7 +12,7 @@
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::show_models_test {
 namespace {
 
 using testing::AllOf, testing::Contains, testing::HasSubstr;
@@ -83,4 +83,4 @@ TEST_F(ShowModels, GoesOnLiveWhileAModelIsRead) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::show_models_test

@@ -14,7 +14,7 @@
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::show_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -391,4 +391,4 @@ TEST_F(ShowTest, RefusesADisplayAndAModelThatThereAreNot) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::show_test

@@ -17,7 +17,7 @@
 #include "studio/timed_source.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::source_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -221,4 +221,4 @@ TEST(RollingBracket, RefusesShotsOfTwoSizes) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::source_test

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace studio {
+namespace studio::tone_follower_test {
 namespace {
 
 using compositing::PictureLevels;
@@ -115,4 +115,4 @@ TEST(ToneFollower, StaysWhereAPictureTellsNothing) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::tone_follower_test

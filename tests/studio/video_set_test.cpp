@@ -6,7 +6,7 @@
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
 
-namespace studio {
+namespace studio::video_set_test {
 namespace {
 
 using capture::float_from_half;
@@ -159,4 +159,4 @@ TEST_F(VideoSetTest, MovesTheLightWithTheObject) {
 }
 
 }  // namespace
-}  // namespace studio
+}  // namespace studio::video_set_test
