@@ -55,6 +55,14 @@ inline Quads grown(Quads quads) {
   return rows | (rows & ~(first_column << 7)) << 1 | (rows & ~first_column) >> 1;
 }
 
+// The column and row of the pixel that stands for a 2x2 block: another one for each light. Of a
+// light that is looked for in parts, those of any four blocks together are to look into all four
+// quarters of its region, and pixels two apart look into opposite ones (SoftLights::part_of_pixel):
+// in blocks of odd rows it is the one above or below.
+inline std::array<int, 2> pixel_of_quad(std::uint32_t light, std::uint32_t row_of_quads) {
+  return {static_cast<int>(light & 1), static_cast<int>((light >> 1 ^ row_of_quads) & 1)};
+}
+
 // Whether two pixels show the same surface, and it is nearly flat between them.
 bool is_one_surface(const Receivers& r, std::size_t a, std::size_t b);
 
@@ -198,8 +206,9 @@ class VisibilityFinder {
   }
   // Of four pixels, in the first to last of four blocks.
   static int outermost(int block, int any) { return block == 0 ? 0 : block == 3 ? 3 : any; }
-  static int offset2(std::uint32_t light) {
-    return bit_of(static_cast<int>(light & 1), static_cast<int>((light >> 1) & 1));
+  static int offset2(std::uint32_t light, int row_of_quads = 0) {
+    const auto [x, y] = pixel_of_quad(light, static_cast<std::uint32_t>(row_of_quads));
+    return bit_of(x, y);
   }
   // The nth of some pixels, counted round.
   static int nth_of(std::uint64_t pixels, int n) {
@@ -294,7 +303,7 @@ class VisibilityFinder {
         const std::uint64_t bits = block2 << corner;
         left &= ~bits;
         if ((smooth & bits) != bits) continue;
-        test(first, i, word, corner + offset2(light));
+        test(first, i, word, corner + offset2(light, has_parts(first, i) ? corner / 32 : 0));
         pixels &= ~bits;
       }
     }

@@ -14,6 +14,7 @@
 #include "render/cell_visibility.h"
 #include "render/soft_lights.h"
 #include "render/texture.h"
+#include "render/visibility_finder.h"
 
 namespace compositing::soft_lights_test {
 namespace {
@@ -117,6 +118,27 @@ TEST(SoftLights, LookAllOverTheirRegions) {
   }
   EXPECT_EQ(parts.size(), 16U);
   EXPECT_EQ(quarters.size(), 4U) << "the first four samples look into different quarters";
+}
+
+TEST(SoftLights, AreSeenInAllQuartersByFourBlocksOfWhichOnePixelEachIsAsked) {
+  for (std::uint32_t light = 0; light < 4; ++light) {
+    for (std::uint32_t first = 0; first < 4; ++first) {  // the blocks' row and column
+      std::set<int> quarters, columns;
+      int rows = 0;
+      for (std::uint32_t block = 0; block < 4; ++block) {
+        const std::uint32_t column = first % 2 + block % 2, row = first / 2 + block / 2;
+        const auto [x, y] = render::pixel_of_quad(light, row % 2);
+        const int part = SoftLights::part_of_pixel(2 * column + static_cast<std::uint32_t>(x),
+                                                   2 * row + static_cast<std::uint32_t>(y));
+        quarters.insert(part % 4 / 2 + part / 8 * 2);
+        columns.insert(part % 4);
+        rows += part / 4;
+      }
+      EXPECT_EQ(quarters.size(), 4U);
+      EXPECT_EQ(columns.size(), 4U);
+      EXPECT_EQ(rows, 2 * 3) << "in the mean, about the middle";
+    }
+  }
 }
 
 TEST(SoftLights, CastThePenumbraOfADisc) {
