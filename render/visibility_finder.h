@@ -297,13 +297,14 @@ class VisibilityFinder {
     const std::uint32_t light = first + static_cast<std::uint32_t>(i);
     if (block_ >= 2) {
       const std::uint64_t smooth = w_.lit[i][wi] & w_.same2[wi];
+      const bool in_parts = has_parts(first, i);
       for (std::uint64_t left = pixels; left != 0;) {
         const int k = std::countr_zero(left);
         const int corner = (k / 32) * 32 + (k % 16) / 2 * 2;
         const std::uint64_t bits = block2 << corner;
         left &= ~bits;
         if ((smooth & bits) != bits) continue;
-        test(first, i, word, corner + offset2(light, has_parts(first, i) ? corner / 32 : 0));
+        test(first, i, word, corner + offset2(light, in_parts ? corner / 32 : 0));
         pixels &= ~bits;
       }
     }
