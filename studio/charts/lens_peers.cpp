@@ -1,10 +1,13 @@
 // Other tools' lens calibrations.
 #include "studio/charts/lens_peers.h"
 
+#include <array>
 #include <chrono>
 #include <cmath>
-#include <cstring>
+#include <optional>
+#include <span>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include <opencv2/calib3d.hpp>
@@ -91,7 +94,7 @@ class MemoryFile {
 
 // The parameters that one of the helpers answers with.
 std::vector<double> by_solver(const char* program,
-                              SolverQuestion question,
+                              const SolverQuestion& question,
                               double time_limit_s,
                               LensPeerResult& result) {
   const MemoryFile file(to_doubles(question));
@@ -103,7 +106,14 @@ std::vector<double> by_solver(const char* program,
     const std::string ending = child.ending();
     throw std::runtime_error(ending.empty() ? "no answer" : ending);
   }
-  if (!(head[1] > 0 && head[1] < 10000)) throw std::runtime_error("no solution");
+  if (!(std::abs(head[1]) >= 1 && std::abs(head[1]) < 10000)) {
+    throw std::runtime_error("no solution");
+  }
+  if (head[1] < 0) {
+    std::string reason(static_cast<std::size_t>(-head[1]), ' ');
+    if (!child.read(std::as_writable_bytes(std::span(reason)))) reason = "half an answer";
+    throw std::runtime_error(reason);
+  }
   std::vector<double> parameters(static_cast<std::size_t>(head[1]));
   if (!child.read(std::as_writable_bytes(std::span(parameters)))) {
     throw std::runtime_error("half an answer");
@@ -125,13 +135,12 @@ void by_omnidir(const LensProblem& problem, double time_limit_s, LensPeerResult&
   const std::vector<double> p = by_solver("platelight-omnidir", {0, problem}, time_limit_s, result);
   if (p.size() != 9) throw std::runtime_error("half an answer");
   result.parameters = p.size();
-  result.unproject = [p](Vec2 q) -> std::optional<Vec3> {
-    const cv::Matx33d K(p[0], 0, p[2], 0, p[1], p[3], 0, 0, 1);
-    const std::vector<double> distortion(p.begin() + 5, p.end());
+  const cv::Matx33d K(p[0], 0, p[2], 0, p[1], p[3], 0, 0, 1);
+  const std::vector<double> distortion(p.begin() + 5, p.end());
+  result.unproject = [K, distortion, x = p[4]](Vec2 q) -> std::optional<Vec3> {
     const std::vector<cv::Point2d> pixel{{q.x, q.y}};
     std::vector<cv::Point2d> ideal;
     cv::undistortPoints(pixel, ideal, K, distortion);
-    const double x = p[4];
     const double u = ideal[0].x;
     const double v = ideal[0].y;
     const double r2 = u * u + v * v;

@@ -56,4 +56,10 @@ void write_answer(std::FILE* file, double time_ms, std::span<const double> param
   std::fwrite(parameters.data(), sizeof(double), parameters.size(), file);
 }
 
+void write_refusal(std::FILE* file, std::string_view reason) {
+  const double head[2] = {0, -static_cast<double>(reason.size())};
+  std::fwrite(head, sizeof(double), 2, file);
+  std::fwrite(reason.data(), 1, reason.size(), file);
+}
+
 }  // namespace studio

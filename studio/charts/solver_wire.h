@@ -2,13 +2,15 @@
 //
 // Question: which model, of those that the program knows; width, height; columns, rows, square in
 // metres; number of views; for each corner of each view x, y and 1, or -1 if it was not seen.
-// Answer: milliseconds of the solve, number of parameters (0: no solution), parameters.
+// Answer: milliseconds of the solve, number of parameters (0: no solution), parameters; or 0 and
+// the length of a text as a number below 0, then in bytes what the tool said instead.
 #pragma once
 
 #include <cstddef>
 #include <cstdio>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "calibrate/lens_solve.h"
@@ -30,5 +32,6 @@ std::vector<double> to_doubles(const SolverQuestion& question);
 std::optional<SolverQuestion> read_question(std::FILE* file);
 
 void write_answer(std::FILE* file, double time_ms, std::span<const double> parameters);
+void write_refusal(std::FILE* file, std::string_view reason);
 
 }  // namespace studio

@@ -87,10 +87,13 @@ TEST(LensPeers, AreNotBetterOnANormalLensAndTenTimesWorseIfTheBoardIsBent) {
 TEST(LensPeers, SayWhatIsWrongInsteadOfEndingTheProgram) {
   LensProblem problem = make_board_views(made_normal(), calibrate::normal_boards());
   for (auto& view : problem.views) view.corners.assign(100, std::nullopt);
-  for (const LensPeer peer :
-       {LensPeer::opencv_camera5, LensPeer::opencv_fisheye, LensPeer::mrcal_opencv5}) {
+  for (const LensPeer peer : {LensPeer::opencv_camera5, LensPeer::opencv_fisheye,
+                              LensPeer::opencv_omnidir, LensPeer::mrcal_opencv5}) {
     const LensPeerResult result = calibrate_with(peer, problem);
     EXPECT_NE(result.status, "ok") << name_of(peer);
+    if (peer != LensPeer::mrcal_opencv5) {
+      EXPECT_THAT(result.status, testing::HasSubstr("(-2")) << "in OpenCV's own words";
+    }
     EXPECT_FALSE(result.unproject) << name_of(peer);
   }
 }
