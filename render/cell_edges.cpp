@@ -17,7 +17,7 @@ constexpr float plate_contrast =
 constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
 constexpr Scene::Surface no_hit{~0U, ~0U};
 // Where each sample sends on so many rays, as behind ribbed glass, a pixel takes no more samples.
-constexpr int many_rays = 6, most_samples_of_many_rays = 256;
+constexpr int many_rays = 10, most_samples_of_many_rays = 256;
 constexpr float alike_mirrors = 0.99F;  // cosine between normals: what they mirror is alike
 // Of so few further samples, the one in the middle of the pattern would be the centre's once more.
 constexpr int few_samples = 4;
