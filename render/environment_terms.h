@@ -24,7 +24,8 @@ struct EnvironmentTerm {
 };
 
 // Many of them in half the room, for they are most of what is kept, and in the order in which they
-// are lit: by levels, and by slots within each. A weight's colours have one exponent, and each is
+// are lit: by levels, and within each so that the next term is of another slot, where that can be,
+// for a sum waits for what was put there last. A weight's colours have one exponent, and each is
 // within 1/16384 of the greatest; places are within 1/65536 of the level. A weight that is not
 // finite, or below 2^-110, counts as 0.
 class EnvironmentTerms {
@@ -46,7 +47,8 @@ class EnvironmentTerms {
 
  private:
   // Eight terms: each has 15 bits of red, 8 of the exponent and 9 of the slot; 16 of green and 16
-  // of x; 16 of blue and 16 of y. The last block of a level is filled up with weights of 0.
+  // of x; 16 of blue and 16 of y. A level's terms in the order of their slots fill the first places
+  // of all of its blocks, then the second ones; those left over have a weight of 0.
   struct Block {
     alignas(32) std::array<std::array<std::uint32_t, 8>, 3> words;
   };
