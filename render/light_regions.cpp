@@ -328,7 +328,7 @@ std::vector<RegionLight> sum_regions(const LightRegions& regions,
                                      const capture::Image& map,
                                      const capture::Image& finer) {
   std::vector<RegionLight> sums = sum_regions(regions, map);
-  if (finer.height <= regions.height) return sums;
+  if (sums.empty() || finer.height <= regions.height) return sums;
   const TexelGrid grid(finer.height);
   std::vector<Moments> moments(sums.size());
   const int width = 2 * regions.height;

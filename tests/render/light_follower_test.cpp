@@ -137,9 +137,20 @@ TEST(LightFollower, WaitsThroughABlackFrame) {
 }
 
 TEST(LightFollower, StartsFromABlackFrame) {
+  for (const int height : {64, 256}) {
+    LightFollower follower;
+    EXPECT_TRUE(follower.follow(make_even_environment(0, height), {}).lights.empty());
+    EXPECT_FALSE(follower.follow(make_sun_and_sky({}, height), {}).lights.empty());
+  }
+}
+
+TEST(LightFollower, TakesAnotherNumberOfLightsWhileAllIsBlack) {
   LightFollower follower;
-  EXPECT_TRUE(follower.follow(make_even_environment(0, 64), {}).lights.empty());
-  EXPECT_FALSE(follower.follow(make_sun_and_sky({}, 64), {}).lights.empty());
+  follower.follow(make_sun_and_sky({}, 256), {.table = {.count = 64}});
+  EXPECT_TRUE(
+      follower.follow(make_even_environment(0, 256), {.table = {.count = 16}}).lights.empty());
+  EXPECT_EQ(follower.follow(make_sun_and_sky({}, 256), {.table = {.count = 16}}).lights.size(),
+            16U);
 }
 
 TEST(LightFollower, MarksTheLightsOfTheSunAndItsTexels) {

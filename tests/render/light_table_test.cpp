@@ -121,9 +121,11 @@ TEST(MakeLightTable, PointsASmallSunsLightAtTheSun) {
 }
 
 TEST(MakeLightTable, GivesAnEmptyTableForABlackMap) {
-  const LightTable table = make_light_table(make_even_environment(0, 64), {});
-  EXPECT_TRUE(table.lights.empty());
-  EXPECT_EQ(table.error_estimate, 0);
+  for (const int height : {64, 256}) {  // as high as what is cut into regions, and higher
+    const LightTable table = make_light_table(make_even_environment(0, height), {});
+    EXPECT_TRUE(table.lights.empty());
+    EXPECT_EQ(table.error_estimate, 0);
+  }
 }
 
 TEST(MakeLightTable, MakesOneLightOfOneBrightTexel) {
