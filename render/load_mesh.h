@@ -48,7 +48,7 @@ struct LoadedModel {
 // glTF materials: base colour, metallic-roughness, normal, clear coat, transmission (as a thin
 // wall; a volume of it as solid glass, glass.h, if it is hardly rough), emission, alpha cut-outs
 // (blended alpha is cut at a half). Not handled, and noted in the report: occlusion maps (the light
-// is traced), sheen, volumes that are not clear, coat and transmission roughness maps, vertex
+// is traced), sheen, volumes that are not clear, transmission roughness maps, vertex
 // colours, animation, skins. Materials of other formats: colour, opacity, shininess, emission.
 //
 // A texture that is not there or cannot be decoded is told in the notes and replaced: base colour

@@ -32,6 +32,7 @@ namespace {
 constexpr int max_depth = 256;
 // Metres from the origin: farther out, floats and Embree overflow.
 constexpr float farthest = 1e9F;
+bool is_near(float x) { return std::abs(x) <= farthest; }  // nor what is no number
 
 // A file in memory, for assimp.
 class MemoryStream : public Assimp::IOStream {
@@ -180,17 +181,15 @@ class ModelBuilder {
       for (const std::uint32_t corner : triangle) {
         const Vec3f p = shown.positions[corner];
         const aiVector3D q = m * aiVector3D(p.x, p.y, p.z);
+        if (!is_near(q.x) || !is_near(q.y) || !is_near(q.z))
+          throw std::runtime_error("node '" + name +
+                                   "' lies farther away than a million kilometres");
         report.lower = {std::min(report.lower.x, q.x), std::min(report.lower.y, q.y),
                         std::min(report.lower.z, q.z)};
         report.upper = {std::max(report.upper.x, q.x), std::max(report.upper.y, q.y),
                         std::max(report.upper.z, q.z)};
       }
     }
-    for (const Vec3f corner : {report.lower, report.upper})
-      for (const float x : {corner.x, corner.y, corner.z})
-        if (!(std::abs(x) <= farthest))
-          throw std::runtime_error("node '" + name +
-                                   "' lies farther away than a million kilometres");
     model_.instances.push_back(std::move(instance));
   }
 

@@ -24,16 +24,29 @@ constexpr std::uint64_t bytes_per_s = 1U << 20;
 constexpr std::uint64_t patience = 4;  // on a busy machine: real time over processor time
 constexpr std::uint64_t most_served = std::uint64_t{4} << 30;
 constexpr int most_questions = 10000;
+constexpr int most_files_beside = 100000;  // that are looked at
 
-// Bytes of the model and of what lies beside it that it may want: buffers, material libraries.
+// In small letters.
+std::string ending_of(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return ending;
+}
+
+// Bytes of the model and of what lies in its folder or below that it may want: buffers, material
+// libraries.
 std::uint64_t bytes_beside(const ModelFolder& folder) {
   std::error_code error;
   std::uint64_t bytes = fs::file_size(folder.model(), error);
-  const std::string ending = folder.model().extension().string();
+  const std::string ending = ending_of(folder.model());
   if (ending != ".gltf" && ending != ".obj") return bytes;
   const fs::path beside = fs::absolute(folder.model()).parent_path();
-  for (fs::directory_iterator at(beside, error), end; !error && at != end; at.increment(error)) {
-    const std::string other = at->path().extension().string();
+  constexpr auto unreadable = fs::directory_options::skip_permission_denied;
+  fs::recursive_directory_iterator at(beside, unreadable, error), end;
+  for (int seen = 0; !error && at != end && seen < most_files_beside; ++seen, at.increment(error)) {
+    const std::string other = ending_of(at->path());
     std::error_code of_file;
     if ((other == ".bin" || other == ".mtl") && at->is_regular_file(of_file)) {
       bytes += at->file_size(of_file);

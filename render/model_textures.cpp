@@ -14,7 +14,7 @@
 namespace render {
 namespace {
 
-constexpr std::size_t max_texel_bytes = std::size_t{4} << 30;
+constexpr std::size_t max_texel_bytes = std::size_t{4} << 30;  // of files, too
 
 // A texture on its way from the file.
 struct Source {
@@ -94,6 +94,7 @@ class Substitution {
     lost(p.metallic_roughness_texture, left_out);
     lost(p.normal_texture, left_out);
     lost(p.clearcoat_texture, left_out);
+    lost(p.clearcoat_roughness_texture, left_out);
   }
 
   // What became of a lost texture, in words.
@@ -127,14 +128,20 @@ class Substitution {
 std::vector<std::shared_ptr<const Texture>> decode_textures(RawModel& model,
                                                             const ModelFolder& folder) {
   std::vector<Source> sources(model.textures.size());
-  std::size_t bytes = 0;
+  std::size_t bytes = 0, file_bytes = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    read(model.textures[i], folder, sources[i]);
-    bytes += claimed_bytes(model.textures[i], sources[i]);
+    Source& source = sources[i];
+    read(model.textures[i], folder, source);
+    const std::size_t claimed = claimed_bytes(model.textures[i], source);
+    bytes += claimed;
+    // What is no picture is told from one at once, and not kept until all are read.
+    if (claimed == 0 && source.why.empty()) decode(model.textures[i], source);
+    file_bytes += source.file.size();
+    if (bytes > max_texel_bytes || file_bytes > max_texel_bytes)
+      throw std::runtime_error("its textures take more than 4 GB");
   }
-  if (bytes > max_texel_bytes) throw std::runtime_error("its textures take more than 4 GB");
   capture::parallel_for(std::size_t{0}, sources.size(), [&](std::size_t i) {
-    if (sources[i].why.empty()) decode(model.textures[i], sources[i]);
+    if (sources[i].why.empty() && !sources[i].texture) decode(model.textures[i], sources[i]);
   });
   Substitution substitution(sources);
   for (RawMaterial& material : model.materials) substitution.apply(material);

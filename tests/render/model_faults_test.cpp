@@ -113,6 +113,18 @@ TEST(ModelFaults, RefusesPositionsThatAreNotFiniteOrTooFar) {
   expect_refused(with_apex({0, 3e10F, 0}, "farther away"));
 }
 
+TEST(ModelFaults, RefusesPlacesThatAreNoNumbers) {
+  GlbParts parts;
+  parts.positions = {0, 0, 0, 10, 1, 10, 20, -3, 20};  // of x, infinity less infinity
+  std::string file = make_glb(parts);
+  const std::string node = R"("name":"part")", placed = R"("name":"part","matrix":
+[1e38,0,0,0,0,1,0,0,-1e38,0,0.1,0,0,0,0,1])";
+  const std::size_t length = file.find("BIN\0"s) - 4 - 20;
+  file = made::glb(file.substr(20, length).replace(file.find(node) - 20, node.size(), placed),
+                   file.substr(file.find("BIN\0"s) + 4));
+  expect_refused({{"a.glb", file, "farther away"}});
+}
+
 TEST(ModelFaults, LeavesOutTrianglesThatAreNotFiniteAndSaysSo) {
   const fs::path folder = made::make_temporary_directory();
   const LoadedModel model = load_model(
@@ -285,6 +297,27 @@ TEST(ModelFaults, KeepsTheTexturesBesideALostOne) {
   const StandardParameters p = standard_parameters(model.scene.materials.at(0), 1);
   EXPECT_EQ(p.base_color_texture, 0);
   EXPECT_EQ(p.normal_texture, -1);
+}
+
+TEST(ModelFaults, LeavesOutALostMapOfTheCoat) {
+  const fs::path folder = made::make_temporary_directory();
+  fs::copy_file(made::bad_files().parent_path() / "one_texel.png", folder / "one.png");
+  for (const bool lost : {true, false}) {
+    GlbParts parts;
+    parts.material = R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}},
+"extensions":{"KHR_materials_clearcoat":{"clearcoatFactor":1,"clearcoatRoughnessFactor":0.5,
+"clearcoatRoughnessTexture":{"index":1}}}})";
+    parts.more = R"(,"extensionsUsed":["KHR_materials_clearcoat"],
+"textures":[{"source":0},{"source":1}],"images":[{"uri":")" +
+                 (lost ? "one.png\"},{\"uri\":\"lost.png"s : "lost.png\"},{\"uri\":\"one.png"s) +
+                 "\"}]";
+    const LoadedModel model = load_model(write(folder, {"a.glb", make_glb(parts)}));
+    ASSERT_EQ(model.scene.textures.size(), 1U);
+    const StandardParameters p = standard_parameters(model.scene.materials.at(0), 1);
+    EXPECT_EQ(p.clearcoat_roughness_texture, lost ? -1 : 0);
+    EXPECT_EQ(p.base_color_texture, lost ? 0 : -1);
+    EXPECT_THAT(model.report.notes, testing::Contains(HasSubstr(lost ? "left out" : "magenta")));
+  }
 }
 
 TEST(ModelFaults, RefusesTexturesThatTogetherTakeTooMuch) {

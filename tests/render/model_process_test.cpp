@@ -161,5 +161,27 @@ TEST(ReadModelConfined, BelievesNothingThatItsReaderSends) {
   EXPECT_THAT(refusal(sending(Kind::head, size, bytes)), HasSubstr("no mesh"));
 }
 
+// What its reader may take grows with the buffers, wherever below the model they lie.
+TEST(ReadModelConfined, CountsBuffersBelowTheModel) {
+  if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";
+  const fs::path folder = made::make_temporary_directory();
+  const OtherReader reader(folder);
+  const fs::path told = folder / "told";
+  reader.become("head -c 8 | od -An -tu8 > " + told.string());
+  const auto memory_of = [&](const std::string& name) {
+    std::ofstream(folder / name) << "{}";
+    EXPECT_THROW(load_model(folder / name), std::runtime_error);
+    std::uint64_t bytes = 0;
+    std::ifstream(told) >> bytes;
+    return bytes;
+  };
+  const std::uint64_t alone = memory_of("a.gltf");
+  EXPECT_EQ(alone, (512U << 20) + 2U * 24);
+  fs::create_directories(folder / "parts" / "more");
+  std::ofstream(folder / "parts" / "more" / "a.BIN") << std::string(1000, ' ');
+  EXPECT_EQ(memory_of("a.gltf"), alone + 24000);
+  EXPECT_EQ(memory_of("B.GLTF"), alone + 24000);
+}
+
 }  // namespace
 }  // namespace render::model_process_test
