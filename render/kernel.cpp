@@ -199,7 +199,9 @@ void TileWorkspace::Impl::write_kept(
   const int column = x0 / cell_size, row = y0 / cell_size;
   const FrameKeys& keys = memory.keys();
   const LitCell* lit = memory.lit(column, row);
-  if (lit && lit->light == keys.light.all &&
+  // Before a frame knows of clear bodies, or while the light changes, its plate has no key.
+  const bool knows_plate = cell.bent.empty() || keys.plate_levels.all != 0;
+  if (lit && lit->light == keys.light.all && knows_plate &&
       (cell.bent.empty() || lit->plate_levels == keys.plate_levels.all) &&
       (lit->shows_plate ? has_plate_of(*lit, tile, x0, y0) : !is_broken_plate(tile, x0, y0))) {
     copy_lit(*lit, tile, x0, y0);
@@ -211,7 +213,8 @@ void TileWorkspace::Impl::write_kept(
   apart.statistics = &statistics;
   light(frame, cell, statistics);
   write(frame, apart, x0, y0);
-  if (LitCell* room = cell.video.empty() ? memory.place_lit(column, row) : nullptr) {
+  const bool can_stay = cell.video.empty() && knows_plate;
+  if (LitCell* room = can_stay ? memory.place_lit(column, row) : nullptr) {
     keep_lit(tile, x0, y0, *room);
     room->light = keys.light.all;
     room->plate_levels = keys.plate_levels.all;

@@ -202,5 +202,45 @@ TEST(RefineCells, FindsCellsAheadAsTheFrameWouldShowThem) {
   expect_same(warm, shot.show(nullptr), 0);
 }
 
+// A body that the first stage misses: the frame that finds it has begun without it.
+TEST(RefineCells, KeepsNoCellLitWhosePlateHadNoKey) {
+  RealFloorRoom shot;
+  MadeRoom& room = shot.room;
+  render::SceneDescription scene = room.scene->description();
+  constexpr std::size_t screen = 3, glass_ball = 6;
+  for (const std::size_t i : {screen, glass_ball}) scene.instances[i].set_from_object[11] = -100;
+  scene.meshes.push_back(made_ball({-0.31F, 1.0F, 1.3F}, 0.07F, 4));
+  scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+  room.scene = std::make_unique<render::Scene>(std::move(scene));
+  const auto show = [&](int frame, bool refine) {
+    for (std::size_t i = 0; i < room.plate.pixels.size(); ++i) {
+      const auto value = static_cast<float>((i * 7 + static_cast<std::size_t>(frame)) % 11);
+      room.plate.pixels[i] = capture::half_from_float(0.1F + 0.01F * value);
+    }
+    render::FrameInputs inputs = shot.inputs();
+    inputs.kept = &shot.kept;
+    const auto context = render::prepare_frame(inputs, room.job, room.plate);
+    if (refine) {
+      std::vector<render::Refinement> wanted;
+      for (std::size_t i = 0; i < 30; ++i) wanted.push_back({i, render::finished_stage});
+      render::RenderStatistics ahead;
+      refine_cells(*context, wanted, Clock::now() + std::chrono::hours(1), room.job, ahead);
+    }
+    render::FrameResult warm;
+    render_frame(*context, room.plate, warm);
+    expect_same(warm, shot.show(nullptr), frame);
+  };
+  room.job.stages.assign(30, 0);
+  for (int frame = 0; frame < 3; ++frame) show(0, false);
+  EXPECT_FALSE(shot.kept.bends_plate());
+  show(0, true);
+  EXPECT_TRUE(shot.kept.bends_plate());
+  const std::vector<render::DirectionalLight> before = room.job.lights.lights;
+  room.job.lights.lights[0].irradiance *= 1.2F;
+  show(1, false);
+  room.job.lights.lights = before;
+  for (int frame = 2; frame < 5; ++frame) show(frame, false);
+}
+
 }  // namespace
 }  // namespace compositing::kept_cells_test
