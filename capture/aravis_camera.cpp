@@ -89,10 +89,12 @@ class AravisCamera final : public Camera {
   std::optional<ExposureRange> exposures_;
   std::array<double, 16> set_exposures_s_{};  // the last ones: the camera may be as slow
   std::size_t exposures_set_ = 0;
+  double told_exposure_s_ = 0;  // by the last good frame: automatic ones change unasked
   DeviceClock clock_;
   std::optional<std::uint64_t> last_id_;
   Time last_sign_{};       // when the camera was last heard of
   int silent_frames_ = 0;  // lost since then
+  Time opened_{};          // when the stream was taken
   std::string away_note_;
 };
 
@@ -123,8 +125,9 @@ void AravisCamera::open(const CameraOptions& options) {
   info_.rate = stream_->rate();
   info_.live = true;
   exposures_ = stream_->exposure_range();
-  set_exposures_s_[0] = settings_.exposure_s.value_or(0);
-  last_sign_ = monotonic_now();
+  set_exposures_s_[0] = stream_->fixed_exposure_s();
+  opened_ = monotonic_now();
+  last_sign_ = opened_;
 }
 
 void AravisCamera::keep_settings() {
@@ -164,7 +167,8 @@ void AravisCamera::describe() {
 
 Time AravisCamera::period() const {
   const Time told = info_.rate.num > 0 ? time_of_frame(1, info_.rate) : untold_period;
-  return std::max(told, time_of_seconds(std::ranges::max(set_exposures_s_)));
+  return std::max(told,
+                  time_of_seconds(std::max(std::ranges::max(set_exposures_s_), told_exposure_s_)));
 }
 
 std::optional<Frame> AravisCamera::next() {
@@ -188,10 +192,12 @@ void AravisCamera::read_next() {
     leave(error.what());
     return;
   }
-  const Time silence = monotonic_now() - last_sign_;
-  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(silence);
+  const Time now = monotonic_now();
+  const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now - last_sign_);
   const std::string note = "no picture came for " + std::to_string(ms.count()) + " ms";
   lose_what_is_due(note);
+  // One that just returned gets as long for its first picture as any other one.
+  const Time silence = now - std::max(last_sign_, opened_);
   if (silence > std::max(least_silence, silence_frames * period())) leave(note);
 }
 
@@ -220,6 +226,8 @@ void AravisCamera::await_return() {
   search_.reset();
   clock_.reset();
   last_id_.reset();
+  opened_ = monotonic_now();
+  set_exposures_s_[0] = stream_->fixed_exposure_s();
   try {
     frames_.set_layout(stream_->layout(), crop_);
   } catch (const std::runtime_error& error) {
@@ -243,6 +251,7 @@ void AravisCamera::read_buffer(const AravisBuffer& buffer) {
   Frame frame;
   frame.time = time_of(buffer, frame.note);
   frame.exposure_s = buffer.exposure_s;
+  if (buffer.fault.empty()) told_exposure_s_ = buffer.exposure_s;
   count(buffer, frame.time);
   last_sign_ = monotonic_now();
   silent_frames_ = 0;

@@ -50,6 +50,8 @@ class AravisStream {
   bool counts_in_16_bits() const { return is_gige_; }
   bool tells_exposures() const { return chunk_parser_ != nullptr; }
   std::optional<ExposureRange> exposure_range() const { return exposures_; }
+  // What it was opened with; 0 = automatic, not told, or changed by set_exposure since.
+  double fixed_exposure_s() const { return fixed_exposure_s_; }
   // Sets the exposure of some later frame on. From the first call on, AravisBuffer::exposure_s is
   // told by chunks only. Returns what the camera took. Throws std::runtime_error, without the
   // camera's name, with what was asked and what is possible.

@@ -334,6 +334,60 @@ TEST_F(AravisCameraTest, WaitsForTheSlowestFrames) {
   EXPECT_EQ(camera->statistics().lost, 0);
 }
 
+// What an exposure is need not be said in the URI.
+TEST_F(AravisCameraTest, WaitsForSlowFramesWhoseExposureTheCameraTells) {
+  MadeGigeSettings settings = small();
+  settings.exposures = {1e-5, 2};
+  for (const bool set_before : {false, true}) {
+    settings.exposure_s = set_before ? 0.6 : 0.005;
+    make(settings);
+    const auto camera =
+        open(set_before ? "?format=Mono12&rate=30" : "?format=Mono12&rate=30&ExposureTime=600000");
+    for (int i = 0; i < 3; ++i) {
+      const auto frame = camera->next();
+      EXPECT_EQ(frame->status, FrameStatus::good) << frame->note;
+      EXPECT_NEAR(frame->exposure_s, 0.6, 1e-9);
+    }
+    EXPECT_EQ(camera->statistics().lost, 0);
+  }
+}
+
+// An exposure that was set long ago, or by the camera itself, may go on.
+TEST_F(AravisCameraTest, WaitsForSlowFramesThatTellTheirExposure) {
+  MadeGigeSettings settings = small();
+  settings.exposures = {1e-5, 2};
+  settings.has_chunks = true;
+  settings.exposure_lag = 4;
+  make(settings);
+  const auto camera = open("?format=Mono12&rate=30&exposure=0.4");
+  next_good(*camera);
+  camera->set_exposure(0.001);
+  int slow = 0;
+  for (Frame frame = *camera->next(); frame.exposure_s > 0.3; frame = *camera->next()) {
+    EXPECT_EQ(frame.status, FrameStatus::good) << frame.note;
+    ++slow;
+  }
+  EXPECT_GE(slow, 3);
+  EXPECT_EQ(camera->statistics().lost, 0);
+}
+
+// Its first picture takes an exposure and a transfer, which together are longer than a frame.
+TEST_F(AravisCameraTest, ReturnsThoughItsFirstPictureTakesLongerThanAFrame) {
+  MadeGigeSettings settings = small();
+  settings.link_bits_per_s = 3e6;  // 17 ms for a picture
+  make(settings);
+  const auto camera = open("?format=Mono12&rate=30&exposure=0.022&packet_size=576&resend=0");
+  next_good(*camera);
+  made_->unplug();
+  while (camera->next()->note.find("away") == std::string::npos) {
+  }
+  made_->plug_in();
+  const std::int64_t number_at_return = camera->statistics().delivered;
+  const Frame frame = next_good(*camera);
+  EXPECT_LE(frame.number - number_at_return, 60) << "2 s";
+  EXPECT_EQ(camera->statistics().delivered - 1, frame.number);
+}
+
 TEST_F(AravisCameraTest, ReturnsWithItsExposure) {
   const auto camera = open("?format=Mono12&rate=30");
   camera->set_exposure(0.003);
