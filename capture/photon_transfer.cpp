@@ -243,10 +243,14 @@ Measured measure_colour(const ColourBlocks& colour,
   Measured measured;
   measured.fit =
       fit_black_level(block_means(colour, levels, whole, line), claimed_s, exposure_error);
-  const double power = power_of(levels, measured.fit);
   constexpr double most_bent = 0.05;
-  if (!measured.fit.log_exposures.empty() && std::abs(power - 1) > most_bent) {
-    fail_not_linear("they grow as the exposure to the power " + std::to_string(power).substr(0, 4));
+  // Without two exposures of one place there are none to solve for: said below.
+  if (!measured.fit.log_exposures.empty()) {
+    const double power = power_of(levels, measured.fit);
+    if (std::abs(power - 1) > most_bent) {
+      fail_not_linear("they grow as the exposure to the power " +
+                      std::to_string(power).substr(0, 4));
+    }
   }
   check_noise(line);
   if (!std::isfinite(measured.fit.black.sigma)) {

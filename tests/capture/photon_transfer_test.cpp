@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <random>
 #include <stdexcept>
 
@@ -326,6 +327,25 @@ TEST(MeasurePhotonTransfer, SaysWhatShotsLack) {
   Image even = make_image(128, 128, 1);
   std::fill(even.pixels.begin(), even.pixels.end(), 0.5F);
   EXPECT_NE(refusal_of<NotLinear>(take(sensor, even, {1, 1.01}, 3), 12), "");
+}
+
+// Each place is good at one exposure at most: nothing tells black.
+TEST(MeasurePhotonTransfer, RefusesExposuresThatShareNoUnclippedPlace) {
+  const MadeSensor sensor{.full_well_e = 20'000, .read_noise_e = 4, .bits = 12, .pedestal = 64};
+  const Image scene = patches(160, 160, 1, 0.8, 15);
+  const auto refusal_beside = [&](int code, double good_s, double clipped_s) {
+    Shots shots = take(sensor, scene, {1, 1});
+    for (std::size_t i = 0; i < shots.made.size(); ++i) {
+      const bool good = i < 2;
+      shots.exposures_s[i] = good ? good_s : clipped_s;
+      if (!good) std::ranges::fill(shots.made[i].codes, static_cast<std::uint16_t>(code));
+    }
+    return refusal_of<std::runtime_error>(shots, 12);
+  };
+  for (const std::string& message : {refusal_beside(4095, 0.001, 1), refusal_beside(0, 1, 0.001)}) {
+    EXPECT_NE(message.find("no place is seen unclipped at two exposures"), std::string::npos)
+        << message;
+  }
 }
 
 TEST(MeasurePhotonTransfer, RefusesShotsThatDoNotFitTogether) {
