@@ -40,7 +40,9 @@ std::optional<AVPixelFormat> plain_format(AVPixelFormat format, const AVPixFmtDe
   const bool rgb = (its.flags & AV_PIX_FMT_FLAG_RGB) != 0;
   const bool wide_words = its.comp[0].depth + its.comp[0].shift > 16;
   if (bayer || wide_words) {
-    return its.comp[0].depth > 8 ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_RGB24;
+    // The depths of a mosaic's components are their shares of a pixel; a step is a code's bytes.
+    const bool deep = bayer ? its.comp[0].step > 1 : its.comp[0].depth > 8;
+    return deep ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_RGB24;
   }
   if (rgb && its.comp[0].depth < 8) {
     return AV_PIX_FMT_RGB24;

@@ -119,6 +119,8 @@ std::vector<PictureEntry> read_list(const std::filesystem::path& list) {
     try {
       entries.push_back(entry_of(line, list.parent_path()));
     } catch (const std::runtime_error& error) {
+      // A line without its end was being written when the recording was cut off.
+      if (text.eof() && !entries.empty()) break;
       fail(error.what());
     }
     if (entries.size() > 1 && entries.back().time <= entries[entries.size() - 2].time) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -20,6 +21,7 @@ constexpr std::chrono::seconds max_untaken{10};
 constexpr int joins_per_second = 200;
 
 constexpr int max_channels = 64;
+constexpr int max_rate = 768'000;  // twice what any recorder has; memory goes with it
 
 }  // namespace
 
@@ -39,6 +41,10 @@ SoundDecoder::SoundDecoder(MediaFile& file)
   rate_ = stream.codecpar->sample_rate;
   if (channels_ < 1 || channels_ > max_channels || rate_ < 1) {
     throw std::runtime_error("it names no rate or channels");
+  }
+  if (rate_ > max_rate) {
+    throw std::runtime_error("its rate is " + std::to_string(rate_) + " Hz, above the limit of " +
+                             std::to_string(max_rate) + " Hz");
   }
 }
 

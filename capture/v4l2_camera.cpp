@@ -73,7 +73,7 @@ class V4l2Camera final : public Camera {
   std::optional<ExposureRange> exposures_;
 
   std::optional<std::uint32_t> last_sequence_;
-  int time_outs_ = 0;
+  int time_outs_ = 0;  // since the last buffer, a lost frame each
   std::string away_note_;
   Time next_search_{};
   std::optional<double> asked_exposure_s_;  // the last one
@@ -188,8 +188,8 @@ bool V4l2Camera::search() {
 void V4l2Camera::read_next() {
   try {
     if (const auto buffer = stream_->next(patience())) {
-      time_outs_ = 0;
       read_buffer(*buffer);
+      time_outs_ = 0;
       return;
     }
   } catch (const std::runtime_error& error) {
@@ -231,14 +231,17 @@ void V4l2Camera::read_buffer(const V4l2Buffer& buffer) {
               std::move(frame));
 }
 
-// Frames that the device counted and did not deliver, evenly between the last one and `time`.
+// Frames that the device counted and did not deliver, evenly between the last one and `time`. Those
+// that were given up already are among them.
 void V4l2Camera::count_missing(std::uint32_t sequence, Time time) {
   const std::optional<std::uint32_t> last = std::exchange(last_sequence_, sequence);
   if (!last) return;
   const std::uint32_t step = sequence - *last;  // over its wrap
   // Devices that do not count tell 0 always, and counters may start again.
   if (step <= 1 || step > 0x80000000U) return;
-  frames_.lose_between(step - 1, time, words_of_missing(step - 1));
+  const auto given_up = static_cast<std::uint32_t>(time_outs_);
+  if (step - 1 <= given_up) return;
+  frames_.lose_between(step - 1 - given_up, time, words_of_missing(step - 1));
 }
 
 // The middle of the exposure, as far as stamp and exposure tell it.

@@ -108,6 +108,21 @@ TEST_F(Replay, NamesTheLineThatItRefuses) {
               testing::ThrowsMessage<std::runtime_error>(HasSubstr("line 1: the first line")));
 }
 
+TEST_F(Replay, PlaysUpToWhereItsListWasCutOff) {
+  write_picture("a.png", 10);
+  const std::string good = "a.png,0,0.01,good\n";
+  const std::string next = "a.png,0.04,0.01,good";
+  for (std::size_t written = 0; written < next.size(); ++written) {
+    write_list(good + next.substr(0, written));
+    EXPECT_EQ(open()->info().frames, 1) << written;
+  }
+  write_list(good + next);
+  EXPECT_EQ(open()->info().frames, 2) << "only its end is missing";
+  write_list(next.substr(0, 10));
+  EXPECT_THAT([&] { open(); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("line 2: it needs four")));
+}
+
 TEST_F(Replay, RefusesAFolderThatIsNotThereOrHasNoPictures) {
   EXPECT_THAT([] { open_camera("replay:/no/such/folder"); },
               testing::ThrowsMessage<std::runtime_error>(HasSubstr("no such folder")));

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 
 #include "capture/camera.h"
 #include "tests/independent_plate.h"
@@ -143,6 +144,28 @@ TEST_F(Clap, IsBoundedInMemoryWhenNobodyListens) {
   ASSERT_TRUE(rest);
   EXPECT_LE(rest->samples.size(), 8000U * 11);
   EXPECT_GE(rest->samples.size(), 8000U * 9);
+}
+
+// A header may name any rate, and memory goes with it.
+TEST_F(Clap, IsLeftOutIfItsRateIsNoRecorders) {
+  const std::string sound = (directory_ / "sound.raw").string();
+  std::ofstream(sound) << std::string(20000, '\0');
+  const auto make_at = [&](const std::string& rate) {
+    const std::string clip = (directory_ / (rate + ".mkv")).string();
+    independent::ffmpeg("-f lavfi -i color=black:size=16x16:rate=5:duration=1 -f s16le -ar " +
+                        rate + " -ac 1 -i '" + sound + "' -c:v ffv1 -c:a copy '" + clip + "'");
+    return clip;
+  };
+  EXPECT_EQ(open_camera(make_at("768000"))->info().sound_rate, 768000);
+  for (const char* rate : {"768001", "2000000000"}) {
+    const auto camera = open_camera(make_at(rate));
+    EXPECT_EQ(camera->info().sound_channels, 0);
+    EXPECT_THAT(camera->info().description,
+                testing::HasSubstr("sound left out: its rate is " + std::string(rate) +
+                                   " Hz, above the limit of 768000 Hz"));
+    ASSERT_TRUE(camera->next());
+    EXPECT_FALSE(camera->take_sound());
+  }
 }
 
 TEST_F(Clap, OfASilentFileIsNothing) {

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "capture/coded_picture.h"
 #include "tests/capture/fake_v4l2.h"
@@ -252,6 +254,28 @@ TEST_F(V4l2CameraTest, LosesFramesThatDoNotComeInTime) {
     EXPECT_THAT(frame->note, HasSubstr("within 500 ms"));
   }
   EXPECT_EQ(camera->next()->status, FrameStatus::good);
+}
+
+TEST_F(V4l2CameraTest, CountsFramesOnceThatWereWaitedForInVain) {
+  const auto camera = open("/dev/video0?format=YUYV");
+  camera->next();
+  device().events.assign(2, {.wait_result = 0});
+  device().events.push_back({.sequence_step = 4});
+  device().events.push_back({.sequence_step = 2});
+  std::vector<std::string> lost;
+  for (std::int64_t number = 1; number <= 6; ++number) {
+    const auto frame = camera->next();
+    EXPECT_EQ(frame->number, number);
+    if (frame->status == FrameStatus::lost) lost.push_back(frame->note);
+  }
+  EXPECT_THAT(lost, testing::ElementsAre(HasSubstr("within 500 ms"), HasSubstr("within 500 ms"),
+                                         HasSubstr("left out 3"), HasSubstr("left out 1")));
+  EXPECT_EQ(camera->next()->status, FrameStatus::good);
+
+  device().events.assign(2, {.wait_result = 0});
+  device().events.push_back({.sequence_step = 2});
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(camera->next()->status, FrameStatus::lost);
+  EXPECT_EQ(camera->next()->status, FrameStatus::good) << "fewer than were given up";
 }
 
 TEST_F(V4l2CameraTest, StartsAStreamAnewThatIsSilent) {

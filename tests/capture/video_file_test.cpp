@@ -72,6 +72,25 @@ TEST_F(VideoFile, CountsAndTimesEveryFrameInEveryContainer) {
   }
 }
 
+TEST_F(VideoFile, KeepsTheDepthOfAMosaic) {
+  constexpr std::uint16_t code = 1000;
+  const std::string raw = (directory_ / "codes.raw").string();
+  std::ofstream codes(raw, std::ios::binary);
+  for (int i = 0; i < 16 * 16; ++i)
+    codes << static_cast<char>(code & 0xff) << static_cast<char>(code >> 8);
+  codes.close();
+  const std::string clip = (directory_ / "mosaic.nut").string();
+  independent::ffmpeg(
+      "-f rawvideo -pixel_format bayer_rggb16le -video_size 16x16 -framerate 25 -i '" + raw +
+      "' -c copy '" + clip + "'");
+  const auto camera = open_camera(clip);
+  EXPECT_THAT(camera->info().description, HasSubstr("bayer_rggb16le by swscale as rgb48le"));
+  const auto frame = camera->next();
+  ASSERT_TRUE(frame);
+  const double light = decode(Transfer::rec1886, code / 65535.0);
+  for (const float value : frame->image->pixels) EXPECT_NEAR(value / light, 1, 1e-3);
+}
+
 TEST_F(VideoFile, StartsAtTheFrameThatIsAskedFor) {
   const std::string clip = make_clip("a.mp4", "-c:v libx264 -bf 2 -g 8");
   const auto whole = open_camera(clip);
