@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -38,46 +39,18 @@ void check_frames(std::span<const Image> frames) {
 
 float clean(float value) { return value > 0 && value <= 1e9F ? value : 0; }
 
-// Mean over a box of 5x5 pixels, cut at the borders.
-void blur(Image& image) {
-  constexpr int reach = 2;
-  const auto pass = [&](int count, int lines, auto&& at) {
-    std::vector<float> row(static_cast<std::size_t>(count));
-    for (int line = 0; line < lines; ++line) {
-      for (int c = 0; c < 3; ++c) {
-        for (int i = 0; i < count; ++i) row[static_cast<std::size_t>(i)] = at(line, i, c);
-        for (int i = 0; i < count; ++i) {
-          const int from = std::max(0, i - reach), to = std::min(count - 1, i + reach);
-          float sum = 0;
-          for (int j = from; j <= to; ++j) sum += row[static_cast<std::size_t>(j)];
-          at(line, i, c) = sum / static_cast<float>(to - from + 1);
-        }
-      }
-    }
-  };
-  pass(image.width, image.height, [&](int y, int x, int c) -> float& { return image.at(y, x, c); });
-  pass(image.height, image.width, [&](int x, int y, int c) -> float& { return image.at(y, x, c); });
-}
-
-// The colour that most of a picture has, as the mean over it.
-std::array<float, 3> mean_of(const Image& image) {
-  std::array<double, 3> sum{};
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) sum[i % 3] += image.pixels[i];
-  std::array<float, 3> mean{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    mean[c] = static_cast<float>(sum[c] * 3 / static_cast<double>(image.pixels.size()));
-  }
-  return mean;
-}
-
-// Variance of one frame against its neighbour, as a line over light.
+// Variance of one frame against its neighbour, as a line over light. That is blurred: its own noise
+// would make the line flatter.
 void measure_noise(std::span<const Image> frames, CleanPlate& plate) {
+  if (frames.size() < 2) return;
+  Image light = plate.light;
+  blur_screen(light);
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
   for (std::size_t f = 1; f < frames.size(); ++f) {
     for (std::size_t i = 0; i < frames[f].pixels.size(); i += 7) {
       const double a = clean(frames[f - 1].pixels[i]), b = clean(frames[f].pixels[i]);
       if (a >= 0.98 || b >= 0.98) continue;  // clipped: without noise
-      const double x = plate.light.pixels[i], y = 0.5 * (a - b) * (a - b);
+      const double x = light.pixels[i], y = 0.5 * (a - b) * (a - b);
       n += 1, sx += x, sy += y, sxx += x * x, sxy += x * y;
     }
   }
@@ -116,6 +89,19 @@ Ordered find_key(std::span<const Image> frames, ScreenColour colour) {
   return all[static_cast<std::size_t>(low - all.begin()) / 2];
 }
 
+// The colour whose key has the greatest excess: a screen's also where it is the lesser part of the
+// picture. Nothing if none has any.
+std::optional<ScreenColour> most_saturated(std::span<const Image> frames) {
+  std::optional<ScreenColour> best;
+  float excess = 0;
+  for (int i = 0; i <= static_cast<int>(ScreenColour::magenta); ++i) {
+    const auto colour = static_cast<ScreenColour>(i);
+    const float of_this = find_key(frames, colour).excess;
+    if (of_this > excess) excess = of_this, best = colour;
+  }
+  return best;
+}
+
 bool is_screen(const Ordered& c, const Ordered& key) {
   if (c.excess < 0.35F * key.excess || c.excess > 3 * key.excess) return false;
   const float off = std::abs(c.second * key.first - key.second * c.first) +
@@ -124,6 +110,36 @@ bool is_screen(const Ordered& c, const Ordered& key) {
 }
 
 }  // namespace
+
+void blur_screen(Image& light) {
+  constexpr int reach = 2;
+  const auto pass = [&](int count, int lines, auto&& at) {
+    std::vector<float> row(static_cast<std::size_t>(count));
+    for (int line = 0; line < lines; ++line) {
+      for (int c = 0; c < 3; ++c) {
+        for (int i = 0; i < count; ++i) row[static_cast<std::size_t>(i)] = at(line, i, c);
+        for (int i = 0; i < count; ++i) {
+          const int from = std::max(0, i - reach), to = std::min(count - 1, i + reach);
+          float sum = 0;
+          for (int j = from; j <= to; ++j) sum += row[static_cast<std::size_t>(j)];
+          at(line, i, c) = sum / static_cast<float>(to - from + 1);
+        }
+      }
+    }
+  };
+  pass(light.width, light.height, [&](int y, int x, int c) -> float& { return light.at(y, x, c); });
+  pass(light.height, light.width, [&](int x, int y, int c) -> float& { return light.at(y, x, c); });
+}
+
+ScreenColour mean_colour(const Image& light) {
+  std::array<double, 3> sum{};
+  for (std::size_t i = 0; i < light.pixels.size(); ++i) sum[i % 3] += light.pixels[i];
+  std::array<float, 3> mean{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    mean[c] = static_cast<float>(sum[c] * 3 / static_cast<double>(light.pixels.size()));
+  }
+  return screen_colour_of(mean);
+}
 
 CleanPlate average_plate(std::span<const Image> frames) {
   check_frames(frames);
@@ -135,22 +151,14 @@ CleanPlate average_plate(std::span<const Image> frames) {
       plate.light.pixels[i] += share * clean(frame.pixels[i]);
     }
   }
-  blur(plate.light);
-  plate.colour = screen_colour_of(mean_of(plate.light));
+  plate.colour = most_saturated(frames).value_or(mean_colour(plate.light));
   measure_noise(frames, plate);
   return plate;
 }
 
 CleanPlate plate_from_footage(std::span<const Image> frames) {
   check_frames(frames);
-  ScreenColour best = ScreenColour::green;
-  float excess = 0;
-  for (int i = 0; i <= static_cast<int>(ScreenColour::magenta); ++i) {
-    const auto colour = static_cast<ScreenColour>(i);
-    const float of_this = find_key(frames, colour).excess;
-    if (of_this > excess) excess = of_this, best = colour;
-  }
-  return plate_from_footage(frames, best);
+  return plate_from_footage(frames, most_saturated(frames).value_or(ScreenColour::green));
 }
 
 CleanPlate plate_from_footage(std::span<const Image> frames, ScreenColour colour) {
@@ -194,7 +202,6 @@ CleanPlate plate_from_footage(std::span<const Image> frames, ScreenColour colour
       std::copy_n(filler.value(y, x), 3, &light.pixels[light.index(y, x)]);
     }
   }
-  blur(light);
   plate.known = static_cast<float>(known / (static_cast<double>(light.height) * light.width));
   return plate;
 }

@@ -35,9 +35,9 @@ struct CleanPlate {
   float known = 1;  // share of the frame in which the screen itself was seen
 };
 
-// The mean of frames of the empty screen, of one size, at least one, blurred by a box of 5x5
-// pixels. Noise is measured if there are two or more. Values that are not finite, or below 0, count
-// as 0. The screen's colour is that of most of it. Throws std::invalid_argument if there are no
+// The mean of frames of the empty screen, of one size, at least one. Noise is measured if there are
+// two or more. Values that are not finite, or below 0, count as 0. The screen's colour is the most
+// saturated large one; it need not fill the picture. Throws std::invalid_argument if there are no
 // frames, sizes differ, or a frame is not (height, width, 3).
 CleanPlate average_plate(std::span<const capture::Image> frames);
 
@@ -46,6 +46,13 @@ CleanPlate average_plate(std::span<const capture::Image> frames);
 // was seen. `colour` as the footage's most saturated large colour if not given. Frames as above.
 CleanPlate plate_from_footage(std::span<const capture::Image> frames);
 CleanPlate plate_from_footage(std::span<const capture::Image> frames, ScreenColour colour);
+
+// Takes the noise out of a screen's light, which is smooth, in place: mean over a box of 5x5
+// pixels, cut at the borders. (height, width, 3).
+void blur_screen(capture::Image& light);
+
+// The colour of a picture's mean. (height, width, 3), not empty.
+ScreenColour mean_colour(const capture::Image& light);
 
 // How the last value of a plate's cell is to be read.
 enum class PlateUse : std::uint8_t {
@@ -96,7 +103,8 @@ class PlateLight {
  public:
   static constexpr int cell = 8;
 
-  // Throws std::invalid_argument for an empty plate.
+  // A screen's light is blurred; another background's is not, for it has edges, and its colour is
+  // that of its mean. Throws std::invalid_argument for an empty plate.
   explicit PlateLight(CleanPlate plate, PlateUse use = PlateUse::screen);
 
   const CleanPlate& plate() const { return plate_; }

@@ -124,11 +124,10 @@ class KeyStore {
     const auto past = static_cast<std::size_t>(scratch_.past[8 * block + row]);
     return load_halves(&scratch_.previous[key_lanes * (8 * block + row)], past);
   }
-  // The same of a block of 8x8 pixels that are whole, and will be written.
+  // The same of a block of 8x8 pixels that are whole.
   void keep_whole(std::size_t block) {
     static_assert(sizeof(KeyPast) == 1);
     std::memset(&scratch_.past[8 * block], static_cast<int>(KeyPast::whole), 8);
-    std::memset(out_.written + 8 * block, 1, 8);
   }
 
   void clear_pixels(int y, int x, int count) {
@@ -138,6 +137,7 @@ class KeyStore {
     written = 0;
   }
   void mark_written(int y, int x) { out_.written[block_at(y, x)] = 1; }
+  void mark_written(std::size_t block) { std::memset(out_.written + 8 * block, 1, 8); }
   void mark_written(std::size_t block, std::size_t row, bool written) {
     out_.written[8 * block + row] = written ? 1 : 0;
   }

@@ -102,6 +102,12 @@ PlateLight::PlateLight(CleanPlate plate, PlateUse use)
   for (float& value : plate_.light.pixels) {
     if (!(value > 0 && value < 1e9F)) value = 0;
   }
+  if (use == PlateUse::screen) {
+    blur_screen(plate_.light);
+  } else {
+    // Light is followed in the first channel: most of the picture must have it.
+    plate_.colour = mean_colour(plate_.light);
+  }
   bare_.height = plate_.light.height;
   bare_.width = plate_.light.width;
   bare_.use = use;

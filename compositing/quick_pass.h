@@ -127,7 +127,9 @@ class QuickPass {
   }
 
   void put_whole(int top, int x, int rows, std::size_t block) {
-    store_.keep_whole(block);
+    store_.mark_written(block);
+    // Without smoothing nothing is kept, and so nothing would take it back.
+    if (in_.noise > 0) store_.keep_whole(block);
     switch (channels_of(in_.plate.colour)[0]) {
       case 0:
         return put_whole<0>(top, x, rows);

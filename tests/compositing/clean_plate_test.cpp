@@ -49,6 +49,26 @@ TEST(AveragePlate, TellsTheColourOfAnyScreen) {
   EXPECT_EQ(colour_of({0.34F, 0.36F, 0.002F}), ScreenColour::yellow);
 }
 
+// Most of the picture is a wall whose red stands out, too, but less.
+TEST(AveragePlate, TellsTheColourOfAScreenThatIsTheLesserPartOfThePicture) {
+  Image shot = even_picture(64, 96, {0.5F, 0.4F, 0.3F});
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 20; x < 48; ++x) {
+      for (int c = 0; c < 3; ++c) shot.at(y, x, c) = std::array{0.04F, 0.4F, 0.06F}[c];
+    }
+  }
+  EXPECT_EQ(average_plate({&shot, 1}).colour, ScreenColour::green);
+  const std::vector<Image> shots{shot, shot, shot};
+  EXPECT_EQ(average_plate(shots).colour, ScreenColour::green);
+}
+
+TEST(AveragePlate, LeavesOneShotAsItIs) {
+  const Image shot = light_of(MadeClip(made_scene("noise"), 4, 60, 80).plate_shot(0));
+  const CleanPlate plate = average_plate({&shot, 1});
+  EXPECT_EQ(plate.light.pixels, shot.pixels);
+  EXPECT_EQ(average_plate({&plate.light, 1}).light.pixels, shot.pixels);
+}
+
 TEST(AveragePlate, TakesWhatIsNoNumberForBlack) {
   Image shot = even_picture(16, 16, {0.1F, 0.5F, 0.1F});
   shot.pixels[5] = std::numeric_limits<float>::quiet_NaN();
@@ -81,6 +101,15 @@ TEST(PlateFromFootage, FindsTheScreenBehindAPersonWhoNeverLeaves) {
     off += std::abs(plate.light.pixels[i] / bare.pixels[i] - 1);
   }
   EXPECT_LT(off * 3 / static_cast<double>(bare.pixels.size()), 0.05);
+}
+
+TEST(PlateLight, BlursAScreenAndNoOtherBackground) {
+  Image shot = even_picture(16, 16, {0.1F, 0.5F, 0.1F});
+  shot.at(8, 8, 1) = 0.75F;
+  const CleanPlate plate = average_plate({&shot, 1});
+  EXPECT_NEAR(PlateLight(plate).plate().light.at(8, 8, 1), 0.51F, 1e-5F);
+  EXPECT_NEAR(PlateLight(plate).plate().light.at(6, 10, 1), 0.51F, 1e-5F);
+  EXPECT_EQ(PlateLight(plate, PlateUse::difference).plate().light.pixels, shot.pixels);
 }
 
 TEST(PlateLight, FollowsLampsAndShadows) {

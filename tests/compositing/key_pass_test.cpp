@@ -136,7 +136,7 @@ TEST(KeyPass, IsTheFormulaOfEachPixelByItself) {
     for (int number = 0; number < 3; ++number) {
       const Image frame = any_frame(random, plate.light, number);
       keyer.key(frame, keyed);
-      const auto order = channels_of(plate.colour);
+      const auto order = channels_of(keyer.lit().colour);
       const KeyDials& dials = keyer.dials();
       for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {

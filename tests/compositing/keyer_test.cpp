@@ -312,6 +312,79 @@ TEST(Keyer, TakesAPersonFromAStillRoomByDifference) {
   EXPECT_GT(report.confidence, 0.5F);
 }
 
+// Every pixel of the room is an edge.
+TEST(Keyer, FindsNobodyInAnEmptyTexturedRoomByDifference) {
+  Image room = capture::make_image(90, 160);
+  for (std::size_t i = 0; i < room.pixels.size(); ++i)
+    room.pixels[i] = (0.1F + 0.5F * random(5, i / 3)) * (1.1F - 0.2F * static_cast<float>(i % 3));
+  const auto noisy = [&](std::uint64_t seed) {
+    Image out = room;
+    for (std::size_t i = 0; i < out.pixels.size(); ++i) {
+      out.pixels[i] +=
+          0.005F * static_cast<float>(capture::normal_deviate(capture::mixed_bits(seed, i)));
+    }
+    return out;
+  };
+  const std::vector<Image> shots{noisy(1), noisy(2), noisy(3), noisy(4)};
+  KeySettings settings;
+  settings.method = KeyMethod::difference;
+  Keyer keyer(average_plate(shots), settings);
+  HalfImage half;
+  const KeyReport report = keyer.key(noisy(9), half);
+  const Image keyed = to_float(half);
+  double person = 0;
+  for (std::size_t p = 3; p < keyed.pixels.size(); p += 4) person += keyed.pixels[p];
+  EXPECT_LT(4 * person / static_cast<double>(keyed.pixels.size()), 1e-3);
+  EXPECT_GT(report.confidence, 0.9F) << name_of(report.status);
+}
+
+// The poster's blue stands out most, but the walls have hardly any.
+TEST(Keyer, FollowsTheWallsAndNoPosterByDifference) {
+  Image room = capture::make_image(90, 160);
+  for (int y = 0; y < 90; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      const bool poster = x > 20 && x < 60 && y > 20 && y < 60;
+      const std::array<float, 3> light =
+          poster ? std::array{0.02F, 0.04F, 0.6F} : std::array{0.4F, 0.2F, 0.05F};
+      for (std::size_t c = 0; c < 3; ++c) {
+        const auto i = static_cast<std::uint64_t>(room.index(y, x, static_cast<int>(c)));
+        const auto noise = static_cast<float>(capture::normal_deviate(capture::mixed_bits(3, i)));
+        room.pixels[i] = light[c] + 0.005F * noise;
+      }
+    }
+  }
+  KeySettings settings;
+  settings.method = KeyMethod::difference;
+  Keyer keyer(average_plate({&room, 1}), settings);
+  HalfImage half;
+  for (float& light : room.pixels) light *= 0.8F;
+  const KeyReport report = keyer.key(room, half);
+  EXPECT_NEAR(report.sight.gain, 0.8F, 0.02F);
+  EXPECT_GT(report.sight.screen, 0.8F);
+  EXPECT_GT(report.confidence, 0.9F) << name_of(report.status);
+}
+
+// The screen is a third of what its plate shows.
+TEST(Keyer, KeysBeforeAScreenThatIsTheLesserPartOfThePicture) {
+  Image room = even_picture(64, 192, {0.5F, 0.4F, 0.3F});
+  const auto fill = [](Image& image, int left, int right, std::array<float, 3> light) {
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = left; x < right; ++x) {
+        for (std::size_t c = 0; c < 3; ++c) image.at(y, x, static_cast<int>(c)) = light[c];
+      }
+    }
+  };
+  fill(room, 64, 128, green);
+  Keyer keyer(average_plate({&room, 1}), {});
+  fill(room, 88, 104, {0.3F, 0.3F, 0.3F});
+  HalfImage half;
+  const KeyReport report = keyer.key(room, half);
+  const Image keyed = to_float(half);
+  EXPECT_EQ(keyed.at(32, 76, 3), 0);
+  EXPECT_EQ(keyed.at(32, 96, 3), 1);
+  EXPECT_GT(report.confidence, 0.9F) << name_of(report.status);
+}
+
 TEST(KeyTable, IsWhatItsMakerLearnsFromTheSameClips) {
   if (!PLATELIGHT_FULL_TESTS) GTEST_SKIP() << "takes a minute: tests/run.sh --full";
   const TableCodes learned = train_key_table(training_seeds);

@@ -106,6 +106,32 @@ TEST(QuickKey, LeavesNothingOfAPersonWhoHasLeft) {
   }
 }
 
+TEST(QuickKey, ForgetsAPersonAtOnceWithoutSmoothing) {
+  const MadeClip clip(made_scene("noise"), 21, 135, 240);
+  KeySettings settings = quick_settings();
+  settings.smoothing = 0;
+  settings.follows_light = false;  // bounds of what is bare follow gains by steps, so have a past
+  Keyer left(plate_of(clip), settings), never(plate_of(clip), settings);
+  KeyedFrame a, b;
+  Image person = light_of(clip.plate_shot(2));
+  for (int y = 24; y < 112; ++y) {
+    for (int x = 64; x < 176; ++x) {
+      for (int c = 0; c < 3; ++c) person.at(y, x, c) = 0.3F;
+    }
+  }
+  left.key(person, a);
+  EXPECT_EQ(a.image().pixels[a.image().index(64, 120, 3)], 0x3C00);
+  for (int i = 3; i < 6; ++i) {
+    const Image screen = light_of(clip.plate_shot(i));
+    left.key(screen, a), never.key(screen, b);
+    ASSERT_EQ(a.image().pixels, b.image().pixels) << i;
+    for (int row = 0; row < 17; ++row) {
+      for (int column = 0; column < 30; ++column)
+        ASSERT_EQ(a.has_any_in_block(row, column), b.has_any_in_block(row, column));
+    }
+  }
+}
+
 TEST(QuickKey, LeavesNoTrail) {
   const MadeClip clip(made_scene("walking"), 21, 135, 240);
   Keyer keyer(plate_of(clip), quick_settings());
