@@ -68,6 +68,7 @@ struct PersonFeed::Person {
   std::shared_ptr<const render::LivePicture> clear = clear_picture();
   std::vector<bool> hidden;  // of its instances
   bool told = false;         // what it is shown as
+  bool unplaced = false;     // told that it cannot be placed yet
   std::vector<std::string> notes;
   PersonFrame frame;
 
@@ -147,11 +148,25 @@ void PersonFeed::stand(Person& person) {
   const PersonCameraFeed& feed = person.cameras.front().feed;
   person.standing =
       person.tracker->update(std::chrono::duration<double>(feed.time()).count(), feed.feet());
-  const FeetStatus seen = feed.feet().status;
-  if (seen != FeetStatus::seen && status.feet == compositing::name_of(FeetStatus::seen)) {
+  // What the matte shows as feet need not stand on the floor: the tracker tells.
+  FeetStatus seen = feed.feet().status;
+  if (person.standing) {
+    seen = person.standing->status;
+  } else if (seen == FeetStatus::seen) {
+    seen = FeetStatus::uncertain;
+  }
+  const bool was_seen = status.feet == compositing::name_of(FeetStatus::seen);
+  // Nobody yet is no news; somebody who cannot be placed is, once.
+  const bool unplaced = !person.standing && seen != FeetStatus::absent;
+  if (person.standing && was_seen && seen != FeetStatus::seen) {
     person.notes.push_back(fmt::format("{}: its feet are {}; it stays where it is", status.name,
                                        compositing::name_of(seen)));
+  } else if (unplaced && !person.unplaced) {
+    person.notes.push_back(
+        fmt::format("{}: its feet are {}; it is not shown until they are seen on the floor",
+                    status.name, compositing::name_of(seen)));
   }
+  person.unplaced |= unplaced;
   status.feet = compositing::name_of(seen);
 }
 

@@ -94,10 +94,16 @@ void key_clip(const KeyOptions& options, Console& console) {
   compositing::CleanPlate plate = read_clean_plate(options.plate, source);
   const double known = plate.known;
   const std::string colour(compositing::name_of(plate.colour));
-  const auto [width, height] = std::pair(plate.light.width, plate.light.height);
+  const auto camera = open_video(source);
+  // Before the masks, which are for the video too.
+  const auto [width, height] = std::pair(camera->info().width, camera->info().height);
+  if (plate.light.width != width || plate.light.height != height) {
+    throw std::invalid_argument(
+        fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", options.plate,
+                    plate.light.width, plate.light.height, source.uri, width, height));
+  }
   compositing::Keyer keyer(std::move(plate), settings_of(options),
                            read_key_masks(options.masks, width, height));
-  const auto camera = open_video(source);
   compositing::ExrSequenceSettings take;
   take.dir = options.out;
   take.rate = camera->info().rate.num > 0 ? camera->info().rate : capture::Rational{25, 1};

@@ -60,6 +60,19 @@ TEST_F(KeyCommand, TakesAPlateAndKeysAClipWithIt) {
   EXPECT_LT(squares / (3.0 * truth_.height * truth_.width), 1e-3);
 }
 
+// What is keyed blurs it: twice would be once too often.
+TEST_F(KeyCommand, WritesAPlateOfOneFrameAsItIs) {
+  const Outcome plate =
+      run("key plate " + in("empty_0000.png") + " --colour sRGB -o " + in("plate.exr"));
+  ASSERT_EQ(plate.status, 0) << plate.err;
+  const capture::Image light = capture::read_exr(in("plate.exr"));
+  const capture::Image shot = compositing::light_of(
+      compositing::MadeClip(compositing::made_scene("plain"), 4, 90, 160).plate_shot(0));
+  ASSERT_EQ(light.pixels.size(), shot.pixels.size());
+  for (std::size_t i = 0; i < light.pixels.size(); ++i)
+    ASSERT_NEAR(light.pixels[i], shot.pixels[i], 1e-3F) << i;
+}
+
 TEST_F(KeyCommand, KeepsToMasks) {
   run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr"));
   // The left third is the person, the right third is not.
@@ -103,6 +116,19 @@ TEST_F(KeyCommand, RefusesAPlateOfAnotherSizeAndNamesBoth) {
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("80x45"));
   EXPECT_THAT(outcome.err, HasSubstr("160x90"));
+  expect_one_line(outcome.err);
+}
+
+// A mask that fits the video is not to blame.
+TEST_F(KeyCommand, BlamesThePlateAndNotTheMaskForThePlatesSize) {
+  capture::write_exr(in("small.exr"), capture::make_image(45, 80));
+  capture::write_exr(in("core.exr"), capture::make_image(90, 160));
+  const Outcome outcome = run("key " + in("take_%04d.png") + " --plate " + in("small.exr") +
+                              " --core-mask " + in("core.exr") + " -o " + in("keyed"));
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("the clean plate " + in("small.exr") + " is 80x45"));
+  EXPECT_THAT(outcome.err, HasSubstr("is 160x90"));
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("mask")));
   expect_one_line(outcome.err);
 }
 

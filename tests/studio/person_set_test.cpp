@@ -194,6 +194,20 @@ TEST_F(PersonSetTest, StandsWhereItsFeetAreAndIsSeenThere) {
   EXPECT_TRUE(show.status()->notes.empty()) << show.status()->notes.front();
 }
 
+// Its camera looks up, by the set: whatever it shows is above the horizon.
+TEST_F(PersonSetTest, SaysOnceThatAPersonWhoIsSeenCannotBePlaced) {
+  std::string upward = walker;
+  upward.replace(upward.find("look_at = [0, 0, 1]"), 19, "look_at = [0, 0, 6]");
+  Show show(made_set("grey:6,25,0", upward));
+  std::vector<std::string> told;
+  show.run([&](const ShownFrame& shown) {
+    EXPECT_EQ(shown.prepared.persons.at(0).feet, "uncertain");
+    told.insert(told.end(), shown.prepared.notes.begin(), shown.prepared.notes.end());
+  });
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_THAT(told[0], HasSubstr("walker: its feet are uncertain; it is not shown"));
+}
+
 TEST_F(PersonSetTest, GivesTheSameBitsWhateverTheTiming) {
   const Set set = made_set("grey:8,25,0", walker);
   const auto pictures_of = [&](int slow_ms) {
