@@ -27,6 +27,7 @@ void Console::clear_bar() {
 }
 
 void Console::say(std::string_view line) {
+  const std::lock_guard lock(mutex_);
   if (quiet_) return;
   clear_bar();
   fmt::print("{}\n", line);
@@ -34,6 +35,7 @@ void Console::say(std::string_view line) {
 }
 
 void Console::warn(std::string_view line) {
+  const std::lock_guard lock(mutex_);
   clear_bar();
   fmt::print(stderr, "{}\n", line);
 }
@@ -41,6 +43,7 @@ void Console::warn(std::string_view line) {
 void Console::progress(double share, std::string_view what) {
   using namespace std::chrono_literals;
   if (quiet_ || !terminal_) return;
+  const std::lock_guard lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
   if (now - bar_time_ < 100ms && share < 1) return;
   bar_time_ = now;

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <chrono>
+#include <mutex>
 #include <string>
 #include <string_view>
 
 namespace studio {
 
+// From any thread.
 class Console {
  public:
   Console(bool quiet, std::string figures_file);
@@ -25,10 +27,12 @@ class Console {
   void figures(std::string_view json);
   // Whether anybody wants figures: costly ones need not be made otherwise.
   bool wants_figures() const { return !figures_file_.empty(); }
+  const std::string& figures_file() const { return figures_file_; }
 
  private:
   void clear_bar();
 
+  std::mutex mutex_;
   bool quiet_;
   bool terminal_;
   bool bar_shown_ = false;

@@ -94,9 +94,13 @@ RecordSettings read_record_section(Section section, const std::filesystem::path&
   read_path("exr", record.exr);
   read_path("fill", record.fill);
   read_path("key", record.key);
+  for (const auto& [key, path] : {std::pair("file", &record.file), std::pair("fill", &record.fill),
+                                  std::pair("key", &record.key)}) {
+    if (!path->empty() && !path->ends_with(".mkv")) section.fault(key, "must end in .mkv");
+  }
   if (!section.has("key") && section.has("fill")) section.fault("fill", "comes with record.key");
   if (!section.has("fill") && section.has("key")) section.fault("key", "comes with record.fill");
-  section.text("codec", record.codec);
+  section.word("codec", record.codec, {"h264", "lossless"});
   section.text("timecode", record.timecode);
   section.finish();
   return record;

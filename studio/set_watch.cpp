@@ -10,12 +10,13 @@ namespace studio {
 using namespace std::chrono_literals;
 
 SetWatch::SetWatch(std::string path,
+                   std::filesystem::file_time_type since,
                    std::function<void(Set)> changed,
                    std::function<void(const SetError&)> refused)
     : path_(std::move(path)),
       changed_(std::move(changed)),
       refused_(std::move(refused)),
-      seen_(std::filesystem::last_write_time(path_)),
+      seen_(since),
       thread_([this](const std::stop_token& stop) { watch(stop); }) {}
 
 void SetWatch::watch(const std::stop_token& stop) const {

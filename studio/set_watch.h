@@ -14,7 +14,9 @@ namespace studio {
 // why it cannot, goes to the callbacks, on that thread.
 class SetWatch {
  public:
+  // `since`: when the file was last written, as far as its show knows.
   SetWatch(std::string path,
+           std::filesystem::file_time_type since,
            std::function<void(Set)> changed,
            std::function<void(const SetError&)> refused);
 

@@ -15,6 +15,7 @@
 #include "render/kept_transport.h"
 #include "studio/handover.h"
 #include "studio/recording.h"
+#include "studio/set_files.h"
 #include "studio/sharpening.h"
 #include "studio/tally.h"
 #include "studio/tone_follower.h"
@@ -90,12 +91,16 @@ class Show::Stages {
     if (!frames_ && !options_.live && maker_.is_endless()) frames_ = 1;
     planned_frames_ = frames_ ? frames_ : frames_of_plate();
     if (options.record && !s.record.is_empty()) {
-      at_place(s, s.record.place, [&] { recording_.start(s.record); });
+      at_place(s, s.record.place, [&] {
+        spare_sources(s, s.record);
+        recording_.start(s.record);
+      });
     }
     tally_.status().effort = s.effort;
     publish(false);
   }
 
+  bool is_live() const { return options_.live; }
   std::optional<std::int64_t> planned_frames() const { return planned_frames_; }
 
   void post(ShowCommand command) {
@@ -233,7 +238,10 @@ class Show::Stages {
     noting([&] {
       std::visit(
           Overloaded{[&](const SetEffort& c) { maker_.set_effort(c.effort); },
-                     [&](const StartRecording& c) { work.recorder.emplace_back(c); },
+                     [&](const StartRecording& c) {
+                       spare_sources(maker_.set(), c.record);
+                       work.recorder.emplace_back(c);
+                     },
                      [&](const StopRecording& c) { work.recorder.emplace_back(c); },
                      [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
                      [&](const SetView& c) { view_ = c.view; },
@@ -415,6 +423,7 @@ Show::~Show() = default;
 void Show::post(ShowCommand command) { stages_->post(std::move(command)); }
 std::shared_ptr<const ShowStatus> Show::status() const { return stages_->status(); }
 void Show::run(const std::function<void(const ShownFrame&)>& on_frame) { stages_->run(on_frame); }
+bool Show::is_live() const { return stages_->is_live(); }
 std::optional<std::int64_t> Show::planned_frames() const { return stages_->planned_frames(); }
 
 }  // namespace studio

@@ -134,6 +134,8 @@ class Show {
   // power.
   void run(const std::function<void(const ShownFrame&)>& on_frame = {});
 
+  // Paced by the clock or a live plate.
+  bool is_live() const;
   // Frames that run() will show; nothing if it does not know.
   std::optional<std::int64_t> planned_frames() const;
 

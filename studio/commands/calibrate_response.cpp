@@ -19,6 +19,7 @@
 #include "capture/photon_transfer.h"
 #include "capture/response.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/exposure_list.h"
 
 namespace studio {
 namespace {
@@ -41,33 +42,6 @@ struct Calibrated {
   std::optional<capture::ResponseFit> fit;
   std::vector<std::string> warnings;
 };
-
-double number_of(std::string_view word) {
-  double number = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(number)) {
-    throw UsageError(fmt::format("--exposures: \"{}\" is no time, such as 0.5 or 1/80", word));
-  }
-  return number;
-}
-
-// "1/80,0.5,13": seconds; 0 = a dark shot.
-std::vector<double> exposures_of(const std::string& list) {
-  std::vector<double> exposures_s;
-  for (std::size_t begin = 0; begin < list.size();) {
-    const std::size_t end = std::min(list.find(',', begin), list.size());
-    const std::string_view word = std::string_view(list).substr(begin, end - begin);
-    const std::size_t slash = word.find('/');
-    const double over = slash == word.npos ? 1 : number_of(word.substr(slash + 1));
-    const double exposure_s = number_of(word.substr(0, slash)) / over;
-    if (!(exposure_s >= 0) || !std::isfinite(exposure_s)) {
-      throw UsageError(fmt::format("--exposures: \"{}\" is no time of 0 s or more", word));
-    }
-    exposures_s.push_back(exposure_s);
-    begin = end + 1;
-  }
-  return exposures_s;
-}
 
 capture::BayerPattern pattern_of(const std::string& name) {
   using capture::BayerPattern;
@@ -237,7 +211,7 @@ void calibrate_response(const ResponseOptions& options, Console& console) {
     throw UsageError("--model is auto, linear or curve");
   }
   capture::CalibrationShotOptions reading;
-  reading.exposures_s = exposures_of(options.exposures);
+  reading.exposures_s = exposures_in(options.exposures);
   reading.pattern = pattern_of(options.mosaic);
   const auto start = std::chrono::steady_clock::now();
   capture::CalibrationShots shots;

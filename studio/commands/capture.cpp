@@ -1,7 +1,6 @@
 // platelight capture: recordings of live cameras.
 #include <algorithm>
 #include <chrono>
-#include <csignal>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "capture/camera.h"
 #include "capture/recording.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/interruptible.h"
 
 namespace studio {
 namespace {
@@ -24,23 +24,6 @@ struct CaptureOptions {
   std::string folder;
   std::optional<std::int64_t> frames;
   std::optional<double> seconds;
-};
-
-volatile std::sig_atomic_t interrupted = 0;
-
-// Until it goes out of scope, Ctrl-C ends the recording and not the program.
-class Interruptible {
- public:
-  Interruptible() {
-    interrupted = 0;
-    before_ = std::signal(SIGINT, [](int) { interrupted = 1; });
-  }
-  ~Interruptible() { std::signal(SIGINT, before_); }
-  Interruptible(const Interruptible&) = delete;
-  Interruptible& operator=(const Interruptible&) = delete;
-
- private:
-  void (*before_)(int);
 };
 
 struct Taken {
@@ -60,8 +43,8 @@ Taken record(const CaptureOptions& options,
   capture::FrameRecording recording(options.folder);
   std::optional<capture::Time> first;
   Taken taken;
-  const Interruptible until_interrupted;
-  for (double frames = 0; frame && frames < most_frames && interrupted == 0; ++frames) {
+  const Interruptible ctrl_c;
+  for (double frames = 0; frame && frames < most_frames && !ctrl_c.is_interrupted(); ++frames) {
     if (!first) first = frame->time;
     const double seconds = std::chrono::duration<double>(frame->time - *first).count();
     if (seconds >= most_s) break;

@@ -1,4 +1,5 @@
 // platelight hdr: from bracketed shots, or one HDR picture, to an EXR file.
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "capture/exr.h"
 #include "capture/make_hdr.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/exposure_list.h"
 
 namespace studio {
 namespace {
@@ -20,9 +22,23 @@ namespace {
 struct HdrCommandOptions {
   std::vector<std::string> shots;
   std::string out;
+  std::string exposures;
   std::string response = "auto";
   std::string response_out;
 };
+
+// Of each shot, in seconds; none if none are stated.
+std::vector<double> stated_exposures(const HdrCommandOptions& options) {
+  std::vector<double> exposures_s = exposures_in(options.exposures);
+  if (!exposures_s.empty() && exposures_s.size() != options.shots.size()) {
+    throw UsageError(fmt::format("--exposures states {} times for {} shots", exposures_s.size(),
+                                 options.shots.size()));
+  }
+  if (std::ranges::find(exposures_s, 0) != exposures_s.end()) {
+    throw UsageError("--exposures: a dark shot tells nothing of the light");
+  }
+  return exposures_s;
+}
 
 nlohmann::ordered_json to_json(const capture::HdrResult& result, double stops) {
   auto candidates = nlohmann::ordered_json::array();
@@ -52,7 +68,8 @@ void save_response(const HdrCommandOptions& options, const capture::HdrResult& r
 
 void hdr(const HdrCommandOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) throw UsageError("-o must name an .exr file");
-  const capture::HdrResult result = capture::make_hdr(options.shots, {{}, options.response});
+  const capture::HdrResult result =
+      capture::make_hdr(options.shots, {stated_exposures(options), options.response});
   if (!options.response_out.empty()) save_response(options, result);
   capture::write_exr(options.out, result.radiance);
   const double stops = capture::range_stops(result.radiance);
@@ -66,20 +83,22 @@ void hdr(const HdrCommandOptions& options, Console& console) {
 }  // namespace
 
 Command hdr_command() {
-  return {
-      "hdr", "Merge bracketed shots to an HDR picture, or convert one",
-      "platelight hdr bracket/*.JPG -o light.exr --json light.json",
-      [](Arguments& arguments) -> std::function<void(Console&)> {
-        auto o = std::make_shared<HdrCommandOptions>();
-        arguments.positionals("SHOTS", o->shots, "shots with EXIF times, or one HDR or EXR file");
-        arguments.option("-o,--out", o->out, "EXR file");
-        arguments.required("--out");
-        arguments.option("--response", o->response,
-                         "auto (recovered), sRGB, linear, or a .rsp or .toml file");
-        arguments.option("--response-out", o->response_out,
-                         "write the response to this .rsp or .toml file, for sets and other shots");
-        return [o](Console& console) { hdr(*o, console); };
-      }};
+  return {"hdr", "Merge bracketed shots to an HDR picture, or convert one",
+          "platelight hdr bracket/*.JPG -o light.exr --json light.json",
+          [](Arguments& arguments) -> std::function<void(Console&)> {
+            auto o = std::make_shared<HdrCommandOptions>();
+            arguments.positionals("SHOTS", o->shots, "shots, or one HDR or EXR file");
+            arguments.option("-o,--out", o->out, "EXR file");
+            arguments.required("--out");
+            arguments.option("--exposures", o->exposures,
+                             "seconds of each shot, such as 1/80,0.5,13; else as EXIF tells them");
+            arguments.option("--response", o->response,
+                             "auto (recovered), sRGB, linear, or a .rsp or .toml file");
+            arguments.option(
+                "--response-out", o->response_out,
+                "write the response to this .rsp or .toml file, for sets and other shots");
+            return [o](Console& console) { hdr(*o, console); };
+          }};
 }
 
 }  // namespace studio

@@ -1,4 +1,5 @@
 // platelight run: puts a set on air.
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -9,9 +10,11 @@
 
 #include "capture/png.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/interruptible.h"
 #include "studio/effort_points.h"
 #include "studio/figures.h"
 #include "studio/picture_error.h"
+#include "studio/set_files.h"
 #include "studio/set_watch.h"
 #include "studio/show.h"
 
@@ -80,6 +83,32 @@ void report_progress(const ShowStatus& status,
   console.progress(share, text);
 }
 
+// Tells what goes wrong, each thing once and as soon as the show tells it; where that is very much,
+// the rest at the end.
+class Warnings {
+ public:
+  explicit Warnings(Console& console) : console_(console) {}
+
+  void tell(const ShowStatus& status) {
+    constexpr std::size_t most = 20;
+    if (told_.size() < most) tell_all(status);
+  }
+  void tell_all(const ShowStatus& status) {
+    for (const std::string& note : status.notes) tell(note);
+    if (!status.recorder.error.empty()) tell(status.recorder.error);
+  }
+
+ private:
+  void tell(const std::string& what) {
+    if (std::ranges::find(told_, what) != told_.end()) return;
+    console_.warn(what);
+    told_.push_back(what);
+  }
+
+  Console& console_;
+  std::vector<std::string> told_;
+};
+
 void report_end(const ShowStatus& status, const Set& set, Console& console) {
   console.say(
       fmt::format("{} frames at {:.2f} fps, {} dropped, {} lost in the plate; frame time "
@@ -113,10 +142,15 @@ void report_end(const ShowStatus& status, const Set& set, Console& console) {
     console.say(fmt::format("recorded {} frames of fill to {} and of key to {}",
                             status.recorder.written, set.record.fill, set.record.key));
   }
-  for (const std::string& note : status.notes) console.warn(note);
+  if (status.recorder.dropped > 0) {
+    console.warn(fmt::format("{} frames are not in the recording", status.recorder.dropped));
+  }
 }
 
 void run(const RunOptions& options, Console& console) {
+  // Before it is read: what is saved while the scene loads is a change.
+  std::error_code unreadable;
+  const auto saved = std::filesystem::last_write_time(options.set, unreadable);
   Set set = read_set(options.set);
   apply_options(options, set);
   if (options.fps || options.error) choose_effort(options, set, console);
@@ -124,6 +158,9 @@ void run(const RunOptions& options, Console& console) {
   ShowOptions show_options;
   show_options.live = options.live;
   show_options.frames = options.frames;
+  for (const std::string& written : {options.view_png, console.figures_file()}) {
+    spare_sources(set, written);
+  }
   Show show(set, show_options);
   if (!options.view.empty()) show.post(SetView{render::ray_view_named(options.view)});
   const std::optional<std::int64_t> planned = show.planned_frames();
@@ -131,24 +168,34 @@ void run(const RunOptions& options, Console& console) {
   std::unique_ptr<SetWatch> watch;
   if (options.watch) {
     watch = std::make_unique<SetWatch>(
-        options.set,
+        options.set, saved,
         [&](Set changed) {
           apply_options(options, changed);
           if (options.fps || options.error) changed.effort = effort;
-          console.say(fmt::format("{} has changed: on air", options.set));
+          console.say(fmt::format("{} has changed", options.set));
           show.post(ChangeSet{std::move(changed)});
         },
         [&](const SetError& error) { console.warn(error.what()); });
   }
 
   ShownFrame last;
-  show.run([&](const ShownFrame& shown) {
-    report_progress(*show.status(), planned, console);
-    last = shown;
-  });
+  Warnings warnings(console);
+  {
+    const Interruptible ctrl_c;
+    show.run([&](const ShownFrame& shown) {
+      const auto status = show.status();
+      report_progress(*status, planned, console);
+      warnings.tell(*status);
+      // A show that is not live is there for its recording.
+      const bool in_vain = !status->recorder.error.empty() && !show.is_live();
+      if (ctrl_c.is_interrupted() || in_vain) show.post(Quit{});
+      last = shown;
+    });
+  }
   watch.reset();
 
   const ShowStatus status = *show.status();
+  warnings.tell_all(status);
   report_end(status, set, console);
   if (!options.view_png.empty() && last.view_rgb8) {
     capture::write_png(options.view_png, set.show.width, set.show.height, 3, *last.view_rgb8);

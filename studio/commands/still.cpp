@@ -9,6 +9,7 @@
 #include "studio/commands/commands.h"
 #include "studio/figures.h"
 #include "studio/overlay.h"
+#include "studio/set_files.h"
 #include "studio/show.h"
 
 namespace studio {
@@ -29,6 +30,9 @@ void still(const StillOptions& options, Console& console) {
   ShowOptions show_options;
   show_options.frames = 1;
   show_options.record = false;
+  for (const std::string& written : {options.out, console.figures_file()}) {
+    spare_sources(set, written);
+  }
   Show show(set, show_options);
   if (!options.view.empty()) show.post(SetView{render::ray_view_named(options.view)});
   ShownFrame shown;

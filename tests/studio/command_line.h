@@ -36,13 +36,14 @@ class CommandLine : public testing::Test {
   }
   void TearDown() override { fs::remove_all(dir_); }
 
-  Outcome run(const std::string& words) const {
+  // `through`: a program that runs it.
+  Outcome run(const std::string& words, const std::string& through = "") const {
     const char* binary = std::getenv("PLATELIGHT_BINARY");
     EXPECT_NE(binary, nullptr) << "ctest sets PLATELIGHT_BINARY";
     const fs::path out = dir_ / "out.txt";
     const fs::path err = dir_ / "err.txt";
-    const std::string line = std::string(binary) + " " + words + " >" + out.string() + " 2>" +
-                             err.string() + " </dev/null";
+    const std::string line = through + " " + std::string(binary) + " " + words + " >" +
+                             out.string() + " 2>" + err.string() + " </dev/null";
     const int status = std::system(line.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, content_of(out), content_of(err)};
   }

@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "capture/camera.h"
 #include "capture/camera_response.h"
 #include "capture/exr.h"
 #include "capture/made_sensor.h"
@@ -269,6 +270,57 @@ TEST_F(Runs, RecordFillAndKeyForAnExternalKeyer) {
   EXPECT_LT(json["recorder"]["key_raised"], 1);
 }
 
+// As an operator ends a show that has no end.
+TEST_F(Runs, EndOnASignalWithTheirTakeWhole) {
+  write_set();  // its plate
+  const std::string set = write_made_set(dir_, "file:plate_0.png");
+  const std::string take = (dir_ / "take.mkv").string(), json_path = (dir_ / "run.json").string();
+  for (const char* signal : {"INT", "TERM"}) {
+    const Outcome outcome =
+        run("run " + set + " --frames 1000000 --record " + take + " --json " + json_path,
+            "timeout --preserve-status -s " + std::string(signal) + " 2");
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const auto json = nlohmann::json::parse(content_of(json_path));
+    EXPECT_GT(json["frames"], 0);
+    EXPECT_LT(json["frames"], 1000000);
+    EXPECT_EQ(json["recorder"]["written"], json["frames"]);
+    const auto camera = capture::open_camera("file:" + take);
+    EXPECT_EQ(camera->info().frames, json["frames"]);
+  }
+}
+
+TEST_F(Runs, AreNotRecordedOverWhatTheirSetIsMadeFrom) {
+  const std::string take = (dir_ / "take.mkv").string(), frames = (dir_ / "take").string();
+  const std::string first = write_set();
+  ASSERT_EQ(run("run " + first + " --record " + take + " --exr " + frames).status, 0);
+  const std::string set = write_made_set(dir_, "file:take.mkv");
+  const auto expect_spared = [&](const std::string& words, const std::string& path) {
+    const std::string before = content_of(path);
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 1) << words;
+    EXPECT_THAT(outcome.err, HasSubstr("would be lost")) << words;
+    EXPECT_EQ(content_of(path), before) << words;
+  };
+  expect_spared("run " + set + " --record " + (dir_ / "." / "take.mkv").string(), take);
+  expect_spared("run " + set + " --json " + set, set);
+  expect_spared("still " + set + " -o " + set, set);
+  write_made_set(dir_, "file:take/frame.%06d.exr");
+  expect_spared("run " + set + " --exr " + frames, frames + "/frame.000000.exr");
+}
+
+TEST_F(Runs, StopWhenTheyAreNoLongerRecorded) {
+  write_set();  // its plate
+  const std::string set = write_made_set(dir_, "file:plate_0.png");
+  const fs::path full = dir_ / "full.mkv";
+  fs::create_symlink("/dev/full", full);
+  const std::string json_path = (dir_ / "run.json").string();
+  const Outcome outcome =
+      run("run " + set + " --frames 1000000 --record " + full.string() + " --json " + json_path);
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("No space left on device"));
+  EXPECT_LT(nlohmann::json::parse(content_of(json_path))["frames"], 1000000);
+}
+
 TEST_F(Runs, RefuseAPairThatIsNone) {
   const std::string set = write_set();
   const std::string fill = (dir_ / "fill.mkv").string(), key = (dir_ / "key.mov").string();
@@ -381,6 +433,30 @@ std::string write_shots(const std::filesystem::path& directory,
     paths += path.string() + " ";
   }
   return paths;
+}
+
+TEST_F(CommandLine, MergesShotsOfStatedExposures) {
+  const capture::MadeSensor sensor{
+      .full_well_e = 40'000, .read_noise_e = 4, .bits = 8, .transfer = capture::Transfer::srgb};
+  const std::string shots = write_shots(dir_, sensor, {0.02, 0.1, 0.5});
+  const std::string out = (dir_ / "light.exr").string();
+  const std::string json = (dir_ / "light.json").string();
+  const std::string command =
+      "hdr " + shots + "-o " + out + " --response sRGB --json " + json + " --exposures ";
+  const Outcome outcome = run(command + "1/50,0.1,1/2");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto figures = nlohmann::json::parse(content_of(json));
+  EXPECT_EQ(figures["exposures_s"].get<std::vector<double>>(),
+            (std::vector<double>{1.0 / 50, 0.1, 0.5}));
+  EXPECT_NEAR(capture::read_exr(out).at(8, 8, 0), 1.05, 0.05) << "light of the brightest patch";
+
+  const Outcome fewer = run(command + "1/50,0.1");
+  EXPECT_EQ(fewer.status, 2);
+  EXPECT_THAT(fewer.err, HasSubstr("2 times for 3 shots"));
+  expect_one_line(fewer.err);
+  for (const char* wrong : {"soon,1,2", "0,1,2", "1/0,1,2", "1,,2"}) {
+    EXPECT_EQ(run(command + wrong).status, 2) << wrong;
+  }
 }
 
 TEST_F(CommandLine, CalibratesALinearSensorFromItsShots) {
