@@ -83,19 +83,19 @@ void report_progress(const ShowStatus& status,
   console.progress(share, text);
 }
 
-// Tells what goes wrong, each thing once and as soon as the show tells it; where that is very much,
-// the rest at the end.
+// Tells what goes wrong, each thing once and as soon as the show tells it; where notes are very
+// many, the rest of them at the end.
 class Warnings {
  public:
   explicit Warnings(Console& console) : console_(console) {}
 
   void tell(const ShowStatus& status) {
     constexpr std::size_t most = 20;
-    if (told_.size() < most) tell_all(status);
-  }
-  void tell_all(const ShowStatus& status) {
-    for (const std::string& note : status.notes) tell(note);
     if (!status.recorder.error.empty()) tell(status.recorder.error);
+    if (told_.size() < most) tell_notes(status);
+  }
+  void tell_notes(const ShowStatus& status) {
+    for (const std::string& note : status.notes) tell(note);
   }
 
  private:
@@ -195,7 +195,7 @@ void run(const RunOptions& options, Console& console) {
   watch.reset();
 
   const ShowStatus status = *show.status();
-  warnings.tell_all(status);
+  warnings.tell_notes(status);
   report_end(status, set, console);
   if (!options.view_png.empty() && last.view_rgb8) {
     capture::write_png(options.view_png, set.show.width, set.show.height, 3, *last.view_rgb8);

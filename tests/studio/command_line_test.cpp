@@ -278,7 +278,7 @@ TEST_F(Runs, EndOnASignalWithTheirTakeWhole) {
   for (const char* signal : {"INT", "TERM"}) {
     const Outcome outcome =
         run("run " + set + " --frames 1000000 --record " + take + " --json " + json_path,
-            "timeout --preserve-status -s " + std::string(signal) + " 2");
+            "timeout --preserve-status -s " + std::string(signal) + " 4");
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const auto json = nlohmann::json::parse(content_of(json_path));
     EXPECT_GT(json["frames"], 0);
