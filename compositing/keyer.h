@@ -43,6 +43,7 @@ struct KeySettings {
   bool follows_light = true;  // the plate's gain is measured in each frame
   float smoothing = 1;        // of alpha over frames, in units of the noise; 0 = none
   KeyEffort effort = KeyEffort::full;
+  friend bool operator==(const KeySettings&, const KeySettings&) = default;
 };
 
 // Where the key holds. Each is (height, width) of 0..255, or empty.

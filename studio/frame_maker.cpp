@@ -340,15 +340,22 @@ void FrameMaker::change_video(const std::string& name, const std::string& uri) {
   if (video != set_.videos.end()) video->source = uri;
 }
 
-FrameMaker::Change FrameMaker::prepare(Set set, std::uint64_t scene_version, bool live) {
+FrameMaker::Change FrameMaker::prepare(Set set, std::uint64_t scene_version) const {
+  const bool live = plate_->is_live();
   Change change;
-  change.persons = std::make_unique<PersonFeed>(set, std::nullopt, live);
-  change.light = std::make_unique<LightFeed>(set);
+  change.persons = std::make_unique<PersonFeed>(set, std::nullopt, live, persons_.get());
+  change.videos = std::make_unique<VideoFeed>(set, std::nullopt, live, videos_.get());
+  if (!light_->serves(set)) change.light = std::make_unique<LightFeed>(set, light_.get());
   change.track = track_of(set);
   change.directions = directions_of(set);
   change.lens = std::make_shared<calibrate::Lens>(lens_of(set));
   change.set_scene = describe_scene(set);
   change.scene = compile(set, *change.persons, change.set_scene, scene_version);
+  try {
+    change.videos->place(set, change.set_scene);
+  } catch (const std::invalid_argument& error) {
+    fail(set, {}, error.what());
+  }
   change.set = std::move(set);
   return change;
 }
@@ -365,25 +372,19 @@ void FrameMaker::check_change(const Set& set) const {
 }
 
 void FrameMaker::take_over(Change change) {
-  // All that may fail comes before anything is taken over.
-  auto videos =
-      std::make_unique<VideoFeed>(change.set, std::nullopt, plate_->is_live(), videos_.get());
-  try {
-    videos->place(change.set, change.set_scene);
-  } catch (const std::invalid_argument& error) {
-    fail(change.set, {}, error.what());
-  }
-  // Begun where the show is: before the first shape is shown.
+  // All that may fail comes before anything is taken over. Begun where the show is: before the
+  // first shape is shown.
   auto shapes = std::make_unique<ShapeFeed>(change.set, change.set_scene, rate_, std::nullopt,
                                             live_, shapes_.get());
   shapes_.swap(shapes);
   set_ = std::move(change.set);
-  videos_ = std::move(videos);
+  videos_ = std::move(change.videos);
+  change.persons->take_over();
   persons_ = std::move(change.persons);
   set_scene_ = std::move(change.set_scene);
   scene_ = std::move(change.scene);
   lamps_ = describe_lamps(set_);
-  light_ = std::move(change.light);
+  if (change.light) light_ = std::move(change.light);
   track_ = std::move(change.track);
   directions_ = std::move(change.directions);
   lens_ = std::move(change.lens);
@@ -406,14 +407,14 @@ void FrameMaker::let_go(std::unique_ptr<ShapeFeed> shapes) {
 void FrameMaker::change_set(Set set) {
   check_change(set);
   finish_change();
-  take_over(prepare(std::move(set), ++scene_version_, plate_->is_live()));
+  take_over(prepare(std::move(set), ++scene_version_));
 }
 
 void FrameMaker::change_set_beside(Set set) {
   check_change(set);
   finish_change();
   change_ =
-      std::async(std::launch::async, prepare, std::move(set), ++scene_version_, plate_->is_live());
+      std::async(std::launch::async, &FrameMaker::prepare, this, std::move(set), ++scene_version_);
 }
 
 // Waits for the change that is on its way.

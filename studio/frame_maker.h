@@ -121,13 +121,15 @@ class FrameMaker {
     Set set;
     SetScene set_scene;
     std::shared_ptr<render::Scene> scene;
-    std::unique_ptr<LightFeed> light;
+    std::unique_ptr<LightFeed> light;  // null = that of the set before
     std::unique_ptr<PersonFeed> persons;
+    std::unique_ptr<VideoFeed> videos;
     std::optional<calibrate::Track> track;
     std::shared_ptr<const calibrate::DirectionTable> directions;
     std::shared_ptr<const calibrate::Lens> lens;
   };
-  static Change prepare(Set set, std::uint64_t scene_version, bool live);
+  // Beside the frames: of what they use it only reads what does not change.
+  Change prepare(Set set, std::uint64_t scene_version) const;
   bool deform_objects(capture::Time time, PreparedFrame& frame);
   render::Scene::Pictures stand_persons(capture::Time time, PreparedFrame& frame);
   void renew_scene(render::Scene::Pictures pictures);

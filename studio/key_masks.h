@@ -13,6 +13,7 @@ struct KeyMaskFiles {
   std::string core;     // white is always the person
 
   bool empty() const { return garbage.empty() && core.empty(); }
+  friend bool operator==(const KeyMaskFiles&, const KeyMaskFiles&) = default;
 };
 
 // For videos of that size. Throws std::runtime_error if a file cannot be read,

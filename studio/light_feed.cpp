@@ -59,29 +59,43 @@ std::optional<calibrate::Vec3f> floor_of_plate(const capture::Image* plate,
   return calibrate::to_float({sum[0] / pixels, sum[1] / pixels, sum[2] / pixels});
 }
 
+// The probe that `before` has open, or the set's own.
+std::shared_ptr<ProbeSource> open_probe(const Set& set,
+                                        const std::shared_ptr<ProbeSource>& before) {
+  if (before && before->serves(set)) return before;
+  try {
+    return std::make_shared<ProbeSource>(set);
+  } catch (const SetError& error) {
+    if (!before || !before->holds_camera_of(set)) throw;
+    fail(set,
+         fmt::format("{}. It is on air: what is asked of the probe's camera changes only where "
+                     "it can be opened twice; else start anew",
+                     error.diagnostics().front().message));
+  }
+}
+
 }  // namespace
 
-LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
+LightFeed::LightFeed(const Set& set, const LightFeed* before) : settings_(set.probe) {
   if (!settings_) {
     environment_ = darkness();
     return;
   }
-  source_ = std::make_unique<ProbeSource>(set);
-  const capture::Image& first = *source_->at(capture::Time::min() / 2).image;
+  source_ = open_probe(set, before ? before->source_ : nullptr);
   if (settings_->match.method == MatchSettings::Method::given) {
     match_ = given_match(1);
     exposure_ = ExposureFollower(settings_->match.exposure_s);
   }
   if (!settings_->lens) {
-    if (first.width != 2 * first.height) {
+    if (source_->width() != 2 * source_->height()) {
       fail(set, "a latitude-longitude map must be twice as wide as high");
     }
     return;
   }
   const calibrate::Lens& lens = *settings_->lens;
-  if (first.width != lens.width || first.height != lens.height) {
-    fail(set, "the probe's picture is " + std::to_string(first.width) + "x" +
-                  std::to_string(first.height) + ", but its lens is for " +
+  if (source_->width() != lens.width || source_->height() != lens.height) {
+    fail(set, "the probe's picture is " + std::to_string(source_->width()) + "x" +
+                  std::to_string(source_->height()) + ", but its lens is for " +
                   std::to_string(lens.width) + "x" + std::to_string(lens.height));
   }
   render::ProbeSettings mapping;
@@ -93,6 +107,14 @@ LightFeed::LightFeed(const Set& set) : settings_(set.probe) {
   } catch (const std::invalid_argument& error) {
     fail(set, error.what());
   }
+}
+
+bool LightFeed::serves(const Set& set) const {
+  if (!settings_ || !set.probe) return !settings_ && !set.probe;
+  if (!source_->serves(set)) return false;
+  ProbeSettings asked = *set.probe;
+  asked.source_place = settings_->source_place;
+  return asked == *settings_;
 }
 
 // What light is measured by. The picture itself keeps its vignetting.

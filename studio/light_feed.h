@@ -44,8 +44,12 @@ struct LightRequest {
 // One thread uses it. Memory across frames (the followed light, the match) lives here.
 class LightFeed {
  public:
-  // Opens the probe of a set; a set without one is lit by nothing. Throws SetError.
-  explicit LightFeed(const Set& set);
+  // Opens the probe of a set; a set without one is lit by nothing. A camera that `before` has open
+  // runs on: `before` may do so until the first at(), and is of no more use then. Throws SetError.
+  explicit LightFeed(const Set& set, const LightFeed* before = nullptr);
+
+  // Whether another set is lit by the same camera in the same way, so that this one may go on.
+  bool serves(const Set& set) const;
 
   Light at(const LightRequest& request);
 
@@ -61,7 +65,7 @@ class LightFeed {
   std::optional<ProbeSettings> settings_;
   capture::Image evened_;                  // the present plate without its lens's vignetting
   const capture::Image* plate_ = nullptr;  // as a lens without vignetting would take it
-  std::unique_ptr<ProbeSource> source_;
+  std::shared_ptr<ProbeSource> source_;
   std::unique_ptr<render::ProbeMapper> mapper_;  // null = latitude-longitude
   render::LightFollower follower_;
   std::shared_ptr<const capture::Image> radiance_;  // that the environment was made from

@@ -74,6 +74,21 @@ compositing::Window window_about(const std::array<float, 4>& outline,
   return any ? window : compositing::Window();
 }
 
+VideoSource video_of(const PersonCamera& s, const std::string& base_dir) {
+  return {s.source, base_dir, s.loop, s.first, s.colour};
+}
+
+FileTimes times_of(const std::optional<KeyChoice>& key) {
+  return key ? file_times({key->plate, key->masks.garbage, key->masks.core}) : FileTimes{};
+}
+
+// But for where in their files they are written.
+bool same(PersonCamera a, PersonCamera b) {
+  a.place = b.place;
+  if (a.key && b.key) a.key->place = b.key->place;
+  return a == b;
+}
+
 }  // namespace
 
 std::shared_ptr<const render::LivePicture> clear_picture() {
@@ -83,12 +98,17 @@ std::shared_ptr<const render::LivePicture> clear_picture() {
 
 PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
                                    const Options& options,
-                                   Faults& faults)
-    : settings_(settings), bounded_(options.bounded), picture_(clear_picture()) {
+                                   Faults& faults,
+                                   const PersonCameraFeed* before)
+    : settings_(settings),
+      options_(options),
+      times_(times_of(settings.key)),
+      picture_(clear_picture()) {
   const PersonCamera& s = settings_;
-  const VideoSource source{s.source, options.base_dir, s.loop, s.first, s.colour};
+  const VideoSource source = video_of(s, options.base_dir);
   try {
-    source_ = std::make_unique<TimedSource>(source, options.start, options.live);
+    source_ = before ? before->source_
+                     : std::make_shared<TimedSource>(source, options.start, options.live);
     const capture::CameraInfo& info = source_->info();
     if (s.lens && (s.lens->width != info.width || s.lens->height != info.height)) {
       throw std::invalid_argument(
@@ -118,11 +138,20 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
   }
 }
 
+bool PersonCameraFeed::serves(const PersonCamera& settings, const Options& options) const {
+  Options asked = options;
+  asked.start = options_.start;
+  return asked == options_ && same(settings, settings_) && times_of(settings.key) == times_;
+}
+
+bool PersonCameraFeed::has_source_of(const PersonCamera& settings) const {
+  return video_of(settings, options_.base_dir) == video_of(settings_, options_.base_dir);
+}
+
 void PersonCameraFeed::advance(capture::Time time) {
   const std::optional<capture::Frame> frame = source_->at(time);
-  const capture::Frame& newest = frame ? *frame : source_->first();
-  const bool newer = frame ? frame->image != image_ : image_ == nullptr;
-  if (!newer || !newest.image) return;
+  const capture::Frame& newest = frame && frame->image ? *frame : source_->newest();
+  if (newest.image == image_ || !newest.image) return;
   skipped_ = image_ != shown_;
   image_ = newest.image;
   time_ = newest.time;
@@ -141,7 +170,7 @@ void PersonCameraFeed::key_frame() {
   if (!keyer_) {
     texture->take(image);
     if (image.channels == 4) return show_keyed(texture);
-    picture_ = std::make_shared<compositing::KeyedPicture>(texture, bounded_);
+    picture_ = std::make_shared<compositing::KeyedPicture>(texture, options_.bounded);
     return;
   }
   if (std::exchange(skipped_, false)) keyer_->restart();
@@ -164,8 +193,8 @@ void PersonCameraFeed::key_frame() {
 void PersonCameraFeed::show_keyed(std::shared_ptr<const compositing::KeyedTexture> texture) {
   look_for_person(texture->frame());
   window_ = settings_.lens ? compositing::Window() : window_about(outline(), whole());
-  picture_ = see_through(window_,
-                         std::make_shared<compositing::KeyedPicture>(std::move(texture), bounded_));
+  picture_ = see_through(
+      window_, std::make_shared<compositing::KeyedPicture>(std::move(texture), options_.bounded));
 }
 
 void PersonCameraFeed::look_for_person(const compositing::KeyedFrame& keyed) {
@@ -175,7 +204,7 @@ void PersonCameraFeed::look_for_person(const compositing::KeyedFrame& keyed) {
   if (settings_.lens) {
     has_matte_ = true;
     feet_ = enlarged(compositing::find_feet(matte), shrink);
-    if (!bounded_) return;
+    if (!options_.bounded) return;
   }
   outline_ = compositing::outline_box(matte);
   if (outline_) enlarge(*outline_, shrink);

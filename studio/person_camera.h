@@ -14,6 +14,7 @@
 #include "compositing/keyer.h"
 #include "compositing/picture_window.h"
 #include "render/live_picture.h"
+#include "studio/file_times.h"
 #include "studio/set.h"
 #include "studio/timed_source.h"
 
@@ -31,9 +32,20 @@ class PersonCameraFeed {
     bool live = false;
     bool needs_matte = false;  // keyed by whole frames whatever the settings
     bool bounded = false;      // pictures say where they are empty: for hulls
+    friend bool operator==(const Options&, const Options&) = default;
   };
-  // Opens the source, reads plate and masks. Adds faults at their places; is of no use then.
-  PersonCameraFeed(const PersonCamera& settings, const Options& options, Faults& faults);
+  // Opens the source, or goes on with that of `before`, which is then of no more use; reads plate
+  // and masks. Adds faults at their places; is of no use then. May be made while `before` runs.
+  PersonCameraFeed(const PersonCamera& settings,
+                   const Options& options,
+                   Faults& faults,
+                   const PersonCameraFeed* before = nullptr);
+
+  // Whether another one would show just the same, so that this one may go on in its place: its
+  // plate and masks are those that are on disk, too. `start` does not count.
+  bool serves(const PersonCamera& settings, const Options& options) const;
+  // Whether another one could go on with this one's source.
+  bool has_source_of(const PersonCamera& settings) const;
 
   const PersonCamera& settings() const { return settings_; }
   float aspect() const { return aspect_; }  // of its picture: width over height
@@ -74,8 +86,10 @@ class PersonCameraFeed {
   std::array<float, 4> whole() const;
 
   PersonCamera settings_;
-  bool by_texel_ = false, bounded_ = false;
-  std::unique_ptr<TimedSource> source_;
+  Options options_;
+  FileTimes times_;  // of plate and masks, when they were read
+  bool by_texel_ = false;
+  std::shared_ptr<TimedSource> source_;
   std::optional<compositing::Keyer> keyer_;
   float aspect_ = 1;
   capture::Time period_{}, time_{};

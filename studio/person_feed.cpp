@@ -46,6 +46,12 @@ std::string words_for(const compositing::ShapeChoice& choice) {
   return choice.hull ? "the hull" : fmt::format("the billboard of camera {}", choice.camera + 1);
 }
 
+// Whether feet that are followed for one are those of the other.
+bool stands_alike(const PersonSettings& a, const PersonSettings& b) {
+  return a.by_feet == b.by_feet && a.floor_z == b.floor_z && a.may_be_hull() == b.may_be_hull() &&
+         a.first().lens == b.first().lens && a.first().cam_from_set == b.first().cam_from_set;
+}
+
 }  // namespace
 
 struct PersonFeed::Person {
@@ -84,18 +90,98 @@ struct PersonFeed::Person {
   }
 };
 
-PersonFeed::PersonFeed(const Set& set, std::optional<capture::Time> start, bool live) {
+// What of an earlier feed another one goes on with: each person and each source once.
+class PersonFeed::Claims {
+ public:
+  struct Source {
+    const PersonCameraFeed* feed = nullptr;  // null = there is none
+    std::shared_ptr<Person> person;
+  };
+
+  explicit Claims(std::vector<std::shared_ptr<Person>> persons) : persons_(std::move(persons)) {}
+
+  // A person who is filmed just so, of that name rather than another one.
+  std::shared_ptr<Person> same_person(const PersonSettings& s, const auto& options_of) {
+    const auto is_same = [&](const std::shared_ptr<Person>& person) {
+      if (!stands_alike(person->settings, s)) return false;
+      if (person->cameras.size() != s.cameras.size()) return false;
+      for (std::size_t k = 0; k < s.cameras.size(); ++k) {
+        const PersonCameraFeed& feed = person->cameras[k].feed;
+        const bool there = person->settings.cameras[k].cam_from_set == s.cameras[k].cam_from_set;
+        if (!there || is_claimed(feed) || !feed.serves(s.cameras[k], options_of(s, k)))
+          return false;
+      }
+      return true;
+    };
+    const auto found = first_of(s.name, is_same);
+    if (found == nullptr) return nullptr;
+    for (const Person::Camera& camera : found->cameras) claimed_.push_back(&camera.feed);
+    return found;
+  }
+
+  Source source(const PersonCamera& camera) {
+    for (const std::shared_ptr<Person>& person : persons_) {
+      for (const Person::Camera& one : person->cameras) {
+        if (is_claimed(one.feed) || !one.feed.has_source_of(camera)) continue;
+        claimed_.push_back(&one.feed);
+        return {&one.feed, person};
+      }
+    }
+    return {};
+  }
+
+ private:
+  bool is_claimed(const PersonCameraFeed& feed) const {
+    return std::ranges::find(claimed_, &feed) != claimed_.end();
+  }
+  std::shared_ptr<Person> first_of(const std::string& name, const auto& is_wanted) const {
+    std::shared_ptr<Person> found;
+    for (const std::shared_ptr<Person>& person : persons_) {
+      if (!is_wanted(person)) continue;
+      if (person->settings.name == name) return person;
+      if (!found) found = person;
+    }
+    return found;
+  }
+
+  std::vector<std::shared_ptr<Person>> persons_;
+  std::vector<const PersonCameraFeed*> claimed_;
+};
+
+std::string PersonFeed::name_of(const PersonSettings& settings, std::size_t index) {
+  return settings.name.empty() ? fmt::format("person {}", index + 1) : settings.name;
+}
+
+PersonFeed::PersonFeed(const Set& set,
+                       std::optional<capture::Time> start,
+                       bool live,
+                       const PersonFeed* before)
+    : persons_(set.persons.size()), coming_(set.persons.size()) {
   Faults faults(set.path);
   const std::string base_dir = std::filesystem::absolute(set.path).parent_path().string();
-  for (std::size_t i = 0; i < set.persons.size(); ++i) {
-    auto person = std::make_shared<Person>();
+  const auto options_of = [&](const PersonSettings& s, std::size_t camera) {
+    const bool tells_feet = camera == 0 && s.by_feet;
+    return PersonCameraFeed::Options{base_dir, start, live, tells_feet || s.may_be_hull(),
+                                     s.may_be_hull()};
+  };
+  Claims claims(before ? before->persons_ : std::vector<std::shared_ptr<Person>>());
+  for (std::size_t i = 0; i < persons_.size(); ++i) {
+    const PersonSettings& s = set.persons[i];
+    persons_[i] = claims.same_person(s, options_of);
+    if (persons_[i]) coming_[i] = Coming{s, nullptr};
+  }
+  for (std::size_t i = 0; i < persons_.size(); ++i) {
+    if (persons_[i]) continue;
+    auto person = persons_[i] = std::make_shared<Person>();
     const PersonSettings& s = person->settings = set.persons[i];
-    person->frame.status.name = s.name.empty() ? fmt::format("person {}", i + 1) : s.name;
+    person->frame.status.name = name_of(s, i);
     for (std::size_t k = 0; k < s.cameras.size(); ++k) {
-      const bool tells_feet = k == 0 && s.by_feet;
-      person->cameras.push_back({PersonCameraFeed(
-          s.cameras[k], {base_dir, start, live, tells_feet || s.may_be_hull(), s.may_be_hull()},
-          faults)});
+      const Claims::Source source = claims.source(s.cameras[k]);
+      person->cameras.push_back(
+          {PersonCameraFeed(s.cameras[k], options_of(s, k), faults, source.feed)});
+      if (k == 0 && source.person && stands_alike(source.person->settings, s)) {
+        coming_[i] = Coming{s, source.person};
+      }
     }
     try {
       if (s.by_feet) person->tracker.emplace(*s.first().lens, s.first().cam_from_set, s.floor_z);
@@ -107,9 +193,24 @@ PersonFeed::PersonFeed(const Set& set, std::optional<capture::Time> start, bool 
     constexpr std::array<float, 12> identity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     person->frame.places.assign(billboards + hulls, identity);
     person->hidden.assign(billboards + hulls, false);
-    persons_.push_back(std::move(person));
   }
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+}
+
+void PersonFeed::take_over() {
+  for (std::size_t i = 0; i < persons_.size(); ++i) {
+    if (!coming_[i]) continue;
+    Person& person = *persons_[i];
+    if (const Person* before = coming_[i]->person.get()) {
+      person.tracker = before->tracker;
+      person.standing = before->standing;
+      person.unplaced = before->unplaced;
+      person.frame.status.feet = before->frame.status.feet;
+    }
+    person.settings = std::move(coming_[i]->settings);
+    person.frame.status.name = name_of(person.settings, i);
+    coming_[i].reset();
+  }
 }
 
 std::vector<std::shared_ptr<const render::LivePicture>> PersonFeed::nothing_yet() const {

@@ -47,8 +47,15 @@ struct PersonFrame {
 class PersonFeed {
  public:
   // Opens the sources, reads plates and masks. Files begin at `start` of the show's time, or at the
-  // next time that is asked for; `live` as of TimedSource. Throws SetError with all faults.
-  PersonFeed(const Set& set, std::optional<capture::Time> start, bool live);
+  // next time that is asked for; `live` as of TimedSource. Throws SetError with all faults. What
+  // `before` has open runs on, and persons whose cameras are the same stay as they are; it may run
+  // until take_over().
+  PersonFeed(const Set& set,
+             std::optional<capture::Time> start,
+             bool live,
+             const PersonFeed* before = nullptr);
+  // In the place of `before`, which is of no use from here on. Comes before at().
+  void take_over();
 
   bool empty() const { return persons_.empty(); }
   // What a scene shows before its first frame.
@@ -62,7 +69,14 @@ class PersonFeed {
 
  private:
   struct Person;
+  class Claims;
+  // Of a person who is there already: what is new at take_over().
+  struct Coming {
+    PersonSettings settings;
+    std::shared_ptr<Person> person;  // whose feet are followed on; null = it is the same person
+  };
 
+  static std::string name_of(const PersonSettings& settings, std::size_t index);
   // Persons have nothing in common: each of these may run beside those of others.
   void show_at(Person& person, capture::Time time, calibrate::Vec3 viewer);
   void update(Person& person, capture::Time time);
@@ -75,6 +89,7 @@ class PersonFeed {
   void place_billboard(Person& person, calibrate::Vec3 viewer);
 
   std::vector<std::shared_ptr<Person>> persons_;
+  std::vector<std::optional<Coming>> coming_;  // of each person; nothing = it is new
   std::vector<std::string> notes_;
 };
 

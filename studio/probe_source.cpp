@@ -100,7 +100,32 @@ Bracketed bracket(std::unique_ptr<capture::Camera> camera,
 
 }  // namespace
 
-ProbeSource::ProbeSource(const Set& set) {
+ProbeSource::ProbeSource(const Set& set)
+    : settings_(*set.probe), loop_(set.camera.loop), times_(file_times({settings_.response})) {
+  open(set);
+  height_ = newest_.image->height;
+  width_ = newest_.image->width;
+}
+
+bool ProbeSource::serves(const Set& set) const {
+  if (!camera_ || !set.probe || set.camera.loop != loop_) return false;
+  // All but what the light is made of: that concerns the camera.
+  ProbeSettings asked = *set.probe;
+  asked.source_place = settings_.source_place;
+  asked.probe_from_set = settings_.probe_from_set;
+  asked.yaw_rad = settings_.yaw_rad;
+  asked.unseen = settings_.unseen;
+  asked.match = settings_.match;
+  asked.albedo_patch = settings_.albedo_patch;
+  asked.vignetting = settings_.vignetting;
+  return asked == settings_ && file_times({asked.response}) == times_;
+}
+
+bool ProbeSource::holds_camera_of(const Set& set) const {
+  return camera_ && camera_->is_live() && set.probe && set.probe->source == settings_.source;
+}
+
+void ProbeSource::open(const Set& set) {
   const ProbeSettings& probe = *set.probe;
   exposures_s_ = probe.exposures_s;
   offset_ =

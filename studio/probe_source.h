@@ -11,6 +11,7 @@
 #include "capture/flicker.h"
 #include "capture/image.h"
 #include "capture/live_merge.h"
+#include "studio/file_times.h"
 #include "studio/rolling_bracket.h"
 #include "studio/set.h"
 #include "studio/source.h"
@@ -42,6 +43,15 @@ class ProbeSource {
   // Opens or merges what the set names. Throws SetError.
   explicit ProbeSource(const Set& set);
 
+  // Whether it may go on for another set: it is a camera, and that set has the same one, asked in
+  // the same way. The set's light may differ.
+  bool serves(const Set& set) const;
+  // Whether it is a live camera that another set's probe wants as well, which may be denied.
+  bool holds_camera_of(const Set& set) const;
+  // Of the radiance, pixels.
+  int height() const { return height_; }
+  int width() const { return width_; }
+
   struct Radiance {
     std::shared_ptr<const capture::Image> image;  // (height, width, 3)
     capture::Time time{};                         // of the newest shot in it
@@ -54,6 +64,7 @@ class ProbeSource {
   const ProbeStatus& status() const { return status_; }
 
  private:
+  void open(const Set& set);
   void open_camera(const Set& set, const ProbeSettings& probe);
   void prime();
   void prime_live(std::size_t cycle);
@@ -64,6 +75,10 @@ class ProbeSource {
   void merge(capture::Time time);
   double exposure_s_of(const capture::Frame& frame) const;
 
+  ProbeSettings settings_;
+  bool loop_ = false;
+  FileTimes times_;  // of the response, when it was read
+  int height_ = 0, width_ = 0;
   std::vector<double> exposures_s_;
   capture::Time offset_{};                // its clock less the show's
   capture::WindowMergeSettings merging_;  // with the camera's noise, if calibration has told it

@@ -76,6 +76,7 @@ struct MatchSettings {
   std::array<int, 4> patch{};        // of `patch`: x, y, width, height in the show's picture
   std::array<float, 3> albedo{};     // of `patch`: what it is painted
   calibrate::Vec3 normal{0, 0, 1};   // of `patch`: where it faces in the set
+  friend bool operator==(const MatchSettings&, const MatchSettings&) = default;
 };
 
 struct ProbeSettings {
@@ -98,6 +99,7 @@ struct ProbeSettings {
   std::string response;            // .rsp file of the shots; "" = recovered where needed
   capture::Transfer colour = capture::Transfer::linear;
   double offset_s = 0;  // how much later than the plate its frames are stamped
+  friend bool operator==(const ProbeSettings&, const ProbeSettings&) = default;
 };
 
 // Where an object stands: scaled, tilted about its own x, turned about z, moved.
@@ -186,6 +188,7 @@ struct KeyChoice {
   bool by_texel = false;  // filtered, then keyed where rays see it; else whole frames are keyed
   compositing::KeySettings settings;
   Place place;
+  friend bool operator==(const KeyChoice&, const KeyChoice&) = default;
 };
 
 // A camera that films a person.
@@ -198,6 +201,7 @@ struct PersonCamera {
   std::optional<KeyChoice> key;         // nothing = the source has alpha, or shows all
   std::optional<calibrate::Lens> lens;  // with its pose; further cameras always have both
   calibrate::Pose cam_from_set;
+  friend bool operator==(const PersonCamera&, const PersonCamera&) = default;
 };
 
 // A person in a video, who stands in the set.

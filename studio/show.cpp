@@ -155,7 +155,7 @@ class Show::Stages {
     const Clock::time_point start = Clock::now();
     std::int64_t made = 0;
     std::int64_t dropped = 0;
-    for (std::int64_t number = 0; !frames_ || made < *frames_; ++number, ++made) {
+    for (std::int64_t number = options_.first; !frames_ || made < *frames_; ++number, ++made) {
       Work work;
       if (!apply_commands(work)) return;
       const FrameMaker::Due due = next_due(number, start + paused_for_);
@@ -188,7 +188,11 @@ class Show::Stages {
   // The frame that is to be made in the place of `number`: in a live show a later one where that
   // is late. Waits for its time, or for the picture of a live plate.
   FrameMaker::Due next_due(std::int64_t number, Clock::time_point start) {
-    if (maker_.plate().is_live()) return maker_.wait_for_plate();
+    if (maker_.plate().is_live()) {
+      FrameMaker::Due due = maker_.wait_for_plate();
+      while (due.frame < options_.first) due = maker_.wait_for_plate();
+      return due;
+    }
     if (options_.live) number = wait_until_due(number, start);
     return {number, maker_.time_of(number)};
   }
@@ -197,7 +201,7 @@ class Show::Stages {
   // one that is to be made.
   std::int64_t wait_until_due(std::int64_t number, Clock::time_point start) const {
     const auto due = [&](std::int64_t n) {
-      return start + capture::time_of_frame(n, maker_.rate());
+      return start + capture::time_of_frame(n - options_.first, maker_.rate());
     };
     while (Clock::now() >= due(number + 1)) ++number;
     std::this_thread::sleep_until(due(number));

@@ -109,6 +109,7 @@ struct ShowOptions {
   // Paced by the clock, or by a live plate, late frames left out; else every frame is made. A live
   // plate makes the show so.
   bool live = false;
+  std::int64_t first = 0;                 // begins with this frame; those before are passed over
   std::optional<std::int64_t> frames;     // show at most so many; nothing = as the set says
   std::optional<capture::Rational> rate;  // in place of the set's
   bool record = true;                     // as the set says, from the first frame on

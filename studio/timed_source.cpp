@@ -42,9 +42,9 @@ std::optional<capture::Frame> TimedSource::at(capture::Time time) {
   const bool holds = !frame || stalls || lost;
   if (holds && !holds_) note_ = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
   holds_ = holds;
-  if (frame && !lost) pictured_ = frame->time;
+  if (frame && !lost) pictured_ = frame;
   age_ = source_.is_still() || !pictured_ ? capture::Time{}
-                                          : std::max(asked - *pictured_, capture::Time{});
+                                          : std::max(asked - pictured_->time, capture::Time{});
   return frame;
 }
 

@@ -17,6 +17,7 @@ struct VideoSource {
   bool loop = false;
   std::int64_t first = 0;  // frame that it begins with
   capture::Transfer colour = capture::Transfer::rec1886;
+  friend bool operator==(const VideoSource&, const VideoSource&) = default;
 };
 
 // Opens it. Throws as capture::open_camera.
@@ -33,6 +34,8 @@ class TimedSource {
   // The newest frame whose time is not after the show's. Times must not fall. Nothing where the
   // last one holds, because there is no newer one.
   std::optional<capture::Frame> at(capture::Time time);
+  // The newest one with a picture that at() gave; before that, the source's first.
+  const capture::Frame& newest() const { return pictured_ ? *pictured_ : source_.first(); }
   const capture::Frame& first() const { return source_.first(); }
   // How old its newest picture was at the time that was asked for last; 0 for stills, and before a
   // file begins.
@@ -46,7 +49,7 @@ class TimedSource {
   Source source_;
   std::optional<capture::Time> start_;
   bool live_;
-  std::optional<capture::Time> pictured_;  // of the newest frame that was not lost
+  std::optional<capture::Frame> pictured_;  // the newest that was not lost
   capture::Time age_{};
   bool holds_ = false;  // its last frame, for it stalls or has ended
   std::optional<std::string> note_;

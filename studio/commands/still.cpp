@@ -25,9 +25,9 @@ struct StillOptions {
 
 void still(const StillOptions& options, Console& console) {
   Set set = read_set(options.set);
-  if (options.frame) set.camera.frame = set.camera.frame.value_or(0) + *options.frame;
   set.show.sharpen = false;  // there is time
   ShowOptions show_options;
+  show_options.first = options.frame.value_or(0);
   show_options.frames = 1;
   show_options.record = false;
   for (const std::string& written : {options.out, console.figures_file()}) {

@@ -255,6 +255,28 @@ TEST_F(ShowTest, NotesWhatACommandCannotDoAndGoesOn) {
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("size and rate")));
 }
 
+// All that moves is where it would have been: the plate, persons and videos.
+TEST_F(ShowTest, BeginsWithAnyFrame) {
+  const Set set = made_set("grey:20,25,0",
+                           "[[billboard]]\nsource = \"grey:20,50,0\"\nposition = [0, -2, 0]\n"
+                           "height = 1\n[[object]]\nname = \"set\"\nmade = \"tv\"\n"
+                           "[[video]]\nsource = \"grey:20,12,0\"\nobject = \"set/tv\"\n");
+  const auto pictures_of = [&](std::int64_t first, std::int64_t frames) {
+    ShowOptions options;
+    options.first = first;
+    options.frames = frames;
+    Show show(set, options);
+    Pictures pictures;
+    show.run([&](const ShownFrame& shown) { pictures.push_back(shown.result->rgba.pixels); });
+    return pictures;
+  };
+  const Pictures all = pictures_of(0, 8);
+  ASSERT_EQ(all.size(), 8U);
+  EXPECT_NE(all[6], all[7]);
+  EXPECT_EQ(pictures_of(7, 1), Pictures{all[7]});
+  EXPECT_EQ(pictures_of(20, 1), Pictures{}) << "it has ended by then";
+}
+
 TEST_F(ShowTest, TakesAChangedSetOver) {
   ShowOptions options;
   options.frames = 6;
