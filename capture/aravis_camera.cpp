@@ -122,6 +122,8 @@ void AravisCamera::open(const CameraOptions& options) {
   frames_.set_layout(stream_->layout(), crop_);
   info_.width = crop_.width;
   info_.height = crop_.height;
+  info_.whole_width = stream_->layout().width;
+  info_.whole_height = stream_->layout().height;
   info_.rate = stream_->rate();
   info_.live = true;
   exposures_ = stream_->exposure_range();

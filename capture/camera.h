@@ -17,7 +17,11 @@ namespace capture {
 struct CameraInfo {
   int width = 0;
   int height = 0;
-  Rational rate;            // 0/1 = unknown or not constant (stills)
+  int whole_width = 0;  // of the source's picture, before options.crop; 0 = there is none other
+  int whole_height = 0;
+  Rational pixel_aspect{1, 1};  // a pixel's width over its height, as it is to be shown
+  Rational rate;                // 0/1 = unknown or not constant (stills)
+  Time jitter{};                // by how much frames may come later than the rate says
   std::int64_t frames = 0;  // about, where only length and rate are told; 0 = unknown or endless
   std::string description;  // for people: codec, format, colour tags and how they were read
   int sound_channels = 0;   // 0 = silent

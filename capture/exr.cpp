@@ -99,6 +99,7 @@ Imf::Compression library_compression(ExrCompression compression) {
 
 Imf::Header make_header(int width, int height, const ExrOptions& options) {
   Imf::Header header(width, height);
+  header.pixelAspectRatio() = static_cast<float>(options.pixel_aspect.value());
   header.compression() = library_compression(options.compression);
   Imf::addChromaticities(header, Imf::Chromaticities());  // the library's defaults are Rec.709's
   if (options.timecode) {

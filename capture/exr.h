@@ -36,6 +36,7 @@ struct ExrOptions {
   ExrCompression compression = ExrCompression::none;
   std::optional<ExrTimecode> timecode{};
   std::optional<Rational> frames_per_second{};
+  Rational pixel_aspect{1, 1};  // a pixel's width over its height
 };
 
 // An image's channels under these names, in its order.

@@ -1,6 +1,7 @@
 // When frames are.
 #include "capture/frame.h"
 
+#include <cmath>
 #include <stdexcept>
 
 namespace capture {
@@ -32,6 +33,19 @@ std::int64_t frame_at(Time time, Rational rate) {
     n -= 1;
   }
   return static_cast<std::int64_t>(n);
+}
+
+std::optional<Rational> nominal_rate(double rate, double tolerance) {
+  constexpr double largest = 1e6;
+  if (!(rate > 0) || !(rate < largest)) {
+    return std::nullopt;
+  }
+  const Rational whole{std::llround(rate), 1}, ntsc{1000 * std::llround(rate * 1.001), 1001};
+  const auto off = [&](const Rational& named) {
+    return named.num > 0 ? std::abs(rate / named.value() - 1) : HUGE_VAL;
+  };
+  const Rational nearer = off(ntsc) < off(whole) ? ntsc : whole;
+  return off(nearer) <= tolerance ? std::optional(nearer) : std::nullopt;
 }
 
 }  // namespace capture

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "capture/image.h"
@@ -30,6 +31,10 @@ Time time_of_frame(std::int64_t n, Rational rate);
 // The last frame whose time is not after `time`, exactly as time_of_frame has it; below 0 before
 // frame 0. Exact for times of centuries at any broadcast rate.
 std::int64_t frame_at(Time time, Rational rate);
+
+// The rate that a measured one is meant to be: whole, or whole times 1000/1001, whichever is
+// nearer, if that is it to a relative `tolerance`.
+std::optional<Rational> nominal_rate(double rate, double tolerance);
 
 enum class FrameStatus {
   good,

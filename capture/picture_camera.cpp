@@ -88,7 +88,8 @@ class PictureCamera : public Camera {
                 std::vector<PictureEntry> entries,
                 Rational rate,
                 const CameraOptions& options,
-                const LightCurves& curves);
+                const LightCurves& curves,
+                Time jitter);
 
   const CameraInfo& info() const override { return info_; }
   std::optional<Frame> next() override;
@@ -121,7 +122,8 @@ PictureCamera::PictureCamera(const std::string& name,
                              std::vector<PictureEntry> entries,
                              Rational rate,
                              const CameraOptions& options,
-                             const LightCurves& curves)
+                             const LightCurves& curves,
+                             Time jitter)
     : entries_(std::move(entries)),
       reader_(curves),
       loop_(options.loop),
@@ -160,7 +162,10 @@ PictureCamera::PictureCamera(const std::string& name,
   }
   info_.width = crop_.width;
   info_.height = crop_.height;
+  info_.whole_width = source_width_;
+  info_.whole_height = source_height_;
   info_.rate = rate;
+  info_.jitter = jitter;
   info_.frames = loop_ ? 0 : static_cast<std::int64_t>(entries_.size());
   const Time step = entries_.size() > 1 ? entries_.back().time - entries_[entries_.size() - 2].time
                                         : time_of_frame(1, options.picture_rate);
@@ -232,11 +237,12 @@ std::unique_ptr<Camera> make_picture_camera(const std::string& name,
                                             std::vector<PictureEntry> entries,
                                             Rational rate,
                                             const CameraOptions& options,
-                                            const LightCurves& curves) {
+                                            const LightCurves& curves,
+                                            Time jitter) {
   if (entries.empty()) {
     throw std::invalid_argument("a camera without pictures");
   }
-  return std::make_unique<PictureCamera>(name, std::move(entries), rate, options, curves);
+  return std::make_unique<PictureCamera>(name, std::move(entries), rate, options, curves, jitter);
 }
 
 }  // namespace capture

@@ -28,11 +28,13 @@ double exposure_in(const std::string& path);
 
 // Shows `entries`, which are in order of time and at least one. Pictures that are missing, damaged
 // or of another size than the first readable one are lost frames.
-// Throws std::runtime_error if none can be read, or options.frame or options.crop lie outside.
+// `jitter` as of CameraInfo. Throws std::runtime_error if none can be read, or options.frame or
+// options.crop lie outside.
 std::unique_ptr<Camera> make_picture_camera(const std::string& name,
                                             std::vector<PictureEntry> entries,
                                             Rational rate,
                                             const CameraOptions& options,
-                                            const LightCurves& curves);
+                                            const LightCurves& curves,
+                                            Time jitter = {});
 
 }  // namespace capture

@@ -158,6 +158,43 @@ std::vector<PictureEntry> read_bracket(const std::filesystem::path& folder, Rati
   return entries;
 }
 
+// How fast recorded frames follow each other: most of their steps are one frame time, or several
+// where frames were left out, to a quarter of it. 0/1 where that is not so, or they are few.
+Rational rate_of(const std::vector<PictureEntry>& entries) {
+  constexpr std::size_t enough = 8;
+  constexpr double off = 0.25, most = 0.9, of_clocks = 4e-4;
+  if (entries.size() < enough) {
+    return {};
+  }
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < entries.size(); ++i) {
+    steps_s.push_back(std::chrono::duration<double>(entries[i].time - entries[i - 1].time).count());
+  }
+  std::vector<double> sorted = steps_s;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double frame_s = *middle;
+  double frames = 0, length_s = 0;
+  std::size_t even = 0;
+  for (const double step_s : steps_s) {
+    const double count = std::round(step_s / frame_s);
+    if (count < 1 || std::abs(step_s / frame_s - count) > off) {
+      continue;
+    }
+    ++even;
+    frames += count;
+    length_s += step_s;
+  }
+  const bool regular = static_cast<double>(even) >= most * static_cast<double>(steps_s.size());
+  if (!regular) {
+    return {};
+  }
+  const double rate = frames / length_s;
+  // A short recording tells its rate only so well.
+  const double tolerance = of_clocks + off * frame_s / length_s;
+  return nominal_rate(rate, tolerance).value_or(Rational{std::llround(rate * 1000), 1000});
+}
+
 }  // namespace
 
 std::unique_ptr<Camera> open_replay(const std::string& folder,
@@ -169,9 +206,11 @@ std::unique_ptr<Camera> open_replay(const std::string& folder,
   }
   const std::filesystem::path list = std::filesystem::path(folder) / "frames.csv";
   const bool recorded = std::filesystem::exists(list, error);
-  return make_picture_camera(
-      "replay:" + folder, recorded ? read_list(list) : read_bracket(folder, options.picture_rate),
-      recorded ? Rational{} : options.picture_rate, options, curves);
+  std::vector<PictureEntry> entries =
+      recorded ? read_list(list) : read_bracket(folder, options.picture_rate);
+  const Rational rate = recorded ? rate_of(entries) : options.picture_rate;
+  return make_picture_camera("replay:" + folder, std::move(entries), rate, options, curves,
+                             recorded && rate.num > 0 ? time_of_frame(1, rate) / 4 : Time{});
 }
 
 }  // namespace capture

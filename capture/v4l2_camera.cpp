@@ -125,6 +125,8 @@ void V4l2Camera::open(const CameraOptions& options) {
   frames_.set_layout(layout, crop_);
   info_.width = crop_.width;
   info_.height = crop_.height;
+  info_.whole_width = layout.width;
+  info_.whole_height = layout.height;
   info_.rate = stream_->rate();
   info_.live = true;
   exposures_ = capture::exposure_range(stream_->device());

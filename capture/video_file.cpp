@@ -32,8 +32,13 @@ constexpr double most_frames = 1e12;  // a longer length is a broken one
 Rational rate_of(const AVStream& stream) {
   const AVRational counted = stream.r_frame_rate;
   const AVRational average = stream.avg_frame_rate;
+  // Matroska counts in nanoseconds: 60000/1001 comes as 19001/317.
   const auto rational = [](AVRational rate) {
-    return rate.num > 0 && rate.den > 0 ? Rational{rate.num, rate.den} : Rational{};
+    if (rate.num <= 0 || rate.den <= 0) {
+      return Rational{};
+    }
+    constexpr double of_rounding = 1e-6;
+    return nominal_rate(av_q2d(rate), of_rounding).value_or(Rational{rate.num, rate.den});
   };
   if (counted.num > 0 && counted.den > 0 && average.num > 0 && average.den > 0) {
     const double ratio = av_q2d(counted) / av_q2d(average);
@@ -167,6 +172,15 @@ void VideoFile::open() {
 void VideoFile::describe(const AVFrame& first) {
   info_.width = crop_.width;
   info_.height = crop_.height;
+  info_.whole_width = source_width_;
+  info_.whole_height = source_height_;
+  const AVRational told = first.sample_aspect_ratio.num > 0
+                              ? first.sample_aspect_ratio
+                              : file_->video().codecpar->sample_aspect_ratio;
+  constexpr double most = 16;
+  if (told.num > 0 && told.den > 0 && av_q2d(told) <= most && av_q2d(told) >= 1 / most) {
+    info_.pixel_aspect = {told.num, told.den};
+  }
   info_.description =
       std::string(avcodec_get_name(codec_of(*file_))) + ", " + lineariser_.description();
   if (first.interlaced_frame != 0) {

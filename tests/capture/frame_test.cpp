@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <optional>
+
 #include <random>
 #include <stdexcept>
 
@@ -37,6 +40,16 @@ TEST(FrameAt, IsTheLastFrameThatIsNotLater) {
       EXPECT_EQ(frame_at(time - Time{1}, rate), n - 1);
       EXPECT_EQ(frame_at(time_of_frame(n + 1, rate) - Time{1}, rate), n);
     }
+  }
+}
+
+TEST(NominalRate, IsWholeOrThatOfNtsc) {
+  EXPECT_EQ(nominal_rate(19001.0 / 317, 1e-6), (Rational{60000, 1001}));
+  EXPECT_EQ(nominal_rate(29.97, 1e-3), (Rational{30000, 1001}));
+  EXPECT_EQ(nominal_rate(25.000001, 1e-6), (Rational{25, 1}));
+  EXPECT_EQ(nominal_rate(25.01, 1e-6), std::nullopt);
+  for (const double none : {0.0, -25.0, std::nan(""), HUGE_VAL}) {
+    EXPECT_EQ(nominal_rate(none, 1e-3), std::nullopt) << none;
   }
 }
 

@@ -60,6 +60,30 @@ TEST_F(Replay, GivesTheRecordedTimesExposuresAndStates) {
   EXPECT_EQ(camera->statistics().damaged, 1);
 }
 
+// Of a camera whose clock is a little off and whose stamps come by chance; some frames are missing.
+TEST_F(Replay, HasTheRateOfItsRecording) {
+  write_picture("a.png", 10);
+  std::string lines;
+  for (int i = 0; i < 40; ++i) {
+    if (i % 13 == 7) continue;
+    const double time_s = i * 0.020002 + (i * 7 % 5) * 0.0005;
+    lines += "a.png," + std::to_string(time_s) + ",0,good\n";
+  }
+  write_list(lines);
+  const auto even = open();
+  EXPECT_EQ(even->info().rate, (Rational{50, 1}));
+  EXPECT_EQ(even->info().jitter, milliseconds(5));
+  // Of no rate.
+  lines.clear();
+  for (int i = 0; i < 40; ++i) {
+    lines += "a.png," + std::to_string(0.02 * i + 0.0011 * i * i) + ",0,good\n";
+  }
+  write_list(lines);
+  const auto uneven = open();
+  EXPECT_EQ(uneven->info().rate, (Rational{0, 1}));
+  EXPECT_EQ(uneven->info().jitter, Time{0});
+}
+
 TEST_F(Replay, HasNoPictureBeforeTheFirstGoodOne) {
   write_picture("a.png", 10);
   write_list(",0,0,lost\na.png,0.04,0,good\n");
