@@ -54,9 +54,11 @@ CellBaker::Met CellBaker::met_at(int index) const {
   const RayStream& s = stream_;
   if (s.geom[i] == RTC_INVALID_GEOMETRY_ID) return {no_hit, {}, {}};
   const Vec3f d{s.dx[i], s.dy[i], s.dz[i]};
-  Vec3f n = normalize(Vec3f{s.ngx[i], s.ngy[i], s.ngz[i]});
+  const Scene& scene = *frame_->inputs.scene;
+  const Vec3f across{s.ngx[i], s.ngy[i], s.ngz[i]};  // in the object's frame inside an instance
+  Vec3f n = normalize(scene.normal_in_set(s.inst[i], across));
   if (dot(n, d) > 0) n = -n;
-  const Scene::Surface surface = frame_->inputs.scene->surface_of(s.geom[i], s.prim[i], s.inst[i]);
+  const Scene::Surface surface = scene.surface_of(s.geom[i], s.prim[i], s.inst[i]);
   return {surface, n, frame_->camera + d * s.far_m[i]};
 }
 

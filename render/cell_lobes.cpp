@@ -139,7 +139,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const bool many = sent_[from.pixel] >= effort_.max_rays || queue_.size() == queue_.capacity();
   statistics_->depth_limit_hits += deep;
   statistics_->ray_limit_hits += many;
-  const bool later = ray.media.count > 0 && cuts_glass_later_ && !effort_.chance_cuts;
+  const Media& media = ray.media ? *ray.media : from.media;
+  const bool later = media.count > 0 && cuts_glass_later_ && !effort_.chance_cuts;
   const float least = (1 - effort_.accuracy) * (later ? inside_glass : 1);
   // What little a ray adds is not worth many steps along its cone.
   const bool dim = weight < least;
@@ -179,7 +180,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.steps,
                     ray.roughness, from.pixel, from.slot, ray.kind,
                     static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps,
-                    followed > 0 && followed < 1, false, next_path(from.path, pushed_), ray.media,
+                    followed > 0 && followed < 1, false, next_path(from.path, pushed_), media,
                     asks ? from.diffuse : Vec3f{}});
 }
 

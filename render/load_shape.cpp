@@ -35,7 +35,7 @@ MeshShape shape_of(const Mesh& mesh, const Placement& placed) {
   for (Vec3f& n : shape.normals) n = transform_normal(for_normals, n);
   for (auto& tangent : shape.tangents) {
     const Vec3f t = normalize(transform_vector(placed, {tangent[0], tangent[1], tangent[2]}));
-    tangent = {t.x, t.y, t.z, tangent[3]};
+    tangent = {t.x, t.y, t.z, mirrored ? -tangent[3] : tangent[3]};
   }
   return shape;
 }

@@ -413,6 +413,11 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     }
     const HitPoint hit =
         scene_.hit_point(met->geom_id, met->prim_id, met->inst_id, met->u, met->v, w.direction);
+    if (w.media.count > 0) {
+      const Vec3f passed = passed_through(scene_, w.media, met->distance);
+      w.share = times(w.share, passed);
+      w.glow_share = times(w.glow_share, passed);
+    }
     const bool real = scene_.description().instances[hit.instance].kind == ObjectKind::stand_in;
     if (real && sees_plate) {
       w.result.end = CameraPath::End::stand_in;
@@ -420,11 +425,6 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
       break;
     }
     w.met_virtual = w.met_virtual || !real;
-    if (w.media.count > 0) {
-      const Vec3f passed = passed_through(scene_, w.media, met->distance);
-      w.share = times(w.share, passed);
-      w.glow_share = times(w.glow_share, passed);
-    }
     if (materials_[hit.material].glass) {
       pass_glass(w, hit, numbers);
       if (!survives(w, numbers)) break;

@@ -145,6 +145,7 @@ Facet facet_of(const Mesh& mesh,
   const bool back = dot(side, incoming) > 0;
   if (back) side = -side;
   hit.back = back != (mirrored[instance] != 0);
+  bool turned_over = hit.back;  // the normal is seen from behind
   hit.geometric_normal = side;
   Vec3f normal = side;
   hit.edge = {};
@@ -155,6 +156,7 @@ Facet facet_of(const Mesh& mesh,
     n = placed ? normalize(n) : transform_normal(normal_matrices[instance], n);
     if (dot(n, n) > 0.5F) {
       const bool away = dot(n, side) < 0;
+      turned_over = away != (mirrored[instance] != 0);  // which turns normals over, too
       const auto turned = [&](std::uint32_t corner) {
         const Vec3f turned_n =
             placed ? normals[corner] : transform_normal(normal_matrices[instance], normals[corner]);
@@ -185,7 +187,12 @@ Facet facet_of(const Mesh& mesh,
     const Vec3f tangent{t0[0] * w + t1[0] * u + t2[0] * v, t0[1] * w + t1[1] * u + t2[1] * v,
                         t0[2] * w + t1[2] * u + t2[2] * v};
     hit.tangent = normalize(transform_vector(matrix, tangent));
-    hit.handedness = t0[3];
+    // A mirrored bitangent is on the other side; seen from behind, so are tangent and bitangent.
+    hit.handedness = mirrored[instance] != 0 ? -t0[3] : t0[3];
+    if (turned_over) {
+      hit.tangent = -hit.tangent;
+      hit.handedness = -hit.handedness;
+    }
   }
 }
 
@@ -414,6 +421,12 @@ Scene::Surface Scene::surface_of(unsigned geom_id, unsigned prim_id, unsigned in
       part.triangle_of_prim.empty() ? prim_id : part.triangle_of_prim[prim_id];
   surface.material = material_of(*impl_->description.meshes[part.mesh], triangle);
   return surface;
+}
+Vec3f Scene::normal_in_set(unsigned inst_id, Vec3f normal) const {
+  if (inst_id == RTC_INVALID_GEOMETRY_ID) return normal;
+  const std::uint32_t instance = impl_->instance_of_geometry[inst_id];
+  return instance == Part::none ? normal
+                                : transform_normal(impl_->normal_matrices[instance], normal);
 }
 const Shader& Scene::shader_of(std::uint32_t material) const {
   return *impl_->compiled->shaders[material];

@@ -150,6 +150,8 @@ class Scene {
     friend bool operator==(const Surface&, const Surface&) = default;
   };
   Surface surface_of(unsigned geom_id, unsigned prim_id, unsigned inst_id) const;
+  // The same of a normal that Embree gives, which is in the object's frame inside an instance.
+  Vec3f normal_in_set(unsigned inst_id, Vec3f normal) const;
   const Shader& shader_of(std::uint32_t material) const;
   // Of a material of the shader "glass"; null for others.
   const Glass* glass_of(std::uint32_t material) const;

@@ -77,7 +77,7 @@ struct NewRay {
   float roughness;   // of the lobe, 0 = mirror: picks the environment's smoothing
   Spread spread;     // of the sample's cone from here on; nothing = as it came
   RayKind kind;
-  Media media = {};  // that it goes on in
+  std::optional<Media> media = {};  // that it goes on in; nothing = that the point is in
 };
 
 // Fills footprint, steps and turns of a point with its hit and incoming: the cone of a sample whose

@@ -40,7 +40,8 @@ std::optional<Ray> next(const Scene& scene, const Ray& ray, bool refracted) {
   find_shader("glass")->shade({&scene.description(), &scene}, {&point, 1}, pushed);
   if (pushed.rays.size() != 2) return std::nullopt;  // beyond the critical angle
   const NewRay& chosen = pushed.rays[refracted ? 1 : 0];
-  return Ray{chosen.origin, chosen.direction, p.steps, chosen.spread, chosen.media};
+  return Ray{chosen.origin, chosen.direction, p.steps, chosen.spread,
+             chosen.media.value_or(Media())};
 }
 
 // In, mirrored inside so often, and out.
