@@ -131,6 +131,16 @@ void blur_screen(Image& light) {
   pass(light.height, light.width, [&](int x, int y, int c) -> float& { return light.at(y, x, c); });
 }
 
+float screen_share(const Image& light, ScreenColour colour) {
+  const Ordered key = find_key({&light, 1}, colour);
+  const std::size_t pixels = light.pixels.size() / 3;
+  std::size_t screen = 0;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    screen += is_screen(ordered(&light.pixels[3 * i], colour), key) ? 1 : 0;
+  }
+  return static_cast<float>(screen) / static_cast<float>(pixels);
+}
+
 ScreenColour mean_colour(const Image& light) {
   std::array<double, 3> sum{};
   for (std::size_t i = 0; i < light.pixels.size(); ++i) sum[i % 3] += light.pixels[i];

@@ -51,6 +51,9 @@ CleanPlate plate_from_footage(std::span<const capture::Image> frames, ScreenColo
 // pixels, cut at the borders. (height, width, 3).
 void blur_screen(capture::Image& light);
 
+// How much of a plate looks as its screen does, 0..1. (height, width, 3), not empty.
+float screen_share(const capture::Image& light, ScreenColour colour);
+
 // The colour of a picture's mean. (height, width, 3), not empty.
 ScreenColour mean_colour(const capture::Image& light);
 

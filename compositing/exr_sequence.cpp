@@ -72,6 +72,16 @@ std::string ExrSequence::path_of(std::int64_t number) const {
   return (std::filesystem::path(settings_.dir) / name.data()).string();
 }
 
+std::int64_t ExrSequence::frames_in(const std::string& folder) {
+  std::int64_t frames = 0;
+  std::error_code none;
+  for (const auto& file : std::filesystem::directory_iterator(folder, none)) {
+    const std::string name = file.path().filename().string();
+    frames += name.starts_with("frame.") && name.ends_with(".exr") ? 1 : 0;
+  }
+  return frames;
+}
+
 void ExrSequence::write(std::int64_t number,
                         const capture::HalfImage& rgba,
                         const capture::HalfImage& matte,
@@ -79,6 +89,7 @@ void ExrSequence::write(std::int64_t number,
   capture::ExrOptions options;
   options.compression = compression_from_name(settings_.compression);
   options.frames_per_second = settings_.rate;
+  options.pixel_aspect = settings_.pixel_aspect;
   if (timecode) options.timecode = label_of(*timecode, timecode_base(settings_.rate));
   const std::array<capture::ExrPlanes, 2> planes{capture::ExrPlanes{rgba, {"R", "G", "B", "A"}},
                                                  capture::ExrPlanes{matte, {"matte"}}};

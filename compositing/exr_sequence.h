@@ -14,6 +14,7 @@ namespace compositing {
 struct ExrSequenceSettings {
   std::string dir;  // made if missing; frames of the same number are replaced
   capture::Rational rate;
+  capture::Rational pixel_aspect{1, 1};
   std::string compression = "none";  // or "rle", "zip", "piz": smaller and slower in this order
 };
 
@@ -33,6 +34,9 @@ class ExrSequence {
              const std::optional<Timecode>& timecode) const;
 
   std::string path_of(std::int64_t number) const;
+
+  // Frames, by their names, that are in a folder: of an earlier take, before the first is written.
+  static std::int64_t frames_in(const std::string& folder);
 
  private:
   ExrSequenceSettings settings_;

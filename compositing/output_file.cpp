@@ -2,6 +2,7 @@
 #include "compositing/output_file.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -24,6 +25,15 @@ namespace {
 constexpr int buffer_size = 1 << 16;
 constexpr std::size_t marks_kept = 8;
 
+int open_to_write(const std::string& path, int how) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | how, 0666);
+  if (descriptor < 0) {
+    throw std::runtime_error(path +
+                             ": cannot be written: " + std::generic_category().message(errno));
+  }
+  return descriptor;
+}
+
 }  // namespace
 
 bool is_one_file(const std::string& a, const std::string& b) {
@@ -36,12 +46,14 @@ bool is_one_file(const std::string& a, const std::string& b) {
   return whole(a) == whole(b);
 }
 
-OutputFile::OutputFile(const std::string& path) {
-  descriptor_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) {
-    throw std::runtime_error(path +
-                             ": cannot be written: " + std::generic_category().message(errno));
-  }
+void require_writable(const std::string& path) {
+  struct stat found;
+  const bool there = ::lstat(path.c_str(), &found) == 0;
+  ::close(open_to_write(path, 0));
+  if (!there) ::unlink(path.c_str());
+}
+
+OutputFile::OutputFile(const std::string& path) : descriptor_(open_to_write(path, O_TRUNC)) {
   auto* const buffer = static_cast<unsigned char*>(av_malloc(buffer_size));
   if (buffer != nullptr) {
     context_ = avio_alloc_context(buffer, buffer_size, 1, this, nullptr, &OutputFile::write,

@@ -12,6 +12,10 @@ namespace compositing {
 // Whether two paths name one file, there or yet to be written, links followed.
 bool is_one_file(const std::string& a, const std::string& b);
 
+// Whether a file could be written here. What is there stays as it is, and what is not is not left
+// there. Throws std::runtime_error with path and reason if it could not.
+void require_writable(const std::string& path);
+
 class OutputFile {
  public:
   // Creates or replaces the file. Throws std::runtime_error with path and reason.

@@ -40,6 +40,7 @@ VideoSettings video_settings(const RecorderSettings& settings) {
           .rate = settings.rate,
           .width = settings.width,
           .height = settings.height,
+          .pixel_aspect = settings.pixel_aspect,
           .codec = settings.codec,
           .crf = settings.crf,
           .transfer = settings.transfer,
@@ -119,6 +120,13 @@ void validate(const RecorderSettings& settings) {
 
 }  // namespace
 
+void check(const RecorderSettings& settings) {
+  validate(settings);
+  for (const std::string& file : {settings.file, settings.fill_file, settings.key_file}) {
+    if (!file.empty()) require_writable(file);
+  }
+}
+
 class Recorder::Take {
  public:
   explicit Take(const RecorderSettings& settings);
@@ -177,9 +185,10 @@ class Recorder::Take {
 };
 
 Recorder::Take::Take(const RecorderSettings& settings) : settings_(settings) {
-  validate(settings);
+  check(settings);  // so that no take is lost to the start of one that cannot be
   if (!settings.exr_dir.empty()) {
-    exr_.emplace(ExrSequenceSettings{settings.exr_dir, settings.rate, settings.exr_compression});
+    exr_.emplace(ExrSequenceSettings{settings.exr_dir, settings.rate, settings.pixel_aspect,
+                                     settings.exr_compression});
   }
   if (!settings.file.empty()) video_.emplace(video_settings(settings));
   if (has_pair(settings)) {

@@ -29,8 +29,9 @@ struct RecorderSettings {
   capture::Rational rate;
   int width = 0;
   int height = 0;
-  std::string codec = "h264";                               // or "lossless"
-  int crf = 18;                                             // H.264's constant rate factor
+  capture::Rational pixel_aspect{1, 1};  // a pixel's width over its height, for the files' tags
+  std::string codec = "h264";            // or "lossless"
+  int crf = 18;                          // H.264's constant rate factor
   capture::Transfer transfer = capture::Transfer::rec1886;  // of display_rgb8: for the file's tags
   std::string exr_compression = "none";                     // or "rle", "zip", "piz"
   std::optional<Timecode> start;  // label of the first frame; none: 00:00:00:00 if the rate has it
@@ -61,6 +62,9 @@ struct RecorderStatus {
   double write_s = 0;                // time spent writing, in all
   std::string error;                 // why recording stopped; "" = it has not
 };
+
+// Throws as Recorder's constructor, for all that can be told before anything is written.
+void check(const RecorderSettings& settings);
 
 // Never blocks or throws into the show once it runs: what goes wrong then stands in the status, and
 // what was recorded until then is kept. One thread pushes; any thread may ask for the status.

@@ -57,6 +57,7 @@ capture::libav::CodecContext open_encoder(const VideoSettings& settings) {
   encoder->width = settings.width;
   encoder->height = settings.height;
   encoder->pix_fmt = pixel_format(settings);
+  encoder->sample_aspect_ratio = av_rational(settings.pixel_aspect);
   encoder->framerate = av_rational(settings.rate);
   encoder->time_base = av_inv_q(encoder->framerate);
   encoder->gop_size = std::max(1, static_cast<int>(std::lround(settings.rate.value())));
@@ -112,6 +113,10 @@ void validate(const VideoSettings& settings) {
               settings.height <= largest_side,
           "a take has 1 to 16384 rows and columns, not " + std::to_string(settings.width) + " x " +
               std::to_string(settings.height));
+  const capture::Rational aspect = settings.pixel_aspect;
+  require(aspect.num > 0 && aspect.den > 0 && aspect.num <= largest && aspect.den <= largest,
+          "a pixel's aspect is above 0, not " + std::to_string(aspect.num) + "/" +
+              std::to_string(aspect.den));
   require(settings.codec == "h264" || settings.codec == "lossless",
           "no codec \"" + settings.codec + "\"; there are \"h264\" and \"lossless\"");
   require(settings.channels == 1 || settings.channels == 3,
@@ -187,6 +192,7 @@ void VideoWriter::State::open_streams() {
   if (avcodec_parameters_from_context(picture_stream->codecpar, encoder.get()) < 0) {
     throw std::bad_alloc();
   }
+  picture_stream->sample_aspect_ratio = encoder->sample_aspect_ratio;
   picture_stream->time_base = encoder->time_base;
   picture_stream->avg_frame_rate = encoder->framerate;
   picture_stream->r_frame_rate = encoder->framerate;

@@ -16,7 +16,8 @@ struct VideoSettings {
   capture::Rational rate;  // pictures per second
   int width = 0;
   int height = 0;
-  int channels = 3;            // 3 = RGB; 1 = grey of full range, as one plane (4:0:0)
+  capture::Rational pixel_aspect{1, 1};  // a pixel's width over its height: for the tags
+  int channels = 3;                      // 3 = RGB; 1 = grey of full range, as one plane (4:0:0)
   std::string codec = "h264";  // "h264": 8 bits 4:2:0; "lossless": RGB or grey kept bit for bit
   int crf = 18;                // H.264's constant rate factor: 0 finest, 51 coarsest
   capture::Transfer transfer =

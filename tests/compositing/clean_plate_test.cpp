@@ -49,6 +49,19 @@ TEST(AveragePlate, TellsTheColourOfAnyScreen) {
   EXPECT_EQ(colour_of({0.34F, 0.36F, 0.002F}), ScreenColour::yellow);
 }
 
+TEST(ScreenShare, IsThatOfThePicture) {
+  const MadeClip clip(made_scene("noise"), 4, 120, 160);
+  const CleanPlate empty = average_plate(shots_of(clip, 6));
+  EXPECT_GT(screen_share(empty.light, empty.colour), 0.97);
+  Image half = even_picture(64, 96, {0.04F, 0.4F, 0.06F});
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 48; ++x) {
+      for (int c = 0; c < 3; ++c) half.at(y, x, c) = 0.3F;
+    }
+  }
+  EXPECT_NEAR(screen_share(half, ScreenColour::green), 0.5, 0.01);
+}
+
 // Most of the picture is a wall whose red stands out, too, but less.
 TEST(AveragePlate, TellsTheColourOfAScreenThatIsTheLesserPartOfThePicture) {
   Image shot = even_picture(64, 96, {0.5F, 0.4F, 0.3F});

@@ -165,6 +165,20 @@ TEST_F(RecorderFaultsTest, RefusesWhatCannotBeWrittenAtOnceWithPathAndReason) {
   EXPECT_NE(reason(settings).find(path("file/deeper")), std::string::npos) << reason(settings);
 }
 
+TEST_F(RecorderFaultsTest, KeepsATakeThatIsThereWhereAnotherFileCannotBeWritten) {
+  const std::string take = path("take.mkv"), fill = path("fill.mkv");
+  std::ofstream(take) << "a take of before";
+  RecorderSettings settings = small_take(take);
+  settings.display = std::make_shared<const Display>(DisplaySettings{});
+  settings.fill_file = fill;
+  settings.key_file = path("no/such/folder/key.mkv");
+  EXPECT_THROW(check(settings), std::runtime_error);
+  EXPECT_THROW(Recorder recorder(settings), std::runtime_error);
+  std::ifstream in(take);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "a take of before");
+  EXPECT_FALSE(fs::exists(fill)) << "nothing is begun";
+}
+
 TEST_F(RecorderFaultsTest, RefusesHostileSettings) {
   const auto refused = [&](auto change) {
     RecorderSettings settings = small_take(path("take.mkv"));

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "capture/camera.h"
 #include "take.h"
 
 namespace compositing::recorder_test {
@@ -43,6 +44,20 @@ TEST_F(RecorderTest, WritesEveryFrameAtTheRateWithItsTimecode) {
   ASSERT_EQ(times.size(), 45U);
   for (std::size_t n = 0; n < times.size(); ++n) {
     EXPECT_NEAR(times[n], static_cast<double>(n) * 1.001 / 30, 0.0006);
+  }
+}
+
+TEST_F(RecorderTest, TellsTheShapeOfItsPixels) {
+  for (const char* codec : {"h264", "lossless"}) {
+    const std::string file = path(std::string(codec) + ".mkv");
+    RecorderSettings settings = small_take(file);
+    settings.codec = codec;
+    settings.pixel_aspect = {4, 3};
+    std::vector<RecordedFrame> frames;
+    for (int n = 0; n < 3; ++n) frames.push_back(picture(n, textured(64, 48, n)));
+    record(settings, std::move(frames));
+    EXPECT_EQ(probe(file, "stream=sample_aspect_ratio"), "4:3") << codec;
+    EXPECT_EQ(capture::open_camera(file)->info().pixel_aspect, (capture::Rational{4, 3})) << codec;
   }
 }
 
