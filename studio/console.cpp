@@ -8,21 +8,37 @@
 #include <cstdio>
 #include <fstream>
 #include <stdexcept>
+#include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
 namespace studio {
+namespace {
+
+// A terminal may go while the command runs, which is no reason to end it.
+template <typename... Args>
+void print(bool terminal, std::FILE* file, fmt::format_string<Args...> format, Args&&... args) {
+  try {
+    fmt::print(file, format, std::forward<Args>(args)...);
+  } catch (const std::system_error&) {
+    if (!terminal) throw;
+  }
+}
+
+}  // namespace
 
 Console::Console(bool quiet, std::string figures_file)
     : quiet_(quiet),
       terminal_(isatty(STDERR_FILENO) == 1),
+      says_to_terminal_(isatty(STDOUT_FILENO) == 1),
       figures_file_(std::move(figures_file)) {}
 
 Console::~Console() { clear_bar(); }
 
 void Console::clear_bar() {
   if (!bar_shown_) return;
-  fmt::print(stderr, "\r\033[K");
+  print(terminal_, stderr, "\r\033[K");
   bar_shown_ = false;
 }
 
@@ -30,14 +46,14 @@ void Console::say(std::string_view line) {
   const std::lock_guard lock(mutex_);
   if (quiet_) return;
   clear_bar();
-  fmt::print("{}\n", line);
+  print(says_to_terminal_, stdout, "{}\n", line);
   std::fflush(stdout);
 }
 
 void Console::warn(std::string_view line) {
   const std::lock_guard lock(mutex_);
   clear_bar();
-  fmt::print(stderr, "{}\n", line);
+  print(terminal_, stderr, "{}\n", line);
 }
 
 void Console::progress(double share, std::string_view what) {
@@ -49,7 +65,7 @@ void Console::progress(double share, std::string_view what) {
   bar_time_ = now;
   constexpr int width = 30;
   const int full = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * width));
-  fmt::print(stderr, "\r[{:=<{}}{:<{}}] {}\033[K", "", full, "", width - full, what);
+  print(terminal_, stderr, "\r[{:=<{}}{:<{}}] {}\033[K", "", full, "", width - full, what);
   std::fflush(stderr);
   bar_shown_ = true;
 }

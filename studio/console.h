@@ -34,7 +34,8 @@ class Console {
 
   std::mutex mutex_;
   bool quiet_;
-  bool terminal_;
+  bool terminal_;          // is what warnings and bars go to
+  bool says_to_terminal_;  // where lines go
   bool bar_shown_ = false;
   std::string figures_file_;
   std::chrono::steady_clock::time_point bar_time_{};

@@ -161,7 +161,8 @@ std::string show_figures(const Set& set,
          {{"mean", error->delta_e_mean}, {"p95", error->delta_e_p95}, {"p99", error->delta_e_p99}}},
         {"pixels", error->pixels}};
   }
-  return json.dump(2);
+  // Paths need not be UTF-8.
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
 }  // namespace studio

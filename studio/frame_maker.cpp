@@ -20,6 +20,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr capture::Rational rate_of_stills{25, 1};
+// Frames by which a live plate's own count may differ from its clock.
+constexpr double most_parted = 1.5;
 
 // Measures a stage from its making to its end.
 class StageTimer {
@@ -74,6 +76,13 @@ std::unique_ptr<Source> open_plate(const Set& set) {
          fmt::format("the plate's picture is {}x{}, but the show is {}x{}: set show.width and "
                      "show.height, or camera.crop",
                      info.width, info.height, set.show.width, set.show.height));
+  }
+  const auto [width, height] = camera.lens_size;
+  const bool whole_known = width > 0 && info.whole_width > 0;
+  if (camera.crop && whole_known && (width != info.whole_width || height != info.whole_height)) {
+    fail(set, camera.source_place,
+         fmt::format("the plate's whole picture is {}x{}, but its lens is for {}x{}",
+                     info.whole_width, info.whole_height, width, height));
   }
   return source;
 }
@@ -180,27 +189,49 @@ std::shared_ptr<const capture::HalfImage> FrameMaker::half_plate(const capture::
   return last_plate_;
 }
 
+// Where a time lies among the show's frames of a live plate: whole numbers are frames.
+double FrameMaker::place_of(capture::Time time) const {
+  return seconds(time - first_due_->time) * rate_.value();
+}
+
+// The number of a live plate's picture. Cameras count more evenly than they stamp; but where count
+// and clock part, since pictures come at another rate than the camera says, or none came for a
+// while, the clock is right.
+std::int64_t FrameMaker::number_of(const capture::Frame& picture) {
+  const double place = place_of(picture.time);
+  std::int64_t counted = picture.number - first_due_->number + uncounted_;
+  const bool parted = std::abs(static_cast<double>(counted) - place) > most_parted;
+  if (parted || rate_ != plate_->info().rate) {
+    uncounted_ += std::llround(place) - counted;
+    counted = std::llround(place);
+  }
+  return std::max(counted, last_due_.frame + 1);
+}
+
 FrameMaker::Due FrameMaker::wait_for_plate() {
   const capture::Time period = capture::time_of_frame(1, rate_);
-  const capture::Time until = capture::monotonic_now() + 5 * period / 2;
+  const capture::Time patience = 5 * period / 2;
+  const capture::Time until = capture::monotonic_now() + patience;
   if (!first_due_) {
     first_due_ = plate_->wait_for_newer(until);
     last_due_ = {0, first_due_->time};
     return last_due_;
   }
   // The camera may be the faster one.
-  const capture::Time soonest = last_due_.time + 3 * period / 4;
-  const capture::Frame newest = plate_->wait_for_newer(until, soonest);
-  if (newest.time < soonest) {
-    last_due_ = {last_due_.frame + 1, last_due_.time + period};
-    return last_due_;
+  capture::Time soonest = last_due_.time + 3 * period / 4;
+  while (true) {
+    const capture::Frame newest = plate_->wait_for_newer(until, soonest);
+    if (newest.time < soonest) break;
+    const std::int64_t number = number_of(newest);
+    if (static_cast<double>(number) - place_of(newest.time) <= most_parted) {
+      last_due_ = {number, newest.time};
+      return last_due_;
+    }
+    soonest = newest.time + capture::Time{1};  // one picture too many
   }
-  const capture::Time passed = newest.time - first_due_->time;
-  const std::int64_t by_time =
-      std::llround(static_cast<double>(passed.count()) * 1e-9 * rate_.value());
-  const bool same_rate = rate_ == plate_->info().rate;
-  const std::int64_t number = same_rate ? newest.number - first_due_->number : by_time;
-  last_due_ = {std::max(number, last_due_.frame + 1), newest.time};
+  // As late as a picture may be that comes now.
+  const capture::Time time = std::max(last_due_.time + period, capture::monotonic_now() - patience);
+  last_due_ = {std::max<std::int64_t>(std::llround(place_of(time)), last_due_.frame + 1), time};
   return last_due_;
 }
 
@@ -216,8 +247,10 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   std::vector<VideoFrame> videos;
   {
     const StageTimer timer(prepared, Stage::capture);
-    frame = plate_->at(time);
+    frame = plate_->at(time + plate_->info().jitter);
     if (!frame) return std::nullopt;
+    note_plate(*frame);
+    prepared.job.cam_from_set = pose_at(*frame);
     if (plate_->is_live()) {
       prepared.arrived =
           Clock::time_point(std::chrono::duration_cast<Clock::duration>(plate_->arrived()));
@@ -225,6 +258,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.plate = half_plate(*frame);
     prepared.plate_status = frame->status;
     prepared.plate_exposure_s = frame->exposure_s;
+    plate_->read_sound_to(time + capture::time_of_frame(1, rate_));
     prepared.sound = plate_->take_sound();
     videos = videos_->at(time);
     prepared.notes = videos_->take_notes();
@@ -234,8 +268,6 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   }
 
   render::FrameJob& job = prepared.job;
-  job.cam_from_set = track_ ? calibrate::pose_at(*track_, seconds(frame->time)).cam_from_set
-                            : set_.camera.pose.cam_from_set;
   Light light;
   {
     const StageTimer timer(prepared, Stage::probe);
@@ -277,6 +309,30 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.lens = lens_;
   }
   return prepared;
+}
+
+// Tells of the first of frames that are lost in a row.
+void FrameMaker::note_plate(const capture::Frame& frame) {
+  const bool lost = frame.status == capture::FrameStatus::lost;
+  if (lost && !plate_is_lost_) {
+    notes_.push_back(fmt::format("the plate's frame {} is lost{}{}", frame.number,
+                                 frame.note.empty() ? "" : ": ", frame.note));
+  }
+  plate_is_lost_ = lost;
+}
+
+calibrate::Pose FrameMaker::pose_at(const capture::Frame& frame) {
+  if (!track_) return set_.camera.pose.cam_from_set;
+  const double time_s = seconds(frame.time);
+  const calibrate::TrackedPose at = calibrate::pose_at(*track_, time_s);
+  if (!at.inside && !is_off_track_) {
+    notes_.push_back(
+        fmt::format("the camera's track has no pose at {:.3f} s: it stays at the "
+                    "nearest one ({})",
+                    time_s, set_.camera.pose.track));
+  }
+  is_off_track_ = !at.inside;
+  return at.cam_from_set;
 }
 
 // Gives the objects that deform the frame's shapes; whether any changed.

@@ -92,7 +92,8 @@ class FrameMaker {
   };
   // Of a live plate: the frame that shows its newest picture. Waits for a picture that has not been
   // due yet, but not for ever: then the last one is due once more, as a later frame. Numbers count
-  // the show's frames from the first call on, those included whose pictures were passed over.
+  // the show's frames from the first call on, those included whose pictures were passed over or
+  // never came: frame n is n frame times after the first, to a frame and a half.
   Due wait_for_plate();
   // As make(), with a time of its own.
   std::optional<PreparedFrame> make_at(const Due& due);
@@ -137,6 +138,10 @@ class FrameMaker {
   void take_over(Change change);
   void finish_change();
   void let_go(std::unique_ptr<ShapeFeed> shapes);
+  void note_plate(const capture::Frame& frame);
+  calibrate::Pose pose_at(const capture::Frame& frame);
+  double place_of(capture::Time time) const;
+  std::int64_t number_of(const capture::Frame& picture);
   std::shared_ptr<const capture::HalfImage> half_plate(const capture::Frame& frame);
 
   Set set_;
@@ -155,11 +160,13 @@ class FrameMaker {
   std::vector<render::LocalLight> lamps_;
   render::BounceFollower bounces_;
   std::uint64_t scene_version_ = 0;
-  std::future<Change> change_;               // on its way
-  std::vector<std::future<void>> leaving_;   // shapes of sets before
-  std::vector<std::string> notes_;           // for the next frame
+  std::future<Change> change_;              // on its way
+  std::vector<std::future<void>> leaving_;  // shapes of sets before
+  std::vector<std::string> notes_;          // for the next frame
+  bool plate_is_lost_ = false, is_off_track_ = false;
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;
+  std::int64_t uncounted_ = 0;  // frames of the show that a live plate's count leaves out
   std::shared_ptr<const capture::Image> last_image_;  // that last_plate_ was made from
   std::shared_ptr<const capture::HalfImage> last_plate_;
 };

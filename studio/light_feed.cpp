@@ -149,6 +149,7 @@ void LightFeed::build_environment(const LightRequest& request) {
   }
   share_below_zero_ = 3.0 * below_zero / static_cast<double>(env->radiance.pixels.size());
   environment_ = std::move(env);
+  shown_ = false;
 }
 
 // Of the plate over the environment as it is now, which already holds the gain so far.
@@ -242,6 +243,11 @@ Light LightFeed::at(const LightRequest& request) {
     }
   }
   if (table_count_ != request.light_samples) {
+    if (shown_) {  // a frame may still be rendered from it
+      std::shared_ptr<render::Environment> anew = environments_.lend();
+      *anew = *environment_;
+      environment_ = std::move(anew);
+    }
     render::LightFollowerSettings following;
     following.table.count = request.light_samples;
     const std::uint64_t version_before = table_.version;
@@ -253,6 +259,7 @@ Light LightFeed::at(const LightRequest& request) {
   }
   light.table = table_;
   light.environment = environment_;
+  shown_ = true;
   light.planned = planned_ ? planned_ : light.environment;
   light.match = match_;
   if (share_below_zero_ > 0) {

@@ -77,6 +77,7 @@ class LightFeed {
   double share_below_zero_ = 0;  // of the probe's directions, by the match
   // Another one for every change, never touched once it was handed out.
   std::shared_ptr<render::Environment> environment_;
+  bool shown_ = false;  // has been handed out
   capture::Pool<render::Environment> environments_;
   std::shared_ptr<const render::Environment> planned_;  // of the table's version
   render::LightTable table_;                            // of environment_, if it is not stale

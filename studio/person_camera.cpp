@@ -115,6 +115,12 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
           fmt::format("the video's picture is {}x{}, but its lens is for {}x{}", info.width,
                       info.height, s.lens->width, s.lens->height));
     }
+    const auto& first = source_->first().image;
+    if (options.needs_matte && !s.key && first && first->channels != 4) {
+      throw std::invalid_argument(
+          "the video has no alpha: a person who is found by its feet, or shown as a hull, needs a "
+          "key");
+    }
     aspect_ = static_cast<float>(info.width) / static_cast<float>(info.height);
     period_ = capture::time_of_frame(1, info.rate.num > 0 ? info.rate : rate_of_unknown);
   } catch (const std::exception& error) {

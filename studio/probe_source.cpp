@@ -5,12 +5,14 @@
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "calibrate/lens.h"
 #include "capture/bracketed_camera.h"
 #include "capture/camera_response.h"
 #include "capture/make_hdr.h"
+#include "capture/picture_camera.h"
 
 namespace studio {
 namespace {
@@ -33,6 +35,13 @@ double share_above(const capture::Image& radiance, double least) {
     above += radiance.pixels[i] > least ? 1 : 0;
   }
   return static_cast<double>(above * step) / static_cast<double>(radiance.pixels.size());
+}
+
+// Which stays as it is, whatever else begins again.
+bool is_one_picture(std::string_view uri) {
+  constexpr std::string_view scheme = "file:";
+  if (!uri.starts_with(scheme) || uri.find('%') != std::string_view::npos) return false;
+  return capture::is_picture(std::string(uri.substr(scheme.size())));
 }
 
 // The camera's noise, where calibration has told it.
@@ -151,7 +160,7 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
   capture::CameraOptions options;
   options.colour.transfer = probe.colour;
   options.response = probe.response;
-  options.loop = set.camera.loop;
+  options.loop = loop_ && !is_one_picture(probe.source);
   options.mark_saturated = true;
   if (set.show.fps) options.picture_rate = *set.show.fps;
   merging_.noise = noise_of(probe);

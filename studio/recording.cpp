@@ -22,8 +22,7 @@ std::optional<capture::Sound> joined(const std::vector<capture::Sound>& pieces) 
 
 }  // namespace
 
-void Recording::start(const RecordSettings& settings) {
-  stop();
+compositing::RecorderSettings Recording::settings_of(const RecordSettings& settings) const {
   compositing::RecorderSettings recorder;
   recorder.file = settings.file;
   recorder.exr_dir = settings.exr;
@@ -33,6 +32,7 @@ void Recording::start(const RecordSettings& settings) {
   recorder.rate = form_.rate;
   recorder.width = form_.width;
   recorder.height = form_.height;
+  recorder.pixel_aspect = form_.pixel_aspect;
   if (!settings.codec.empty()) recorder.codec = settings.codec;
   if (!settings.timecode.empty()) {
     recorder.start = compositing::parse_timecode(settings.timecode, form_.rate);
@@ -40,6 +40,17 @@ void Recording::start(const RecordSettings& settings) {
   recorder.transfer = form_.transfer;
   recorder.sound_channels = form_.sound_channels;
   recorder.sound_rate = form_.sound_rate;
+  return recorder;
+}
+
+void Recording::check(const RecordSettings& settings) const {
+  compositing::check(settings_of(settings));
+}
+
+void Recording::start(const RecordSettings& settings) {
+  const compositing::RecorderSettings recorder = settings_of(settings);
+  compositing::check(recorder);  // else the take that runs goes on
+  stop();
   recorder_ = std::make_unique<compositing::Recorder>(recorder);
 }
 

@@ -19,6 +19,7 @@ struct RecordingForm {
   capture::Transfer transfer = capture::Transfer::rec1886;  // of the display's codes
   int sound_channels = 0;
   int sound_rate = 0;
+  capture::Rational pixel_aspect{1, 1};
   std::shared_ptr<const compositing::Display> display;  // whose codes are recorded
 };
 
@@ -27,7 +28,9 @@ class Recording {
  public:
   explicit Recording(const RecordingForm& form) : form_(form) {}
 
-  // Ends what runs and starts anew. Throws as compositing::Recorder.
+  // Throws as start(), for all that can be told before.
+  void check(const RecordSettings& settings) const;
+  // Ends what runs and starts anew. Throws as compositing::Recorder; what runs goes on then.
   void start(const RecordSettings& settings);
   // Finishes the files; nothing if none runs.
   void stop();
@@ -38,6 +41,8 @@ class Recording {
   compositing::RecorderStatus status() const;
 
  private:
+  compositing::RecorderSettings settings_of(const RecordSettings& settings) const;
+
   RecordingForm form_;
   std::unique_ptr<compositing::Recorder> recorder_;
   compositing::RecorderStatus last_status_;

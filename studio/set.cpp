@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "compositing/timecode.h"
 #include "render/caustics.h"
 #include "render/kernel.h"
 #include "studio/set_sections.h"
@@ -84,7 +87,26 @@ DisplayChoice read_display_section(Section section) {
   return display;
 }
 
-RecordSettings read_record_section(Section section, const std::filesystem::path& base) {
+// A time code that can be at the show's rate; where that is the plate's, at any.
+void check_timecode(Section& section, const RecordSettings& record, const ShowSettings& show) {
+  if (record.timecode.empty()) return;
+  std::vector<capture::Rational> rates{{60, 1}, {60000, 1001}};
+  if (show.fps) rates = {*show.fps};
+  std::string why;
+  for (const capture::Rational rate : rates) {
+    try {
+      static_cast<void>(compositing::parse_timecode(record.timecode, rate));
+      return;
+    } catch (const std::invalid_argument& error) {
+      if (why.empty()) why = error.what();
+    }
+  }
+  section.fault("timecode", fmt::format("cannot be: {}", why));
+}
+
+RecordSettings read_record_section(Section section,
+                                   const std::filesystem::path& base,
+                                   const ShowSettings& show) {
   RecordSettings record;
   record.place = section.place();
   const auto read_path = [&](std::string_view key, std::string& path) {
@@ -102,6 +124,7 @@ RecordSettings read_record_section(Section section, const std::filesystem::path&
   if (!section.has("fill") && section.has("key")) section.fault("key", "comes with record.fill");
   section.word("codec", record.codec, {"h264", "lossless"});
   section.text("timecode", record.timecode);
+  check_timecode(section, record, show);
   section.finish();
   return record;
 }
@@ -210,7 +233,7 @@ Set read_set(const std::string& path) {
   if (auto section = root.table("effort")) set.effort = read_effort_section(*section);
   if (auto section = root.table("display")) set.display = read_display_section(*section);
   if (auto section = root.table("record")) {
-    set.record = read_record_section(*section, context.base);
+    set.record = read_record_section(*section, context.base, context.show);
   }
   root.finish();
 

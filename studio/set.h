@@ -51,7 +51,8 @@ struct PoseSettings {
 struct CameraSettings {
   std::string source;  // URI, paths made absolute
   Place source_place;
-  calibrate::Lens lens;  // of the show's picture: cropped, and of its size
+  calibrate::Lens lens;            // of the show's picture: cropped, and of its size
+  std::array<int, 2> lens_size{};  // width and height of the whole picture that it was given for
   PoseSettings pose;
   Place pose_place;
   std::optional<std::int64_t> frame;
@@ -162,6 +163,7 @@ struct LampSettings {
 struct ToneSettings {
   std::optional<float> key;  // level of the picture's middle; nothing = as it is
   double seconds = 1;        // in which the curve follows the picture's levels to 63 %
+  friend bool operator==(const ToneSettings&, const ToneSettings&) = default;
 };
 
 // Video that the surfaces of objects show, and shine by.

@@ -80,6 +80,7 @@ void fit_lens(Section& section, const SetContext& context, CameraSettings& camer
   const std::string_view key = section.has("rig_camera") ? "rig_camera"
                                : section.has("lens")     ? "lens"
                                                          : "model";
+  camera.lens_size = {camera.lens.width, camera.lens.height};
   if (camera.crop) {
     const auto [x, y, width, height] = *camera.crop;
     if (x + width > camera.lens.width || y + height > camera.lens.height) {

@@ -82,7 +82,11 @@ void read_match(Section& section, std::array<int, 2> picture, MatchSettings& mat
     table->finish();
   } else {
     std::string word;
-    section.word("match", word, {"auto"});
+    if (section.text("match", word) && word != "auto") {
+      section.fault("match",
+                    "must be \"auto\", the numbers that calibrate light gives, or a table "
+                    "of gain, matrix or patch");
+    }
   }
 }
 

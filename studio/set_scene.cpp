@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <ranges>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 
@@ -62,6 +63,23 @@ SceneDescription parts_of(SceneDescription scene, const Wanted& wanted) {
   return scene;
 }
 
+// All but the parts of these names. Throws std::invalid_argument for a name that no part has.
+SceneDescription without(SceneDescription scene, const std::vector<std::string>& hidden) {
+  for (const std::string& name : hidden) {
+    if (std::ranges::find(scene.instances, name, &Instance::name) != scene.instances.end())
+      continue;
+    std::set<std::string> names;
+    for (const Instance& part : scene.instances) names.insert(part.name);
+    names.erase("");
+    std::string list;
+    for (const std::string& known : names) list += (list.empty() ? "" : ", ") + known;
+    throw std::invalid_argument(fmt::format("cannot hide '{}': its parts are {}", name, list));
+  }
+  return parts_of(std::move(scene), [&](const std::string& name) {
+    return std::ranges::find(hidden, name) == hidden.end();
+  });
+}
+
 // A made thing by its name in the set, as it is.
 SceneDescription make_thing(const std::string& made) {
   const auto one_of = [](std::initializer_list<std::string_view> names) {
@@ -89,12 +107,12 @@ SceneDescription load_object(const ObjectSettings& object, std::vector<std::stri
   if (object.made == "car") {
     render::MadeCarSettings car;
     car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
-    return render::made_car(car);
+    return without(render::made_car(car), object.hide);
   }
-  if (object.made == "lamp") return render::made_lamp(static_cast<float>(object.emission_gain));
-  SceneDescription thing = parts_of(make_thing(object.made), [&](const std::string& name) {
-    return std::ranges::find(object.hide, name) == object.hide.end();
-  });
+  if (object.made == "lamp") {
+    return without(render::made_lamp(static_cast<float>(object.emission_gain)), object.hide);
+  }
+  SceneDescription thing = without(make_thing(object.made), object.hide);
   for (render::Material& material : thing.materials) {
     if (material.shader != "standard") continue;
     render::StandardParameters p = standard_parameters(material, thing.textures.size());

@@ -12,6 +12,7 @@
 
 #include "capture/pool.h"
 #include "compositing/display.h"
+#include "compositing/exr_sequence.h"
 #include "render/kept_transport.h"
 #include "studio/handover.h"
 #include "studio/recording.h"
@@ -68,7 +69,7 @@ RecordingForm form_of(const FrameMaker& maker,
   return {set.show.width,       set.show.height,
           maker.rate(),         srgb ? capture::Transfer::srgb : capture::Transfer::rec1886,
           plate.sound_channels, plate.sound_rate,
-          std::move(display)};
+          plate.pixel_aspect,   std::move(display)};
 }
 
 }  // namespace
@@ -93,7 +94,7 @@ class Show::Stages {
     if (options.record && !s.record.is_empty()) {
       at_place(s, s.record.place, [&] {
         spare_sources(s, s.record);
-        recording_.start(s.record);
+        start_recording(s.record);
       });
     }
     tally_.status().effort = s.effort;
@@ -114,7 +115,7 @@ class Show::Stages {
   void run(const std::function<void(const ShownFrame&)>& on_frame) {
     std::future<void> inputs = std::async(std::launch::async, [this] { make_inputs(); });
     {
-      const Closing closing{work_};  // however this ends, the other thread must not wait for ever
+      const Ending ending{*this};  // however this ends, the other thread must not wait for ever
       while (std::optional<Work> work = work_.take()) {
         const Clock::time_point begin = Clock::now();
         show_frame(std::move(*work), on_frame);
@@ -122,6 +123,7 @@ class Show::Stages {
       }
     }
     recording_.stop();
+    inputs.wait();
     publish(true);
     inputs.get();
   }
@@ -139,6 +141,14 @@ class Show::Stages {
   struct Closing {
     Handover<Work>& work;
     ~Closing() { work.close(); }
+  };
+
+  struct Ending {
+    Stages& stages;
+    ~Ending() {
+      stages.post(Quit{});  // it may be paused
+      stages.work_.close();
+    }
   };
 
   std::optional<std::int64_t> frames_of_plate() const {
@@ -163,7 +173,10 @@ class Show::Stages {
       number = due.frame;
       const Clock::time_point begin = Clock::now();
       std::optional<PreparedFrame> frame = maker_.make_at(due);
-      if (!frame) return;
+      if (!frame) {
+        if (frames_) note(ended_early(made));
+        return;
+      }
       const Clock::duration making = Clock::now() - begin;
       work.frame = std::move(*frame);
       work.dropped = dropped;
@@ -175,6 +188,11 @@ class Show::Stages {
       if (made == 0 && !work_.wait_for_taker()) return;
       if (!work_.wait_for_taker(start_of_next(making))) return;
     }
+  }
+
+  std::string ended_early(std::int64_t made) const {
+    return "the plate ended after " + std::to_string(made) + " of " + std::to_string(*frames_) +
+           " frames: with camera.loop it begins again";
   }
 
   // When the frame after the one just taken is to be begun, so that it is ready in time if
@@ -344,10 +362,19 @@ class Show::Stages {
     shown.prepared.stage_ms[static_cast<std::size_t>(stage)] = ms.count();
   }
 
+  void start_recording(const RecordSettings& record) {
+    const std::int64_t before =
+        record.exr.empty() ? 0 : compositing::ExrSequence::frames_in(record.exr);
+    recording_.start(record);
+    if (before == 0) return;
+    note(record.exr + " has " + std::to_string(before) +
+         " frames already: those with numbers that are not recorded now stay among them");
+  }
+
   void apply(const RecorderCommand& command) {
     noting([&] {
       if (const auto* start = std::get_if<StartRecording>(&command)) {
-        recording_.start(start->record);
+        start_recording(start->record);
       } else {
         recording_.stop();
       }
@@ -363,6 +390,7 @@ class Show::Stages {
     {
       const std::lock_guard lock(mutex_);
       status.notes = notes_;
+      status.noted = noted_;
     }
     status_.store(std::make_shared<const ShowStatus>(status));
   }
@@ -384,6 +412,7 @@ class Show::Stages {
   void note(std::string what) {
     const std::lock_guard lock(mutex_);
     notes_.push_back(std::move(what));
+    ++noted_;
     if (notes_.size() > most_notes) notes_.erase(notes_.begin());
   }
 
@@ -414,11 +443,36 @@ class Show::Stages {
   std::condition_variable posted_;
   std::vector<ShowCommand> commands_;
   std::vector<std::string> notes_;
+  std::int64_t noted_ = 0;
   std::atomic<bool> paused_ = false;
   std::atomic<Clock::rep> rendering_ = 0;  // how long the last frame took from hand to hand
   Handover<Work> work_;
   std::atomic<std::shared_ptr<const ShowStatus>> status_;
 };
+
+void check_show(const Set& set) {
+  std::vector<Diagnostic> faults;
+  const auto collecting = [&](const auto& act) {
+    try {
+      act();
+    } catch (const SetError& error) {
+      faults.insert(faults.end(), error.diagnostics().begin(), error.diagnostics().end());
+    }
+  };
+  std::shared_ptr<const compositing::Display> display;
+  std::optional<FrameMaker> maker;
+  collecting([&] { display = make_display(set); });
+  collecting([&] { maker.emplace(set); });
+  if (display && maker && !set.record.is_empty()) {
+    collecting([&] {
+      at_place(set, set.record.place, [&] {
+        spare_sources(set, set.record);
+        Recording(form_of(*maker, display)).check(set.record);
+      });
+    });
+  }
+  if (!faults.empty()) throw SetError(std::move(faults));
+}
 
 Show::Show(Set set, ShowOptions options)
     : stages_(std::make_unique<Stages>(std::move(set), options)) {}

@@ -95,6 +95,7 @@ struct ShowStatus {
   compositing::RecorderStatus recorder;  // of the present or last recording
   bool finished = false;
   std::vector<std::string> notes;  // what went wrong without ending the show; the last ten
+  std::int64_t noted = 0;          // notes so far
 };
 
 // A finished picture with all that it came from.
@@ -114,6 +115,10 @@ struct ShowOptions {
   std::optional<capture::Rational> rate;  // in place of the set's
   bool record = true;                     // as the set says, from the first frame on
 };
+
+// Opens all that a show of the set would, and looks whether it could be displayed and recorded.
+// Shows and writes nothing. Throws SetError with the faults that only this finds.
+void check_show(const Set& set);
 
 // Inputs of a frame are made on a thread of the show's own while the frame before is rendered on
 // the caller's and oneTBB's. When not live, the frames are the same bits whatever the timing.

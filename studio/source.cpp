@@ -91,6 +91,15 @@ const capture::Frame& Source::wait_for_newer(capture::Time until, capture::Time 
   return newest();
 }
 
+void Source::read_sound_to(capture::Time time) {
+  if (live_ || info().sound_channels == 0) return;
+  while (!next_.empty() && next_.back().frame.time < time && next_.size() < most_waiting) {
+    const std::size_t before = next_.size();
+    read_ahead();
+    if (next_.size() == before) return;  // the end
+  }
+}
+
 std::vector<capture::Sound> Source::take_sound() { return std::exchange(sound_, {}); }
 
 }  // namespace studio

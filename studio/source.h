@@ -42,7 +42,10 @@ class Source {
   // Of a live camera: when the frame that at() gave last was there, on the monotonic clock.
   capture::Time arrived() const { return current_.arrived; }
 
-  // Sound up to the frames that at() has read so far, in order.
+  // Reads ahead as far as the sound up to this time takes, but no more than a few frames; nothing
+  // where there is no sound, and of a live camera.
+  void read_sound_to(capture::Time time);
+  // Sound up to the frames that were read so far, in order.
   std::vector<capture::Sound> take_sound();
 
  private:

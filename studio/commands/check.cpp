@@ -1,13 +1,16 @@
 // platelight check: names every fault of a set file.
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "studio/commands/commands.h"
 #include "studio/set.h"
+#include "studio/set_files.h"
 #include "studio/set_scene.h"
+#include "studio/show.h"
 
 namespace studio {
 namespace {
@@ -58,18 +61,42 @@ void say(const ModelReport& model, Console& console) {
   for (const std::string& note : r.notes) console.say("  note: " + note);
 }
 
+bool is_device(const std::string& uri) {
+  return uri.starts_with("v4l2:") || uri.starts_with("aravis:");
+}
+
+// Cameras that a set wants, which need not be there while it is written.
+std::vector<std::string> devices_of(const Set& set) {
+  std::vector<std::string> sources{set.camera.source};
+  if (set.probe) sources.push_back(set.probe->source);
+  for (const VideoSettings& video : set.videos) sources.push_back(video.source);
+  for (const PersonSettings& person : set.persons) {
+    for (const PersonCamera& camera : person.cameras) sources.push_back(camera.source);
+  }
+  std::erase_if(sources, [](const std::string& uri) { return !is_device(uri); });
+  return sources;
+}
+
 void check(const std::string& path, Console& console) {
   try {
     const Set set = read_set(path);
+    spare_sources(set, console.figures_file());
     const std::vector<ModelReport> models = check_models(set);
+    const std::vector<std::string> devices = devices_of(set);
+    if (devices.empty()) check_show(set);
     console.figures(nlohmann::ordered_json{{"diagnostics", nlohmann::json::array()},
                                            {"models", to_json(models)}}
                         .dump(2));
     for (const ModelReport& model : models) say(model, console);
     console.say(fmt::format("{}: good ({} objects, {} stand-ins)", path, set.objects.size(),
                             set.stand_ins.size()));
+    for (const std::string& device : devices) {
+      console.say(
+          fmt::format("  {} was not opened, and so no other source, nor the recording", device));
+    }
   } catch (const SetError& error) {
-    console.figures(nlohmann::ordered_json{{"diagnostics", to_json(error.diagnostics())}}.dump(2));
+    console.figures(nlohmann::ordered_json{{"diagnostics", to_json(error.diagnostics())}}.dump(
+        2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     throw;
   }
 }
@@ -77,7 +104,7 @@ void check(const std::string& path, Console& console) {
 }  // namespace
 
 Command check_command() {
-  return {"check", "Check a set file and its models, and name all their faults",
+  return {"check", "Check a set file, its models and its sources, and name all their faults",
           "platelight check studio/sets/desk_car.toml",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto path = std::make_shared<std::string>();

@@ -1,22 +1,26 @@
 // Commands that Ctrl-C ends as if their work were done.
 #pragma once
 
+#include <array>
 #include <csignal>
+#include <cstddef>
 
 namespace studio {
 
-// Until it goes out of scope, a first Ctrl-C or SIGTERM is only noted; the next one ends the
-// program. One at a time.
+// Until it goes out of scope, a first Ctrl-C, SIGTERM or SIGHUP (the terminal is gone) is only
+// noted; the next one ends the program. What the program was told to ignore stays so. One at a
+// time.
 class Interruptible {
  public:
   Interruptible() {
     noted_ = 0;
-    interrupt_ = std::signal(SIGINT, &Interruptible::note);
-    terminate_ = std::signal(SIGTERM, &Interruptible::note);
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+      before_[i] = std::signal(signals[i], &Interruptible::note);
+      if (before_[i] == SIG_IGN) std::signal(signals[i], SIG_IGN);
+    }
   }
   ~Interruptible() {
-    std::signal(SIGINT, interrupt_);
-    std::signal(SIGTERM, terminate_);
+    for (std::size_t i = 0; i < signals.size(); ++i) std::signal(signals[i], before_[i]);
   }
   Interruptible(const Interruptible&) = delete;
   Interruptible& operator=(const Interruptible&) = delete;
@@ -24,14 +28,15 @@ class Interruptible {
   bool is_interrupted() const { return noted_ != 0; }
 
  private:
+  static constexpr std::array signals{SIGINT, SIGTERM, SIGHUP};
+
   static void note(int signal) {
     noted_ = 1;
     std::signal(signal, SIG_DFL);
   }
 
   static inline volatile std::sig_atomic_t noted_ = 0;
-  void (*interrupt_)(int);
-  void (*terminate_)(int);
+  std::array<void (*)(int), signals.size()> before_{};
 };
 
 }  // namespace studio

@@ -27,6 +27,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::int64_t plate_frames = 50;
+constexpr double much_elsewhere = 0.1;  // share of a plate that is no screen
+constexpr double unsure = 0.5;          // confidence, in the mean
 
 struct KeyOptions {
   std::vector<std::string> what;
@@ -47,6 +49,9 @@ VideoSource source_of(const KeyOptions& options, const std::string& uri) {
 }
 
 void make_plate(const KeyOptions& options, Console& console) {
+  if (!options.out.ends_with(".exr")) {
+    throw std::invalid_argument(options.out + ": plates are OpenEXR files, name it *.exr");
+  }
   const VideoSource source = source_of(options, options.what.back());
   const auto camera = open_video(source);
   std::vector<capture::Image> frames;
@@ -61,6 +66,14 @@ void make_plate(const KeyOptions& options, Console& console) {
       options.person ? compositing::plate_from_footage(frames) : compositing::average_plate(frames);
   capture::write_exr(options.out, plate.light);
   const std::string_view colour = compositing::name_of(plate.colour);
+  const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
+  const bool by_screen = options.method == "screen";
+  if (by_screen && elsewhere > much_elsewhere) {
+    console.warn(fmt::format(
+        "{:.0f} % of the plate is not screen: if somebody is in the picture, take it anew or with "
+        "--person; what else it is, a garbage mask is to cut away",
+        100 * elsewhere));
+  }
   const double noise = std::sqrt(plate.noise_floor);
   console.figures(Json{{"frames", frames.size()},
                        {"width", plate.light.width},
@@ -113,6 +126,7 @@ void key_clip(const KeyOptions& options, Console& console) {
   capture::HalfImage matte;
   Json rows = Json::array();
   double least = 1, sum = 0, key_ms = 0;
+  std::string_view why = "good";  // of the least
   std::int64_t number = 0;
   for (; number < options.frames.value_or(INT64_MAX); ++number) {
     const auto frame = camera->next();
@@ -128,6 +142,7 @@ void key_clip(const KeyOptions& options, Console& console) {
       matte.pixels.push_back(keyed.pixels[i]);
     }
     sequence.write(number, keyed, matte, {});
+    if (report.confidence < least) why = compositing::name_of(report.status);
     least = std::min(least, double{report.confidence});
     sum += report.confidence;
     rows.push_back({{"frame", number + options.first.value_or(0)},
@@ -157,6 +172,9 @@ void key_clip(const KeyOptions& options, Console& console) {
                   "least; {:.1f} ms a "
                   "frame",
                   options.out, number, colour, sum / count, least, key_ms / count));
+  if (sum / count < unsure) {
+    console.warn(fmt::format("the key is unsure ({}): look at it before it is used", why));
+  }
 }
 
 void key(const KeyOptions& options, Console& console) {

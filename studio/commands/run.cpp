@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -83,22 +85,36 @@ void report_progress(const ShowStatus& status,
   console.progress(share, text);
 }
 
-// Tells what goes wrong, each thing once and as soon as the show tells it; where notes are very
-// many, the rest of them at the end.
+// Tells what goes wrong, each thing once and as soon as the show tells it, and once more after
+// every edit; where notes are very many, the rest of them at the end.
 class Warnings {
  public:
   explicit Warnings(Console& console) : console_(console) {}
 
   void tell(const ShowStatus& status) {
     constexpr std::size_t most = 20;
+    const std::lock_guard lock(mutex_);
     if (!status.recorder.error.empty()) tell(status.recorder.error);
     if (told_.size() < most) tell_notes(status);
   }
-  void tell_notes(const ShowStatus& status) {
-    for (const std::string& note : status.notes) tell(note);
+  void tell_rest(const ShowStatus& status) {
+    const std::lock_guard lock(mutex_);
+    tell_notes(status);
+  }
+  // From any thread: what an edit leads to is told although one before led to it as well.
+  void tell_again() {
+    const std::lock_guard lock(mutex_);
+    told_.clear();
   }
 
  private:
+  void tell_notes(const ShowStatus& status) {
+    const std::vector<std::string>& notes = status.notes;
+    const auto fresh = static_cast<std::ptrdiff_t>(std::min(
+        static_cast<std::size_t>(std::max<std::int64_t>(status.noted - seen_, 0)), notes.size()));
+    for (auto note = notes.end() - fresh; note != notes.end(); ++note) tell(*note);
+    seen_ = status.noted;
+  }
   void tell(const std::string& what) {
     if (std::ranges::find(told_, what) != told_.end()) return;
     console_.warn(what);
@@ -106,8 +122,26 @@ class Warnings {
   }
 
   Console& console_;
+  std::mutex mutex_;
   std::vector<std::string> told_;
+  std::int64_t seen_ = 0;  // notes that were looked at
 };
+
+// Sections of a set whose changes a running show does not take over.
+std::vector<const char*> changed_at_start(const Set& on_air, const Set& changed) {
+  std::vector<const char*> sections;
+  const DisplayChoice &d = on_air.display, &e = changed.display;
+  if (d.display != e.display || d.view != e.view || d.tone != e.tone) sections.push_back("display");
+  const RecordSettings &r = on_air.record, &s = changed.record;
+  if (r.file != s.file || r.exr != s.exr || r.fill != s.fill || r.key != s.key ||
+      r.codec != s.codec || r.timecode != s.timecode) {
+    sections.push_back("record");
+  }
+  if (on_air.show.frames != changed.show.frames || on_air.show.sharpen != changed.show.sharpen) {
+    sections.push_back("show");
+  }
+  return sections;
+}
 
 void report_end(const ShowStatus& status, const Set& set, Console& console) {
   console.say(
@@ -160,11 +194,13 @@ void run(const RunOptions& options, Console& console) {
   show_options.frames = options.frames;
   for (const std::string& written : {options.view_png, console.figures_file()}) {
     spare_sources(set, written);
+    spare_take(set.record, written);
   }
   Show show(set, show_options);
   if (!options.view.empty()) show.post(SetView{render::ray_view_named(options.view)});
   const std::optional<std::int64_t> planned = show.planned_frames();
 
+  Warnings warnings(console);
   std::unique_ptr<SetWatch> watch;
   if (options.watch) {
     watch = std::make_unique<SetWatch>(
@@ -173,13 +209,16 @@ void run(const RunOptions& options, Console& console) {
           apply_options(options, changed);
           if (options.fps || options.error) changed.effort = effort;
           console.say(fmt::format("{} has changed", options.set));
+          warnings.tell_again();
+          for (const char* section : changed_at_start(set, changed)) {
+            console.warn(fmt::format("[{}] counts from the next start on", section));
+          }
           show.post(ChangeSet{std::move(changed)});
         },
         [&](const SetError& error) { console.warn(error.what()); });
   }
 
   ShownFrame last;
-  Warnings warnings(console);
   {
     const Interruptible ctrl_c;
     show.run([&](const ShownFrame& shown) {
@@ -195,7 +234,7 @@ void run(const RunOptions& options, Console& console) {
   watch.reset();
 
   const ShowStatus status = *show.status();
-  warnings.tell_notes(status);
+  warnings.tell_rest(status);
   report_end(status, set, console);
   if (!options.view_png.empty() && last.view_rgb8) {
     capture::write_png(options.view_png, set.show.width, set.show.height, 3, *last.view_rgb8);

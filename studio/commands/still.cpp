@@ -33,11 +33,15 @@ void still(const StillOptions& options, Console& console) {
   for (const std::string& written : {options.out, console.figures_file()}) {
     spare_sources(set, written);
   }
+  if (!options.out.ends_with(".png")) {
+    throw std::invalid_argument(options.out + ": stills are PNG files, name it *.png");
+  }
   Show show(set, show_options);
   if (!options.view.empty()) show.post(SetView{render::ray_view_named(options.view)});
   ShownFrame shown;
   show.run([&](const ShownFrame& frame) { shown = frame; });
   if (!shown.rgb8) throw std::runtime_error(set.path + ": the plate has no such frame");
+  for (const std::string& note : show.status()->notes) console.warn(note);
 
   std::vector<std::uint8_t> picture = shown.view_rgb8 ? *shown.view_rgb8 : *shown.rgb8;
   draw_overlays(set, shown, options.overlays, picture);

@@ -24,7 +24,16 @@ namespace {
 using testing::HasSubstr;
 
 constexpr const char* good_set =
-    "[show]\nwidth = 64\nheight = 48\n[camera]\nsource = \"made:grey\"\n";
+    "[show]\nwidth = 64\nheight = 48\n[camera]\nsource = \"file:plate.png\"\n";
+
+// Writes such a set, and its plate.
+class CheckedSets : public CommandLine {
+ protected:
+  std::string write_good(const std::string& more = "") const {
+    capture::write_png(dir_ / "plate.png", 64, 48, 3, std::vector<std::uint8_t>(64 * 48 * 3, 120));
+    return write("a.toml", good_set + more);
+  }
+};
 
 TEST_F(CommandLine, ShowsAnExampleOfEveryCommand) {
   for (const Command& command : commands()) {
@@ -103,23 +112,23 @@ TEST_F(CommandLine, RecordsLiveCamerasOnly) {
   EXPECT_EQ(run("capture play v4l2:/dev/none " + take).status, 2);
 }
 
-TEST_F(CommandLine, ReturnsOneWhenTheFiguresCannotBeWritten) {
+TEST_F(CheckedSets, ReturnOneWhenTheFiguresCannotBeWritten) {
   const Outcome outcome =
-      run("check " + write("a.toml", good_set) + " --json " + (dir_ / "no/such/dir.json").string());
+      run("check " + write_good() + " --json " + (dir_ / "no/such/dir.json").string());
   EXPECT_EQ(outcome.status, 1);
   expect_one_line(outcome.err);
 }
 
-TEST_F(CommandLine, ChecksAGoodSet) {
-  const std::string set = write("a.toml", good_set);
+TEST_F(CheckedSets, AreGood) {
+  const std::string set = write_good();
   const Outcome outcome = run("check " + set);
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr(set + ": good"));
   EXPECT_EQ(outcome.err, "");
 }
 
-TEST_F(CommandLine, SaysNothingWhenQuiet) {
-  const Outcome outcome = run("check --quiet " + write("a.toml", good_set));
+TEST_F(CheckedSets, SayNothingWhenQuiet) {
+  const Outcome outcome = run("check --quiet " + write_good());
   EXPECT_EQ(outcome.status, 0);
   EXPECT_EQ(outcome.out + outcome.err, "");
 }
@@ -136,14 +145,14 @@ TEST_F(CommandLine, NamesAllFaultsOfASetAndWritesThemAsFigures) {
   EXPECT_THAT(content_of(json), HasSubstr("\"column\": 10"));
 }
 
-TEST_F(CommandLine, ChecksTheModelsOfASet) {
-  const std::string set = good_set + std::string(
-                                         "lens = { model = \"pinhole\", focal_px = 60 }\n"
-                                         "pose = { position = [0, -6, 1], look_at = [0, 0, 0] }\n"
-                                         "[[object]]\nname = \"sign\"\nmesh = \"sign.obj\"\n");
+TEST_F(CheckedSets, AreCheckedWithTheirModels) {
+  const std::string more = std::string(
+      "lens = { model = \"pinhole\", focal_px = 60 }\n"
+      "pose = { position = [0, -6, 1], look_at = [0, 0, 0] }\n"
+      "[[object]]\nname = \"sign\"\nmesh = \"sign.obj\"\n");
   write("sign.obj", "mtllib lost.mtl\no board\nv 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n");
   const std::string json = (dir_ / "figures.json").string();
-  const Outcome good = run("check " + write("a.toml", set) + " --json " + json);
+  const Outcome good = run("check " + write_good(more) + " --json " + json);
   EXPECT_EQ(good.status, 0) << good.err;
   EXPECT_THAT(good.out, HasSubstr("sign: " + (dir_ / "sign.obj").string()));
   EXPECT_THAT(good.out, HasSubstr("1 triangles, 3 vertices"));
@@ -275,7 +284,7 @@ TEST_F(Runs, EndOnASignalWithTheirTakeWhole) {
   write_set();  // its plate
   const std::string set = write_made_set(dir_, "file:plate_0.png");
   const std::string take = (dir_ / "take.mkv").string(), json_path = (dir_ / "run.json").string();
-  for (const char* signal : {"INT", "TERM"}) {
+  for (const char* signal : {"INT", "TERM", "HUP"}) {
     const Outcome outcome =
         run("run " + set + " --frames 1000000 --record " + take + " --json " + json_path,
             "timeout --preserve-status -s " + std::string(signal) + " 4");
@@ -287,6 +296,27 @@ TEST_F(Runs, EndOnASignalWithTheirTakeWhole) {
     const auto camera = capture::open_camera("file:" + take);
     EXPECT_EQ(camera->info().frames, json["frames"]);
   }
+}
+
+TEST_F(Runs, AreCheckedUpToTheirDisplayAndTake) {
+  const auto faults_of = [&](const std::string& more,
+                             const std::string& source = "file:plate_%d.png") {
+    write_set();
+    return run("check " + write_made_set(dir_, source, more)).err;
+  };
+  EXPECT_EQ(faults_of(""), "");
+  EXPECT_THAT(faults_of("[display]\ndisplay = \"none such\"\n"), HasSubstr("none such"));
+  EXPECT_THAT(faults_of("[record]\nfile = \"no/folder/take.mkv\"\n"), HasSubstr("take.mkv"));
+  EXPECT_FALSE(fs::exists(dir_ / "no"));
+  EXPECT_THAT(faults_of("[record]\nfile = \"t.mkv\"\ntimecode = \"hello\"\n"), HasSubstr("hello"));
+  EXPECT_THAT(faults_of("[record]\nfile = \"t.mkv\"\ntimecode = \"25:00:00:00\"\n"),
+              HasSubstr("25:00:00:00"));
+  EXPECT_FALSE(fs::exists(dir_ / "t.mkv"));
+  const std::vector<std::uint8_t> large(66 * 48 * 3, 120);
+  capture::write_png(dir_ / "large.png", 66, 48, 3, large);
+  EXPECT_THAT(faults_of("", "file:large.png"), HasSubstr("66x48"));
+  EXPECT_THAT(faults_of("[[video]]\nsource = \"file:large.png\"\nobject = \"kube\"\n"),
+              HasSubstr("is shown nowhere"));
 }
 
 TEST_F(Runs, AreNotRecordedOverWhatTheirSetIsMadeFrom) {
@@ -304,6 +334,19 @@ TEST_F(Runs, AreNotRecordedOverWhatTheirSetIsMadeFrom) {
   expect_spared("run " + set + " --record " + (dir_ / "." / "take.mkv").string(), take);
   expect_spared("run " + set + " --json " + set, set);
   expect_spared("still " + set + " -o " + set, set);
+  expect_spared("check " + set + " --json " + set, set);
+  write_set();
+  expect_spared("still " + set + " -o " + (dir_ / "plate_1.png").string(),
+                (dir_ / "plate_1.png").string());
+  write("cube.mtl", "newmtl paint\nmap_Kd paint.png\n");
+  capture::write_png(dir_ / "paint.png", 1, 1, 3, std::vector<std::uint8_t>(3, 200));
+  expect_spared("still " + set + " -o " + (dir_ / "paint.png").string(),
+                (dir_ / "paint.png").string());
+  EXPECT_THAT(run("still " + set + " -o " + (dir_ / "still.jpg").string()).err,
+              HasSubstr("PNG files"));
+  const std::string both = (dir_ / "both.mkv").string();
+  EXPECT_THAT(run("run " + set + " --record " + both + " --json " + both).err,
+              HasSubstr("would be lost"));
   write_made_set(dir_, "file:take/frame.%06d.exr");
   expect_spared("run " + set + " --exr " + frames, frames + "/frame.000000.exr");
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <fstream>
 #include <stdexcept>
 
@@ -16,7 +17,6 @@
 namespace studio::set_change_test {
 namespace {
 
-using testing::Contains;
 using testing::ElementsAre;
 using testing::Gt;
 using testing::HasSubstr;
@@ -243,6 +243,19 @@ TEST_F(SetChangeTest, TheProbesCameraRunsOn) {
   EXPECT_GT(maker.make(23).value().probe.frames, after.probe.frames);
 }
 
+// Who would never be seen.
+TEST_F(SetChangeTest, APersonByItsFeetNeedsAMatte) {
+  try {
+    FrameMaker maker(person_set("sole:0",
+                                "lens = { model = \"pinhole\", focal_px = 60, size = [64, 32] }\n"
+                                "pose = { position = [0, -4, 1.4], look_at = [0, 0, 0.9] }\n"
+                                "feet = \"auto\"\n"));
+    ADD_FAILURE();
+  } catch (const SetError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("needs a key"));
+  }
+}
+
 // Of shows, beside whose frames the edit is made.
 TEST_F(SetChangeTest, LiveCamerasAreOpenedOnceInAShowThatIsEditedAgainAndAgain) {
   const auto set = [&](int edit, const std::string& probe = "") {
@@ -251,6 +264,9 @@ TEST_F(SetChangeTest, LiveCamerasAreOpenedOnceInAShowThatIsEditedAgainAndAgain) 
                                  "position = [0, 0, 0]\nheight = {}\n",
                                  2 + edit));
   };
+  std::vector<Set> edits;
+  for (int n = 4; n < 30; n += 5) edits.push_back(set(n));
+  edits.push_back(set(0, "colour = \"sRGB\"\n"));
   ShowOptions options;
   options.live = true;
   options.frames = 40;
@@ -259,8 +275,7 @@ TEST_F(SetChangeTest, LiveCamerasAreOpenedOnceInAShowThatIsEditedAgainAndAgain) 
   show.run([&](const ShownFrame& shown) {
     const auto n = static_cast<int>(numbers.size());
     numbers.push_back(shown_number(shown.prepared));
-    if (n % 5 == 4 && n < 30) show.post(ChangeSet{set(n)});
-    if (n == 32) show.post(ChangeSet{set(0, "colour = \"sRGB\"\n")});
+    if (n % 5 == 4 && n < 35) show.post(ChangeSet{edits[static_cast<std::size_t>(n / 5)]});
   });
   EXPECT_TRUE(std::ranges::is_sorted(numbers)) << testing::PrintToString(numbers);
   EXPECT_THAT(numbers.back(), Gt(30));

@@ -8,8 +8,13 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <functional>
+#include <iterator>
+#include <stdexcept>
 #include <thread>
 
+#include "capture/png.h"
+#include "studio/set_scene.h"
 #include "studio/tone_follower.h"
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
@@ -19,6 +24,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using testing::Contains;
+using testing::ElementsAre;
 using testing::HasSubstr;
 
 using ShowTest = MadeShowTest;
@@ -134,6 +140,151 @@ TEST_F(ShowTest, PassesOverPicturesOfALivePlateThatIsFaster) {
   show.run([&](const ShownFrame& shown) { times.push_back(shown.prepared.job.time); });
   for (std::size_t i = 1; i < times.size(); ++i) EXPECT_GE(times[i] - times[i - 1], 37ms);
   EXPECT_LE(times.size(), 20U);
+}
+
+// Says 50 frames a second, but its frames come as `step` has it, and are counted one by one.
+class UnevenCamera final : public GreyCamera {
+ public:
+  UnevenCamera(std::int64_t frames, std::function<capture::Time(std::int64_t)> step)
+      : GreyCamera(frames, {50, 1}, 0), step_(std::move(step)), time_(capture::monotonic_now()) {
+    info_.live = true;
+  }
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (!frame) return frame;
+    frame->time = time_ += step_(frame->number);
+    std::this_thread::sleep_for(frame->time - capture::monotonic_now());
+    return frame;
+  }
+
+ private:
+  std::function<capture::Time(std::int64_t)> step_;
+  capture::Time time_;
+};
+
+// A take's frames are counted by its clock, or it would play too fast.
+TEST_F(ShowTest, CountsALivePlatesFramesByItsClockWhereTheCameraIsAnotherOneThanItSays) {
+  std::function<capture::Time(std::int64_t)> step;
+  capture::register_camera("uneven", [&](std::string_view rest, const capture::CameraOptions&) {
+    return std::make_unique<UnevenCamera>(std::stol(std::string(rest)), step);
+  });
+  const auto expect_by_clock = [&](const char* frames) {
+    Show show(made_set("uneven:" + std::string(frames)));
+    std::optional<capture::Time> first;
+    show.run([&](const ShownFrame& shown) {
+      const render::FrameJob& job = shown.prepared.job;
+      if (!first) first = job.time;
+      const double place = 50 * std::chrono::duration<double>(job.time - *first).count();
+      EXPECT_NEAR(static_cast<double>(job.frame), place, 2.01);
+    });
+    EXPECT_GT(show.status()->frames, 5);
+  };
+  step = [](std::int64_t) { return 50ms; };  // as in the dark
+  expect_by_clock("20");
+  step = [](std::int64_t n) { return n == 10 ? capture::Time(900ms) : capture::Time(20ms); };
+  expect_by_clock("30");
+  step = [](std::int64_t) { return 16ms; };
+  expect_by_clock("60");
+}
+
+TEST_F(ShowTest, EndsWhereItsUserThrowsWhileItIsPaused) {
+  ShowOptions options;
+  options.frames = 1000;
+  Show show(made_set("grey:1,25,0"), options);
+  const auto run = [&] {
+    show.run([&](const ShownFrame&) {
+      show.post(SetPaused{true});
+      std::this_thread::sleep_for(50ms);
+      throw std::runtime_error("its window is gone");
+    });
+  };
+  EXPECT_THROW(run(), std::runtime_error);
+}
+
+// Frames that are rendered later see what they were made with.
+TEST_F(ShowTest, ChangesNoLightThatWasHandedOut) {
+  FrameMaker maker(made_set("grey:1,25,0"));
+  const PreparedFrame first = maker.make(0).value();
+  const auto smoothed = first.environment->smoothed.back().pixels;
+  const bool apart = first.environment->compact_apart;
+  const std::size_t diffused = first.environment->diffused.size();
+  render::Effort effort = maker.set().effort;
+  effort.light_samples = 256;
+  maker.set_effort(effort);
+  const PreparedFrame second = maker.make(1).value();
+  EXPECT_NE(second.environment, first.environment);
+  EXPECT_EQ(first.environment->compact_apart, apart);
+  EXPECT_EQ(first.environment->diffused.size(), diffused);
+  EXPECT_EQ(first.environment->smoothed.back().pixels, smoothed);
+}
+
+TEST_F(ShowTest, NotesAPlateThatEndsEarly) {
+  ShowOptions options;
+  options.frames = 9;
+  Show show(made_set("grey:4,25,0"), options);
+  show.run();
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("ended after 4 of 9 frames")));
+}
+
+TEST_F(ShowTest, NotesLostFramesOfThePlateOnceInARow) {
+  Show show(made_set("grey:9,25,4"));
+  show.run();
+  const std::vector<std::string> notes = show.status()->notes;
+  EXPECT_EQ(std::ranges::count_if(notes,
+                                  [](const std::string& note) {
+                                    return note.find("the plate's frame") != std::string::npos;
+                                  }),
+            2);
+}
+
+TEST_F(ShowTest, NotesThatTheCamerasTrackHasEnded) {
+  std::ofstream(dir_ / "track.csv") << "time_s,px,py,pz,qw,qx,qy,qz\n"
+                                       "0,0,-8,4,0.7,-0.7,0,0\n0.1,0,-8,4,0.7,-0.7,0,0\n";
+  Set set = made_set("grey:9,25,0");
+  set.camera.pose.track = (dir_ / "track.csv").string();
+  Show show(set);
+  show.run();
+  EXPECT_THAT(show.status()->notes, ElementsAre(HasSubstr("no pose at 0.120 s")));
+}
+
+TEST_F(ShowTest, GoesOnRecordingWhereTheNextTakeCannotBe) {
+  ShowOptions options;
+  options.frames = 12;
+  Show show(made_set("grey:1,25,0"), options);
+  RecordSettings good, bad;
+  good.exr = (dir_ / "take").string();
+  bad.exr = good.exr;
+  bad.timecode = "99:00:00:00";
+  show.post(StartRecording{good});
+  show.run([&](const ShownFrame& shown) {
+    if (shown.prepared.job.frame == 2) show.post(StartRecording{bad});
+  });
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("99:00:00:00")));
+  EXPECT_EQ(show.status()->recorder.written, 12);
+  // Another show says what is there.
+  Show again(made_set("grey:1,25,0"), options);
+  again.post(StartRecording{good});
+  again.run();
+  EXPECT_THAT(again.status()->notes, Contains(HasSubstr("has 12 frames already")));
+}
+
+TEST_F(ShowTest, HidesPartsOfMadeThings) {
+  const auto parts_with = [&](const std::string& hide) {
+    const Set set = made_set("grey:1,25,0", "[[object]]\nmade = \"car\"\n" + hide);
+    return describe_scene(set).description.instances.size();
+  };
+  const Set set = made_set("grey:1,25,0", "[[object]]\nname = \"car\"\nmade = \"car\"\n");
+  const SetScene whole = describe_scene(set);
+  const auto part = std::ranges::find(whole.parts, std::size_t{1}, &ObjectPart::object);
+  ASSERT_NE(part, whole.parts.end());
+  EXPECT_LT(parts_with("hide = [\"" + part->name + "\"]\n"), whole.description.instances.size());
+  try {
+    parts_with("hide = [\"no such part\"]\n");
+    ADD_FAILURE();
+  } catch (const SetError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("cannot hide 'no such part': its parts are"));
+    EXPECT_THAT(error.what(), HasSubstr(part->name));
+  }
 }
 
 TEST_F(ShowTest, DropsPicturesOfALivePlateThatItIsTooSlowFor) {
@@ -392,6 +543,28 @@ TEST_F(ShowTest, TakesATonesCurveFromThePicturesBefore) {
   EXPECT_EQ(codes, first_codes);
   EXPECT_EQ(pictures_of(set, {}, 0ms), pictures_of(made_set("grey:6,25,0"), {}, 0ms))
       << "what is recorded as EXR is linear";
+}
+
+TEST_F(ShowTest, RefusesACroppedPlateOfALensForAnotherSize) {
+  const std::vector<std::uint8_t> grey(128 * 96 * 3, 120);
+  capture::write_png(dir_ / "plate.png", 128, 96, 3, grey);
+  const auto set_of = [&](const char* size) {
+    const std::string path = write_made_set(dir_, "file:plate.png");
+    std::ifstream in(path);
+    std::string text{std::istreambuf_iterator<char>(in), {}};
+    const std::string lens = "focal_px = 60\n";
+    text.replace(text.find(lens), lens.size(),
+                 lens + "size = " + size + "\ncrop = [10, 10, 64, 48]\n");
+    std::ofstream(path) << text;
+    return read_set(path);
+  };
+  EXPECT_TRUE(FrameMaker(set_of("[128, 96]")).make(0));
+  try {
+    FrameMaker maker(set_of("[256, 192]"));
+    ADD_FAILURE();
+  } catch (const SetError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("128x96, but its lens is for 256x192"));
+  }
 }
 
 TEST_F(ShowTest, RefusesAPlateOfAnotherSizeAtItsPlace) {

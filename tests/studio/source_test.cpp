@@ -103,6 +103,47 @@ TEST(Source, KeepsTheNewestLiveFramesWhileNobodyAsks) {
   EXPECT_FALSE(source.at(capture::Time::max())) << "it has ended";
 }
 
+// Of 25 frames a second, with a sample of sound a millisecond.
+class HummingCamera final : public GreyCamera {
+ public:
+  explicit HummingCamera(std::int64_t frames) : GreyCamera(frames, {25, 1}, 0) {
+    info_.sound_channels = 1;
+    info_.sound_rate = 1000;
+  }
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (frame) heard_ = frame->time;
+    return frame;
+  }
+  std::optional<capture::Sound> take_sound() override {
+    if (!heard_) return std::nullopt;
+    capture::Sound sound{*heard_, 1, 1000, std::vector<float>(40, 0.5F)};
+    heard_.reset();
+    return sound;
+  }
+
+ private:
+  std::optional<capture::Time> heard_;
+};
+
+TEST(Source, ReadsTheSoundOfFramesThatAShowPassesOver) {
+  Source source(std::make_unique<HummingCamera>(25));
+  std::size_t samples = 0;
+  for (int frame = 0; frame < 5; ++frame) {  // at five frames a second
+    ASSERT_TRUE(source.at(frame * 200ms));
+    source.read_sound_to((frame + 1) * 200ms);
+    for (const capture::Sound& sound : source.take_sound()) samples += sound.samples.size();
+    EXPECT_GE(samples, static_cast<std::size_t>(frame + 1) * 200);
+  }
+  EXPECT_EQ(samples, 1000U);
+  source.read_sound_to(1000s);
+  Source far(std::make_unique<HummingCamera>(100000));
+  far.read_sound_to(1000s);
+  samples = 0;
+  for (const capture::Sound& sound : far.take_sound()) samples += sound.samples.size();
+  EXPECT_LT(samples, 1000U) << "no more pictures are held than a few";
+}
+
 TEST(Source, RefusesACameraWithoutFrames) { EXPECT_THROW(grey_source(0, 25), std::runtime_error); }
 
 TEST(Quantiles, AreRightToOnePercent) {
