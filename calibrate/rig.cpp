@@ -78,16 +78,17 @@ double rms_px(std::span<const Sight> sights, const Pose& cam_from_board) {
   return std::sqrt(sum / static_cast<double>(sights.size()));
 }
 
-// The board turned by half about its middle, as a place in its own frame.
-Pose half_turn(const Board& board) {
-  const Vec3 last = corner_of(board, board.corner_count() - 1);
-  return {{{-1, 0, 0, 0, -1, 0, 0, 0, 1}}, last};
-}
-
-// How a view may be counted: as it is and, for chessboards, from the other end.
+// How a view may be counted, as places of the board in its own frame: as it is and, for
+// chessboards, from the other end; from all four corners of those that a quarter turn leaves alike.
 std::vector<Pose> countings(const Board& board) {
   std::vector<Pose> result{Pose{}};
-  if (board.kind == Board::Kind::chessboard) result.push_back(half_turn(board));
+  if (board.kind != Board::Kind::chessboard) return result;
+  const Vec3 last = corner_of(board, board.corner_count() - 1);
+  result.push_back({{{-1, 0, 0, 0, -1, 0, 0, 0, 1}}, last});
+  if (board.columns == board.rows && board.columns % 2 == 0) {
+    result.push_back({{{0, -1, 0, 1, 0, 0, 0, 0, 1}}, {last.x, 0, 0}});
+    result.push_back({{{0, 1, 0, -1, 0, 0, 0, 0, 1}}, {0, last.y, 0}});
+  }
   return result;
 }
 

@@ -54,7 +54,8 @@ struct RigFit {
 // Triggs et al., "Bundle Adjustment - A Modern Synthesis", 1999, section 6, with lenses held, after
 // a start from pairs of cameras that share the most views. Robust at first (Cauchy's loss), then
 // plain squares over corners within 4.5 standard deviations. A chessboard that looks the same after
-// half a turn may be counted from either end: that is found out.
+// half a turn may be counted from either end, one of as many rows as columns, if they are even,
+// from any of its four corners: that is found out.
 //
 // Throws std::invalid_argument: a bad board or lens, fewer than two cameras, a name that is empty
 // or twice, views that are not as many as the first camera's or not of the board's corners, noise

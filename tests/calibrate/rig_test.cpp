@@ -28,10 +28,13 @@ struct MadeRig {
 
 // A plate camera, a second one beside it and rolled, and a fish-eye that looks up between them. The
 // board moves before them; each sees it if it is in its picture.
-MadeRig made_rig(std::size_t instants, double noise_px, unsigned seed) {
+MadeRig made_rig(std::size_t instants,
+                 double noise_px,
+                 unsigned seed,
+                 const Board& of_rig = made_board()) {
   made::Random random(seed);
   MadeRig rig;
-  rig.problem.board = made_board();
+  rig.problem.board = of_rig;
   rig.problem.cameras = {
       {"plate", normal_lens(), {}}, {"side", normal_lens(), {}}, {"probe", made::fish_eye(), {}}};
   const Pose first = look_at({0, 0, 1.5}, {0, 3, 1.2}, 0.02);
@@ -139,6 +142,23 @@ TEST(FitRig, FindsOutFromWhichEndAChessboardWasCounted) {
   const made::PoseError error = made::error_of(fit.cameras[1].cam_from_rig, rig.cam_from_rig[1]);
   EXPECT_LT(error.turn_rad, 0.1 * degree);
   EXPECT_LT(error.position_m, 0.003);
+}
+
+TEST(FitRig, FindsOutFromWhichCornerASquareBoardWasCounted) {
+  MadeRig rig = made_rig(12, 0.2, 4, {Board::Kind::chessboard, 8, 8, .04, 0, ""});
+  for (std::size_t i = 0; i < 12; ++i) {
+    auto& corners = rig.problem.cameras[1].views[i].corners;
+    const std::size_t quarters = i % 4;
+    for (std::size_t turn = 0; turn < quarters; ++turn) {
+      const auto before = corners;
+      for (std::size_t k = 0; k < 64; ++k) corners[k] = before[8 * (k % 8) + 7 - k / 8];
+    }
+  }
+  const RigFit fit = fit_rig(rig.problem);
+  const made::PoseError error = made::error_of(fit.cameras[1].cam_from_rig, rig.cam_from_rig[1]);
+  EXPECT_LT(error.turn_rad, 0.1 * degree);
+  EXPECT_LT(error.position_m, 0.003);
+  EXPECT_EQ(fit.cameras[1].left_out, 0U);
 }
 
 TEST(FitRig, ChainsCamerasThatNeverSeeTheSame) {
