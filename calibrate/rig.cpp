@@ -97,13 +97,16 @@ struct Best {
   double error_px = HUGE_VAL;
 };
 
-// b_from_a that explains best what camera b saw at all instants, from one of them.
+// b_from_a that explains best what camera b saw at all instants, from one of them. Of a board that
+// never moves all countings explain as much: it is counted as it is.
 Best relation(const std::vector<std::optional<Seen>>& a,
               const std::vector<std::optional<Seen>>& b,
               const std::vector<Pose>& countings) {
+  constexpr double clearly = 0.8;
   Best best;
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (!a[i] || !b[i]) continue;
+    Best of_instant;
     for (const Pose& counting : countings) {
       const Pose b_from_a = b[i]->cam_from_board * counting * inverse(a[i]->cam_from_board);
       double error = 0;
@@ -115,8 +118,9 @@ Best relation(const std::vector<std::optional<Seen>>& a,
         }
         error += least;
       }
-      if (error < best.error_px) best = {b_from_a, error};
+      if (error < clearly * of_instant.error_px) of_instant = {b_from_a, error};
     }
+    if (of_instant.error_px < best.error_px) best = of_instant;
   }
   return best;
 }
@@ -244,6 +248,82 @@ std::vector<std::uint8_t> solve(Start& start, double noise_px) {
   return used;
 }
 
+// Corners of one camera at one instant.
+struct Share {
+  std::size_t used = 0;
+  std::size_t all = 0;
+};
+
+std::string words_of(const std::vector<std::string>& instants) {
+  constexpr std::size_t most = 5;
+  std::string words;
+  for (std::size_t i = 0; i < std::min(most, instants.size()); ++i) {
+    words += (i == 0 ? "" : ", ") + instants[i];
+  }
+  if (instants.size() > most) words += " and " + std::to_string(instants.size() - most) + " more";
+  return words;
+}
+
+// Counts corners and boards in use. Throws if most of a camera's are not, warns if many are not.
+void judge(RigFit& fit,
+           const RigProblem& problem,
+           const Start& start,
+           std::span<const std::uint8_t> used) {
+  constexpr double many = 0.1;
+  const std::size_t boards = start.instants.size();
+  std::vector<Share> shares(problem.cameras.size() * boards);
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    const RigCorner& corner = start.corners[i];
+    Share& share = shares[corner.camera * boards + corner.board];
+    share.used += used[i];
+    ++share.all;
+  }
+  std::string worst;
+  double least = 1;
+  for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
+    RigCameraFit& camera = fit.cameras[c];
+    std::vector<std::string> wrong;
+    for (std::size_t b = 0; b < boards; ++b) {
+      const Share& share = shares[c * boards + b];
+      if (share.all == 0) continue;
+      ++camera.views;
+      camera.corners += share.used;
+      camera.left_out += share.all - share.used;
+      if (2 * share.used >= share.all) {
+        ++camera.boards;
+      } else {
+        const std::string& name = problem.cameras[c].views[start.instants[b]].name;
+        wrong.push_back(name.empty() ? "number " + std::to_string(start.instants[b]) : name);
+      }
+    }
+    const std::size_t all = camera.corners + camera.left_out;
+    if (all == 0) continue;
+    const double kept = static_cast<double>(camera.corners) / static_cast<double>(all);
+    const std::string left_out =
+        std::to_string(camera.left_out) + " of " + std::to_string(all) + " corners";
+    if (2 * camera.corners < all || 2 * camera.boards < camera.views ||
+        (camera.boards < 2 && camera.views > 1)) {
+      if (worst.empty() || kept < least) {
+        least = kept;
+        worst = "the boards of camera " + problem.cameras[c].name +
+                " do not agree with the others' (" + left_out + " are far off" +
+                (wrong.empty() ? "" : "; the instants " + words_of(wrong)) +
+                "): check that pictures belong to the same instants, and that each lens is its "
+                "camera's";
+      }
+    } else if (!wrong.empty()) {
+      fit.warnings.push_back(problem.cameras[c].name +
+                             ": most of the board does not agree with the other cameras', and is "
+                             "left out, at these instants: " +
+                             words_of(wrong));
+    } else if (1 - kept > many) {
+      fit.warnings.push_back(problem.cameras[c].name + ": " + left_out +
+                             " do not agree with the other cameras' and are left out");
+    }
+  }
+  if (!worst.empty()) throw std::runtime_error(worst);
+}
+
 // The camera's own part of everything's covariance.
 void tell_uncertainty(RigCameraFit& fit,
                       std::span<const double> all,
@@ -281,21 +361,15 @@ RigFit fit_rig(const RigProblem& problem, const RigOptions& options) {
   fit.rig_from_board.resize(problem.cameras[0].views.size());
   for (std::size_t b = 0; b < start.instants.size(); ++b) {
     fit.rig_from_board[start.instants[b]] = start.bundle.rig_from_board[b];
-    for (std::size_t c = 0; c < seen.size(); ++c) {
-      if (seen[c][start.instants[b]]) ++fit.cameras[c].views;
-    }
   }
+  judge(fit, problem, start, used);
   double squares = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < used.size(); ++i) {
     RigCameraFit& camera = fit.cameras[start.corners[i].camera];
-    if (used[i] == 0) {
-      ++camera.left_out;
-      continue;
-    }
+    if (used[i] == 0) continue;
     const double r = length_px(start.corners[i], start.bundle);
     camera.rms_px += r * r;
-    ++camera.corners;
     squares += r * r;
     ++count;
   }

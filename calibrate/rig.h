@@ -41,6 +41,7 @@ struct RigCameraFit {
   std::size_t views = 0;        // that another camera has, too
   std::size_t corners = 0;      // in use
   std::size_t left_out = 0;     // corners taken for wrong
+  std::size_t boards = 0;       // views of which half the corners or more are in use
 };
 
 struct RigFit {
@@ -48,6 +49,7 @@ struct RigFit {
   // Per instant; nothing where fewer than two cameras saw the board.
   std::vector<std::optional<Pose>> rig_from_board;
   double rms_px = 0;
+  std::vector<std::string> warnings;  // for people
 };
 
 // Poses of cameras and boards that explain all corners best: bundle adjustment over both, as in
@@ -59,7 +61,8 @@ struct RigFit {
 //
 // Throws std::invalid_argument: a bad board or lens, fewer than two cameras, a name that is empty
 // or twice, views that are not as many as the first camera's or not of the board's corners, noise
-// that is not above 0; std::runtime_error naming the cameras that share no view with the others.
+// that is not above 0; std::runtime_error naming the cameras that share no view with the others, or
+// one of whose corners or boards less than half, or but one board of several, agree with the rest.
 RigFit fit_rig(const RigProblem& problem, const RigOptions& options = {});
 
 }  // namespace calibrate

@@ -271,7 +271,9 @@ void calibrate_rig(const RigOptions& options, Console& console) {
   }
   calibrate::write_rig(options.out, members,
                        fmt::format("by platelight calibrate rig, {:.2f} px off", fit.rms_px));
-  console.figures(Json{{"rms_px", fit.rms_px}, {"cameras", cameras}}.dump(2));
+  console.figures(
+      Json{{"rms_px", fit.rms_px}, {"cameras", cameras}, {"warnings", fit.warnings}}.dump(2));
+  for (const std::string& warning : fit.warnings) console.warn(warning);
   console.say(
       fmt::format("{}: {} cameras, {:.2f} px off", options.out, sources.size(), fit.rms_px));
 }

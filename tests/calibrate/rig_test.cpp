@@ -185,6 +185,44 @@ TEST(FitRig, RaisesItsUncertaintyIfALensIsWrong) {
   EXPECT_GT(fit.cameras[1].position_sigma_m, 1.5 * before);
 }
 
+TEST(FitRig, RefusesACameraWhosePicturesAreOfOtherInstants) {
+  MadeRig rig = made_rig(12, 0.1, 4);
+  auto& views = rig.problem.cameras[1].views;
+  std::ranges::rotate(views, views.begin() + 1);
+  for (std::size_t i = 0; i < 12; ++i) views[i].name = "instant " + std::to_string(i);
+  EXPECT_THAT(reason_of(rig.problem), HasSubstr("the boards of camera side do not agree"));
+  rig.problem.cameras.pop_back();
+  EXPECT_THAT(reason_of(rig.problem), HasSubstr("the boards of camera side do not agree"));
+  EXPECT_THAT(reason_of(rig.problem), HasSubstr("instant"));
+}
+
+TEST(FitRig, NamesInstantsThatDoNotBelongTogether) {
+  MadeRig rig = made_rig(12, 0.1, 4);
+  EXPECT_TRUE(fit_rig(rig.problem).warnings.empty());
+  auto& views = rig.problem.cameras[1].views;
+  std::swap(views[2].corners, views[7].corners);
+  const RigFit fit = fit_rig(rig.problem);
+  EXPECT_THAT(fit.warnings, testing::Contains(testing::AllOf(HasSubstr("side: "),
+                                                             HasSubstr("instant 2, instant 7"))));
+  const made::PoseError error = made::error_of(fit.cameras[1].cam_from_rig, rig.cam_from_rig[1]);
+  EXPECT_LT(error.position_m, 0.003);
+}
+
+TEST(FitRig, CountsABoardThatNeverMovesAsItIs) {
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    MadeRig rig = made_rig(1, 0.1, seed);
+    for (RigCamera& camera : rig.problem.cameras) {
+      camera.views.resize(5, camera.views[0]);
+    }
+    const RigFit fit = fit_rig(rig.problem);
+    for (std::size_t c = 1; c < 3; ++c) {
+      const made::PoseError error =
+          made::error_of(fit.cameras[c].cam_from_rig, rig.cam_from_rig[c]);
+      EXPECT_LT(error.position_m, 0.05);
+    }
+  }
+}
+
 TEST(FitRig, NamesCamerasThatShareNoView) {
   MadeRig rig = made_rig(12, 0.2, 8);
   for (BoardView& view : rig.problem.cameras[2].views) view.corners.clear();
