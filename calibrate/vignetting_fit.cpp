@@ -67,79 +67,136 @@ std::vector<double> residuals_of(const Places& places, std::span<const double> t
   return residuals;
 }
 
-// Gauss-Newton; `used` says which samples count.
-std::vector<double> solve(const Places& places, int count, const std::vector<bool>& used) {
-  std::vector<double> terms(static_cast<std::size_t>(count), 0.0);
-  constexpr int rounds = 20;
-  for (int round = 0; round < rounds && count > 0; ++round) {
-    const std::vector<double> residuals = residuals_of(places, terms);
+// In spreads: residuals from here on pull less and less.
+constexpr double loss_width = 3;
+
+// Cauchy's, of the samples in use.
+double loss_of(std::span<const double> residuals, const std::vector<bool>& used, double spread) {
+  const double width = loss_width * spread;
+  double loss = 0;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (used[i]) loss += std::log1p(residuals[i] * residuals[i] / (width * width));
+  }
+  return loss;
+}
+
+// A step of Gauss and Newton from `terms`, whose residuals are known.
+Eigen::VectorXd step_from(const Places& places,
+                          std::span<const double> terms,
+                          const std::vector<bool>& used,
+                          std::span<const double> residuals,
+                          double spread) {
+  const auto count = static_cast<Eigen::Index>(terms.size());
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(count, count);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
+  for (std::size_t p = 0; p + 1 < places.begins.size(); ++p) {
+    // The derivatives of log sensitivity, less their weighted mean over the place.
+    double weights = 0;
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(count);
+    double mean_residual = 0;
+    std::vector<std::pair<Eigen::VectorXd, double>> rows;
+    std::vector<double> row_weights;
+    for (std::size_t i = places.begins[p]; i < places.begins[p + 1]; ++i) {
+      if (!used[i]) continue;
+      const double angle = places.samples[i].angle_rad;
+      const double s = std::max(least_sensitivity, sensitivity(terms, angle));
+      Eigen::VectorXd row(count);
+      double power = 1;
+      for (Eigen::Index t = 0; t < count; ++t) row[t] = (power *= angle * angle) / s;
+      const double width = loss_width * spread;
+      const double weight = 1 / (1 + residuals[i] * residuals[i] / (width * width));
+      mean += weight * row;
+      mean_residual += weight * residuals[i];
+      weights += weight;
+      rows.emplace_back(std::move(row), residuals[i]);
+      row_weights.push_back(weight);
+    }
+    if (rows.size() < 2) continue;
+    mean /= weights;
+    mean_residual /= weights;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const Eigen::VectorXd row = rows[i].first - mean;
+      matrix += row_weights[i] * row * row.transpose();
+      right += row_weights[i] * (rows[i].second - mean_residual) * row;
+    }
+  }
+  matrix.diagonal().array() += 1e-9 * std::max(1.0, matrix.diagonal().maxCoeff());
+  return matrix.ldlt().solve(right);
+}
+
+// From the terms given, by Gauss-Newton whose steps are halved while the loss rises: where a lens
+// dims to a tenth, a full one from no terms ends below zero. `used` says which samples count.
+std::vector<double> solve(const Places& places,
+                          std::vector<double> terms,
+                          const std::vector<bool>& used) {
+  constexpr int rounds = 30;
+  constexpr int most_halvings = 12;
+  std::vector<double> residuals = residuals_of(places, terms);
+  for (int round = 0; round < rounds && !terms.empty(); ++round) {
     std::vector<double> sizes;
     for (const double r : residuals) sizes.push_back(std::abs(r));
     const double spread = std::max(1e-6, 1.4826 * median_of(std::move(sizes)));
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(count, count);
-    Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
-    for (std::size_t p = 0; p + 1 < places.begins.size(); ++p) {
-      // The derivatives of log sensitivity, less their weighted mean over the place.
-      double weights = 0;
-      Eigen::VectorXd mean = Eigen::VectorXd::Zero(count);
-      double mean_residual = 0;
-      std::vector<std::pair<Eigen::VectorXd, double>> rows;
-      std::vector<double> row_weights;
-      for (std::size_t i = places.begins[p]; i < places.begins[p + 1]; ++i) {
-        if (!used[i]) continue;
-        const double angle = places.samples[i].angle_rad;
-        const double s = std::max(least_sensitivity, sensitivity(terms, angle));
-        Eigen::VectorXd row(count);
-        double power = 1;
-        for (int t = 0; t < count; ++t) row[t] = (power *= angle * angle) / s;
-        constexpr double width_squared = 9;
-        const double weight =
-            1 / (1 + residuals[i] * residuals[i] / (spread * spread * width_squared));
-        mean += weight * row;
-        mean_residual += weight * residuals[i];
-        weights += weight;
-        rows.emplace_back(std::move(row), residuals[i]);
-        row_weights.push_back(weight);
-      }
-      if (rows.size() < 2) continue;
-      mean /= weights;
-      mean_residual /= weights;
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        const Eigen::VectorXd row = rows[i].first - mean;
-        matrix += row_weights[i] * row * row.transpose();
-        right += row_weights[i] * (rows[i].second - mean_residual) * row;
+    const double loss = loss_of(residuals, used, spread);
+    Eigen::VectorXd step = step_from(places, terms, used, residuals, spread);
+    bool better = false;
+    for (int halving = 0; halving < most_halvings && !better; ++halving, step *= 0.5) {
+      std::vector<double> next = terms;
+      for (std::size_t t = 0; t < next.size(); ++t) next[t] += step[static_cast<Eigen::Index>(t)];
+      std::vector<double> left = residuals_of(places, next);
+      better = loss_of(left, used, spread) <= loss;
+      if (better) {
+        terms = std::move(next);
+        residuals = std::move(left);
       }
     }
-    matrix.diagonal().array() += 1e-9 * std::max(1.0, matrix.diagonal().maxCoeff());
-    const Eigen::VectorXd step = matrix.ldlt().solve(right);
-    for (int t = 0; t < count; ++t) terms[static_cast<std::size_t>(t)] += step[t];
-    if (step.cwiseAbs().maxCoeff() < 1e-7) break;
+    if (!better || step.cwiseAbs().maxCoeff() < 1e-7) break;
   }
   return terms;
 }
 
-// Places are held out; samples, where there is one place.
-double heldout_error(const Places& places, int count) {
+// Of each count of terms from none on, each from the one before.
+std::vector<std::vector<double>> solve_all(const Places& places, const std::vector<bool>& used) {
+  std::vector<std::vector<double>> all{{}};
+  for (int count = 1; count <= most_terms; ++count) {
+    std::vector<double> start = all.back();
+    start.push_back(0);
+    all.push_back(solve(places, std::move(start), used));
+  }
+  return all;
+}
+
+// Of each count of terms. Places are held out; samples, where there is one place.
+std::vector<double> heldout_errors(const Places& places) {
   const bool one_place = places.begins.size() == 2;
-  std::vector<double> squares;
+  std::vector<std::vector<double>> squares(most_terms + 1);
   for (int fold = 0; fold < folds; ++fold) {
     std::vector<bool> used(places.samples.size(), true);
     for (std::size_t i = 0; i < used.size(); ++i) {
       const std::size_t key = one_place ? i : places.samples[i].place;
       if (key * 2654435761U % 4294967296U % folds == static_cast<unsigned>(fold)) used[i] = false;
     }
-    const std::vector<double> residuals = residuals_of(places, solve(places, count, used));
-    for (std::size_t i = 0; i < used.size(); ++i) {
-      if (!used[i]) squares.push_back(residuals[i] * residuals[i]);
+    const std::vector<std::vector<double>> solved = solve_all(places, used);
+    for (std::size_t count = 0; count < solved.size(); ++count) {
+      const std::vector<double> residuals = residuals_of(places, solved[count]);
+      for (std::size_t i = 0; i < used.size(); ++i) {
+        if (!used[i]) squares[count].push_back(residuals[i] * residuals[i]);
+      }
     }
   }
-  if (squares.empty()) return std::numeric_limits<double>::infinity();
-  // Without the largest hundredth: what moved.
-  std::sort(squares.begin(), squares.end());
-  squares.resize(std::max<std::size_t>(1, squares.size() - squares.size() / 100));
-  double sum = 0;
-  for (const double square : squares) sum += square;
-  return std::sqrt(sum / static_cast<double>(squares.size()));
+  std::vector<double> errors;
+  for (std::vector<double>& of_count : squares) {
+    if (of_count.empty()) {
+      errors.push_back(std::numeric_limits<double>::infinity());
+      continue;
+    }
+    // Without the largest hundredth: what moved.
+    std::sort(of_count.begin(), of_count.end());
+    of_count.resize(std::max<std::size_t>(1, of_count.size() - of_count.size() / 100));
+    double sum = 0;
+    for (const double square : of_count) sum += square;
+    errors.push_back(std::sqrt(sum / static_cast<double>(of_count.size())));
+  }
+  return errors;
 }
 
 void check(std::span<const VignettingSample> samples, const Places& places) {
@@ -209,16 +266,23 @@ VignettingFit fit_vignetting(std::span<const VignettingSample> samples) {
   check(samples, places);
   VignettingFit fit;
   double best = std::numeric_limits<double>::infinity();
-  for (int count = 0; count <= most_terms; ++count) {
-    fit.candidates.push_back({count, heldout_error(places, count)});
-    best = std::min(best, fit.candidates.back().heldout_error);
+  for (const double error : heldout_errors(places)) {
+    fit.candidates.push_back({static_cast<int>(fit.candidates.size()), error});
+    best = std::min(best, error);
   }
   constexpr double as_good = 1.1;
   const auto chosen =
       std::find_if(fit.candidates.begin(), fit.candidates.end(),
                    [&](const auto& c) { return c.heldout_error <= as_good * best; });
-  fit.terms = solve(places, chosen->terms, std::vector<bool>(places.samples.size(), true));
+  fit.terms = solve_all(places, std::vector<bool>(places.samples.size(),
+                                                  true))[static_cast<std::size_t>(chosen->terms)];
   fit.heldout_error = chosen->heldout_error;
+  constexpr double large = 0.1;
+  if (!(fit.heldout_error < large)) {
+    fit.warnings.emplace_back(
+        "no terms explain the shots: check that the field is even, or that poses belong to the "
+        "shots and the scene stands still, and that the lens is this camera's");
+  }
   for (const VignettingSample& sample : samples) {
     fit.max_angle_rad = std::max(fit.max_angle_rad, sample.angle_rad);
   }

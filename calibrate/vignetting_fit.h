@@ -29,10 +29,12 @@ struct VignettingFit {
   double heldout_error = 0;
   double max_angle_rad = 0;  // that was seen; beyond it the terms are a guess
   std::vector<VignettingCandidate> candidates;
+  std::vector<std::string> warnings;  // for people; held-out errors of 10 % and more have one
 };
 
 // The fewest terms, none to four, whose error on held-out places is within a tenth of the best.
-// The light of each place is eliminated; Cauchy's loss, so that what moved hardly pulls. An even
+// The light of each place is eliminated; Cauchy's loss, so that what moved hardly pulls; each count
+// of terms starts from the one before, and its steps are halved while the loss rises. An even
 // field is a single place (then angles are held out). Differences of logarithms between samples of
 // one place tell the sensitivity: Goldman, "Vignette and Exposure Calibration and Compensation",
 // IEEE PAMI 32(12), 2010, section 3, with our even polynomial of the angle.

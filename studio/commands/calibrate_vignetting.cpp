@@ -117,13 +117,17 @@ void calibrate_vignetting(const VignettingOptions& options, Console& console) {
       {"heldout_error", fit.heldout_error},
       {"seen_deg", seen_deg},
       {"samples", samples.size()},
-      {"candidates",
-       candidates}}.dump(2));
+      {"candidates", candidates},
+      {"warnings",
+       fit.warnings}}.dump(2));
+  for (const std::string& warning : fit.warnings) console.warn(warning);
   if (fit.max_angle_rad < 0.95 * lens.max_angle_rad) {
     console.warn(fmt::format("no light was seen beyond {:.0f} degrees: there the terms are a guess",
                              seen_deg));
   }
-  if (fit.terms.empty()) {
+  if (fit.terms.empty() && !fit.warnings.empty()) {
+    console.say("vignetting is not told");
+  } else if (fit.terms.empty()) {
     console.say("even: a set needs no vignetting for it");
   } else {
     std::string terms;

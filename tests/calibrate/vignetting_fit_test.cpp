@@ -98,6 +98,45 @@ TEST(FitVignetting, TellsALensFromAnEvenField) {
   }
 }
 
+// Samples of an even field whose light falls with the angle as told, noise .5 %.
+template <class Falloff>
+std::vector<VignettingSample> field_of(double rim_rad, Falloff falloff) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(1, 0.005);
+  std::vector<VignettingSample> samples;
+  for (int i = 0; i < 2000; ++i) {
+    const double angle = rim_rad * std::sqrt((i + 0.5) / 2000);
+    samples.push_back({0, angle, 0.5 * falloff(angle) * normal(random)});
+  }
+  return samples;
+}
+
+TEST(FitVignetting, TellsLensesThatDimToATenth) {
+  for (const double power : {2.5, 3.0, 3.5, 4.0}) {  // of a fish-eye, to .27 and .10
+    const auto falloff = [&](double angle) { return std::pow(std::cos(0.6 * angle), power); };
+    const VignettingFit fit = fit_vignetting(field_of(93 * degree, falloff));
+    EXPECT_LT(fit.heldout_error, 0.01) << power;
+    EXPECT_TRUE(fit.warnings.empty());
+    for (double angle = 0; angle < 93 * degree; angle += 0.02) {
+      EXPECT_NEAR(sensitivity(fit.terms, angle) / falloff(angle), 1, 0.03) << power << " " << angle;
+    }
+  }
+  for (const double corner_deg : {40.0, 50.0, 55.0}) {  // of a pinhole, to .11
+    const auto falloff = [](double angle) { return std::pow(std::cos(angle), 4); };
+    const VignettingFit fit = fit_vignetting(field_of(corner_deg * degree, falloff));
+    EXPECT_LT(fit.heldout_error, 0.01) << corner_deg;
+    for (double angle = 0; angle < corner_deg * degree; angle += 0.02) {
+      EXPECT_NEAR(sensitivity(fit.terms, angle) / falloff(angle), 1, 0.03) << corner_deg;
+    }
+  }
+}
+
+TEST(FitVignetting, WarnsOfAFieldThatNoTermsExplain) {
+  const VignettingFit fit = fit_vignetting(
+      field_of(80 * degree, [](double angle) { return 0.6 + 0.5 * std::sin(40 * angle); }));
+  EXPECT_EQ(fit.warnings.size(), 1U);
+}
+
 TEST(FitVignetting, GivesAnEvenLensNoTerms) {
   const Turned made = turned({}, 0.02);
   const VignettingFit fit = fit_vignetting(turned_samples(made.shots(), fish_eye(), 100));
