@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <unordered_map>
+#include <unordered_set>
 
 #include <Eigen/Dense>
 
@@ -56,6 +58,24 @@ double spread_of(std::span<const double> errors) {
 double weight_of(double error, double spread) {
   const double r = error / (loss_width * spread);
   return 1 / (1 + r * r);
+}
+
+// Each pair's thing, counted from 0 by first appearance, and how many there are.
+struct Things {
+  std::vector<std::size_t> of_pair;
+  std::size_t count = 0;
+};
+
+Things things_of(std::span<const LightPair> pairs) {
+  Things things;
+  std::unordered_map<std::size_t, std::size_t> known;
+  for (const LightPair& pair : pairs) {
+    const bool own = pair.thing == LightPair::of_its_own;
+    const auto at = own ? known.end() : known.try_emplace(pair.thing, things.count).first;
+    things.of_pair.push_back(own ? things.count : at->second);
+    things.count = std::max(things.count, things.of_pair.back() + 1);
+  }
+  return things;
 }
 
 // Logarithms of the gains and of every frame's exposure.
@@ -173,9 +193,9 @@ std::optional<Eigen::Matrix3d> solve_matrix(std::span<const LightPair> pairs,
   return matrix;
 }
 
-// RMS without the worst tenth: what moved, or was in another light.
+// RMS without the worst tenth: what moved, or was in another light. Of none, not a number.
 double error_without_worst(std::vector<double> errors) {
-  if (errors.empty()) return 0;
+  if (errors.empty()) return std::numeric_limits<double>::quiet_NaN();
   for (double& e : errors) e = std::abs(e);
   std::ranges::sort(errors);
   errors.resize(std::max<std::size_t>(1, errors.size() - errors.size() / 10));
@@ -189,13 +209,13 @@ struct HeldOut {
   std::optional<double> matrix;
 };
 
-HeldOut hold_out(std::span<const LightPair> pairs, bool try_matrix) {
+HeldOut hold_out(std::span<const LightPair> pairs, const Things& things, bool try_matrix) {
   std::vector<double> by_gains;
   std::vector<double> by_matrix;
   bool solved = try_matrix;
   for (std::size_t fold = 0; fold < folds; ++fold) {
     Used used(pairs.size(), true);
-    for (std::size_t i = fold; i < used.size(); i += folds) used[i] = false;
+    for (std::size_t i = 0; i < used.size(); ++i) used[i] = things.of_pair[i] % folds != fold;
     const Logs logs = solve_gains(pairs, used);
     const auto matrix = solved ? solve_matrix(pairs, logs, used) : std::nullopt;
     solved = solved && matrix.has_value();
@@ -204,8 +224,8 @@ HeldOut hold_out(std::span<const LightPair> pairs, bool try_matrix) {
     for (std::size_t i = 0; i < used.size(); ++i) {
       if (used[i]) known[pairs[i].frame] = true;
     }
-    for (std::size_t i = fold; i < used.size(); i += folds) {
-      if (!known[pairs[i].frame]) continue;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      if (used[i] || !known[pairs[i].frame]) continue;
       for (std::size_t c = 0; c < 3; ++c) {
         by_gains.push_back(std::expm1(-error_of(pairs[i], c, logs)));
         if (!solved) continue;
@@ -217,7 +237,7 @@ HeldOut hold_out(std::span<const LightPair> pairs, bool try_matrix) {
     }
   }
   HeldOut result{error_without_worst(by_gains), std::nullopt};
-  if (solved) result.matrix = error_without_worst(by_matrix);
+  if (solved && !by_matrix.empty()) result.matrix = error_without_worst(by_matrix);
   return result;
 }
 
@@ -247,28 +267,62 @@ void set_exposures(std::span<const LightPair> pairs, const Logs& logs, LightGain
   }
 }
 
-void set_sigmas(std::span<const LightPair> pairs, const Logs& logs, LightGain& fit) {
-  for (std::size_t c = 0; c < 3; ++c) {
-    std::vector<double> errors;
-    for (const LightPair& pair : pairs) errors.push_back(error_of(pair, c, logs));
-    const double spread = spread_of(errors);
-    double sum = 0;
-    double slope = 0;
-    for (const double e : errors) {  // Huber's sandwich
-      const double r = e / (loss_width * spread);
-      const double weight = 1 / (1 + r * r);
-      sum += weight * e * weight * e;
-      slope += weight * weight * (1 - r * r);
-    }
-    const auto n = static_cast<double>(pairs.size());
-    fit.sigma[c] = pairs.size() > 1 && slope > 0 ? std::sqrt(sum * n / (n - 1)) / slope : 1;
-  }
+// Of the gains at the first frame's exposure: what each thing's errors do to them together, the
+// other frames' exposures eliminated.
+void set_sigmas(std::span<const LightPair> pairs,
+                const Things& things,
+                const Logs& logs,
+                LightGain& fit) {
   const Used all(pairs.size(), true);
   const double spread = spread_of(errors_of(pairs, logs, all));
+  std::size_t first = logs.exposure.size();
   for (const LightPair& pair : pairs) {
+    first = std::min(first, pair.frame);
     double worst = 0;
     for (std::size_t c = 0; c < 3; ++c) worst = std::max(worst, std::abs(error_of(pair, c, logs)));
     fit.left_out += worst > left_out_beyond * spread ? 1 : 0;
+  }
+  fit.sigma.fill(1);
+  std::unordered_set<std::size_t> in_first;
+  std::vector<Eigen::Vector3d> slopes(logs.exposure.size(), Eigen::Vector3d::Zero());
+  const auto index = [](std::size_t c) { return static_cast<Eigen::Index>(c); };
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (pairs[i].frame == first) in_first.insert(things.of_pair[i]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double r = error_of(pairs[i], c, logs) / (loss_width * spread);
+      const double weight = 1 / (1 + r * r);
+      slopes[pairs[i].frame][index(c)] += weight * weight * (1 - r * r);
+    }
+  }
+  if (in_first.size() < 2) return;  // the scale rests on a single thing
+  Eigen::Matrix3d matrix = slopes[first].asDiagonal();
+  // How a frame's errors shift its exposure; a frame of outliers tells nothing.
+  const auto told = [&](std::size_t f) { return slopes[f].minCoeff() > 0; };
+  for (std::size_t f = 0; f < slopes.size(); ++f) {
+    if (f == first || !told(f)) continue;
+    matrix += Eigen::Matrix3d(slopes[f].asDiagonal());
+    matrix -= slopes[f] * slopes[f].transpose() / slopes[f].sum();
+  }
+  std::vector<Eigen::Vector3d> pulls(things.count, Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const std::size_t f = pairs[i].frame;
+    if (f != first && !told(f)) continue;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double error = error_of(pairs[i], c, logs);
+      const double pull = weight_of(error, spread) * error;
+      pulls[things.of_pair[i]][index(c)] += pull;
+      if (f != first) pulls[things.of_pair[i]] -= pull / slopes[f].sum() * slopes[f];
+    }
+  }
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& pull : pulls) squares += pull * pull.transpose();
+  const Eigen::LLT<Eigen::Matrix3d> solver(matrix);
+  if (!told(first) || solver.info() != Eigen::Success) return;
+  const Eigen::Matrix3d inverse = solver.solve(Eigen::Matrix3d::Identity());
+  const auto n = static_cast<double>(in_first.size());
+  const Eigen::Matrix3d covariance = n / (n - 1) * inverse * squares * inverse;
+  for (std::size_t c = 0; c < 3; ++c) {
+    fit.sigma[c] = std::sqrt(covariance(index(c), index(c)));
   }
 }
 
@@ -280,17 +334,22 @@ LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOption
   const Logs logs = solve_gains(pairs, all);
   LightGain fit;
   set_exposures(pairs, logs, fit);
-  set_sigmas(pairs, logs, fit);
-  if (pairs.size() < fewest_for_folds) {
-    fit.warnings.push_back("the gains rest on " + std::to_string(pairs.size()) +
-                           (pairs.size() == 1 ? " thing" : " things") +
+  const Things things = things_of(pairs);
+  set_sigmas(pairs, things, logs, fit);
+  if (things.count < fewest_for_folds) {
+    fit.warnings.push_back("the gains rest on " + std::to_string(things.count) +
+                           (things.count == 1 ? " thing" : " things") +
                            " only, and nothing is left to check them by");
     fit.heldout_error = std::numeric_limits<double>::quiet_NaN();
     return fit;
   }
-  const HeldOut held_out = hold_out(pairs, pairs.size() >= fewest_for_matrix);
+  const HeldOut held_out = hold_out(pairs, things, things.count >= fewest_for_matrix);
   fit.heldout_error = held_out.gains;
   fit.matrix_heldout_error = held_out.matrix;
+  if (std::isnan(held_out.gains)) {
+    fit.warnings.emplace_back(
+        "every frame shows a single thing, and nothing is left to check the gains by");
+  }
   // Of greys, a matrix would only average the channels' noise.
   constexpr double colours_over_noise = 5;
   if (held_out.matrix && held_out.gains > options.good_enough &&

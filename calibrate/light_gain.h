@@ -15,6 +15,9 @@ struct LightPair {
   std::array<double, 3> probe{};  // what the probe's light makes it send, in the probe's units, > 0
   std::array<double, 3> plate{};  // what the plate shows, linear, > 0
   std::size_t frame = 0;          // of the plate, whose exposure may change from frame to frame
+  // Pairs of one thing, in several frames, err alike: more of them tell the gains no better.
+  static constexpr std::size_t of_its_own = static_cast<std::size_t>(-1);
+  std::size_t thing = of_its_own;
 };
 
 struct LightGainOptions {
@@ -26,10 +29,11 @@ struct LightGainOptions {
 
 struct LightGain {
   std::array<double, 3> gain{1, 1, 1};  // plate = gain * probe * exposure of the frame
-  std::array<double, 3> sigma{};        // relative
+  std::array<double, 3> sigma{};        // relative; 1 if the first frame has one thing only
   // Row by row, in place of the gains where held-out pairs ask for it.
   std::optional<std::array<double, 9>> matrix;
-  double heldout_error = 0;  // relative RMS of the gains, of pairs that took no part
+  // Relative RMS of the gains, of things that took no part; not a number if none could be judged.
+  double heldout_error = 0;
   std::optional<double> matrix_heldout_error;  // nothing if there are too few pairs to try
   // The plate's exposure by frame, the first that pairs are of being 1; 0 where no pair is of it.
   std::vector<double> exposures;
@@ -38,8 +42,10 @@ struct LightGain {
 };
 
 // Gains by Cauchy's loss on the logarithms of plate over probe, one exposure a frame solved along
-// with them; the matrix by the same loss on relative errors. Held out is every fifth pair in turn,
-// and the worst tenth of them does not count. Throws std::invalid_argument for values that are not
+// with them; the matrix by the same loss on relative errors. Held out is every fifth thing in turn,
+// from all frames, and the worst tenth of errors does not count; uncertainties, too, are by things
+// (Liang and Zeger, "Longitudinal Data Analysis using Generalized Linear Models", Biometrika 73(1),
+// 1986). Throws std::invalid_argument for values that are not
 // finite and above 0, std::runtime_error if there is no pair.
 LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOptions& options = {});
 

@@ -152,6 +152,7 @@ std::vector<OverlapTexel> find_overlap(const capture::Image& plate,
     if (!seen || texel.pixels < least_pixels_per_texel) continue;
     OverlapTexel both;
     both.pixels = texel.pixels;
+    both.texel = t;
     for (std::size_t c = 0; c < 3; ++c) {
       both.plate[c] = texel.sum[c] / static_cast<float>(texel.pixels);
       both.probe[c] = counted_radiance(env.radiance.pixels[3 * t + c]);

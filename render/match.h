@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +34,7 @@ struct OverlapTexel {
   std::array<float, 3> plate{};  // mean of its pixels
   std::array<float, 3> probe{};  // its radiance
   int pixels = 0;                // of the plate
+  std::size_t texel = 0;         // of the environment, row by row
 };
 
 // Texels that a whole plate tells, neither clipped nor dark, and that the probe saw. Both are taken

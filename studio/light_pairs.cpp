@@ -25,6 +25,7 @@ std::vector<calibrate::LightPair> light_pairs_of(std::span<const render::Overlap
     std::ranges::copy(both.probe, pair.probe.begin());
     std::ranges::copy(both.plate, pair.plate.begin());
     pair.frame = frame;
+    pair.thing = both.texel;
     add_light_pair(pair, pairs);
   }
   return pairs;

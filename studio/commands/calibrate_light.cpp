@@ -98,7 +98,8 @@ void add_patches(const std::vector<PaintedPatch>& patches,
                  const render::Environment& env,
                  std::size_t frame,
                  std::vector<calibrate::LightPair>& pairs) {
-  for (const PaintedPatch& patch : patches) {
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    const PaintedPatch& patch = patches[p];
     const render::Vec3f light =
         render::irradiance_of(env, calibrate::to_float(normalize(patch.normal)));
     const auto match = render::match_by_patch(plate, patch.place, patch.albedo, light);
@@ -110,7 +111,7 @@ void add_patches(const std::vector<PaintedPatch>& patches,
       sent[c] = patch.albedo[c] * irradiance[c] / std::numbers::pi;
       shown[c] = sent[c] * match.gain[c];
     }
-    add_light_pair({sent, shown, frame}, pairs);
+    add_light_pair({sent, shown, frame, p}, pairs);
   }
 }
 

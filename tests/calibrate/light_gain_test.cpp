@@ -86,6 +86,56 @@ TEST(FitLightGain, TakesOneGreyCardAndSaysThatItIsOne) {
   EXPECT_TRUE(std::isnan(fit.heldout_error));
 }
 
+TEST(FitLightGain, TakesManyFramesOfOneGreyCardForOneThing) {
+  made::Random random(3);
+  auto pairs = made_pairs(25, diagonal(made_gain), 0.01, random);
+  for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i].frame = i;
+  const LightGain apart = fit_light_gain(pairs);  // of one thing each
+  EXPECT_THAT(apart.warnings, ElementsAre(HasSubstr("nothing is left to check")));
+  EXPECT_TRUE(std::isnan(apart.heldout_error));
+  EXPECT_THAT(apart.sigma, ElementsAre(1, 1, 1));
+  for (LightPair& pair : pairs) pair.thing = 7;
+  const LightGain fit = fit_light_gain(pairs);
+  EXPECT_THAT(fit.warnings, ElementsAre(HasSubstr("1 thing only")));
+  EXPECT_TRUE(std::isnan(fit.heldout_error));
+  EXPECT_THAT(fit.sigma, ElementsAre(1, 1, 1));
+}
+
+TEST(FitLightGain, KnowsHowRightItIsFromManyFramesOfThings) {
+  // Each thing errs by 5 % in all frames alike. Of plates that stand still all frames show all of
+  // them, else 20 of 60 each.
+  made::Random random(8);
+  for (const bool still : {true, false}) {
+    constexpr int cases = 30;
+    double squares = 0;
+    for (int i = 0; i < cases; ++i) {
+      auto things = made_pairs(60, diagonal(made_gain), 0.01, random);
+      for (LightPair& thing : things) {
+        const double common = std::exp(0.05 * random.normal());
+        for (double& value : thing.plate) value *= common;
+      }
+      std::vector<LightPair> pairs;
+      for (std::size_t frame = 0; frame < 10; ++frame) {
+        const double exposure = frame == 0 ? 1 : std::exp(0.1 * random.normal());
+        for (std::size_t k = 0; k < 60; ++k) {
+          if (!still && (k + 6 * frame) % 60 >= 20) continue;
+          LightPair pair = things[k];
+          pair.thing = k;
+          pair.frame = frame;
+          for (double& value : pair.plate) value *= exposure * std::exp(0.005 * random.normal());
+          pairs.push_back(pair);
+        }
+      }
+      const LightGain fit = fit_light_gain(pairs);
+      EXPECT_NEAR(fit.heldout_error, 0.045, 0.02);
+      const double error = std::log(fit.gain[1] / made_gain[1]) / fit.sigma[1];
+      squares += error * error / cases;
+    }
+    EXPECT_GT(squares, 0.45) << still;
+    EXPECT_LT(squares, 1.8) << still;
+  }
+}
+
 TEST(FitLightGain, TakesAMatrixOnlyWhereHeldOutPairsAskForIt) {
   const std::array<double, 9> mixed{0.9, 0.25, -0.05, 0.1, 0.7, 0.1, 0.02, 0.2, 0.8};
   made::Random random(4);
