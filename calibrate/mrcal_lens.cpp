@@ -5,6 +5,8 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -82,6 +84,68 @@ bool finite(const mrcal_point2_t& q) { return std::isfinite(q.x) && std::isfinit
 
 Vec3 from_mrcal(const mrcal_point3_t& v) { return {v.x, v.y, v.z}; }
 
+// Where the radius in the picture of one of OpenCV's lenses first stops growing with the angle.
+// Farther out it may grow again, and would show what is not there.
+class RadialFold {
+ public:
+  // Without its decentring and prism, which hardly move the fold. Other models have none here.
+  explicit RadialFold(const Lens& lens) {
+    if (!lens.model.starts_with("LENSMODEL_OPENCV")) return;  // all zero: nowhere
+    const auto k = [&](std::size_t i) {
+      return 4 + i < lens.parameters.size() ? lens.parameters[4 + i] : 0;
+    };
+    // In u, the squared tangent of the angle: radius^2 = u (above / below)^2.
+    const std::array above{1.0, k(0), k(1), k(4)};
+    below_ = {1, k(5), k(6), k(7)};
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < 4; ++j) {
+        const double power = 2 * static_cast<double>(i) + 1 - 2 * static_cast<double>(j);
+        slope_[i + j] += power * above[i] * below_[j];
+      }
+    }
+  }
+
+  // Whether a direction with z above 0 lies beyond it.
+  bool lies_before(Vec3 v) {
+    const double u = (v.x * v.x + v.y * v.y) / (v.z * v.z);
+    // So far in that no term can turn it.
+    if (least_within(slope_, u) > 0 && least_within(below_, u) > 0) return false;
+    if (!first_) first_ = find();
+    return u > *first_;
+  }
+
+ private:
+  template <std::size_t n>
+  static double value(const std::array<double, n>& polynomial, double u) {
+    double sum = 0;
+    for (std::size_t i = n; i > 0; --i) sum = sum * u + polynomial[i - 1];
+    return sum;
+  }
+
+  // A bound of 1 + ... from 0 to u.
+  template <std::size_t n>
+  static double least_within(const std::array<double, n>& polynomial, double u) {
+    double sum = 0;
+    for (std::size_t i = n - 1; i > 0; --i) sum = (sum + std::abs(polynomial[i])) * u;
+    return 1 - sum;
+  }
+
+  // To half a degree, not too near: up to there the picture itself tells that it is mirrored.
+  double find() const {
+    constexpr int steps = 180;
+    for (int i = 1; i < steps; ++i) {
+      const double tangent = std::tan(0.5 * std::numbers::pi * i / steps);
+      const double u = tangent * tangent;
+      if (!(value(slope_, u) > 0) || !(value(below_, u) > 0)) return u;
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  std::array<double, 7> slope_{};  // of the radius, times below^2
+  std::array<double, 4> below_{};
+  std::optional<double> first_;
+};
+
 // A direction's pixel and its change with the direction.
 struct Projection {
   Vec2 q;
@@ -94,7 +158,8 @@ class Projector {
       : model_(parsed(lens.model)),
         parameters_(lens.parameters.data()),
         max_angle_rad_(lens.max_angle_rad),
-        behind_(mrcal_lensmodel_metadata(&model_).can_project_behind_camera) {}
+        behind_(mrcal_lensmodel_metadata(&model_).can_project_behind_camera),
+        fold_(lens) {}
 
   // Nothing where the lens sees nothing. Past the angle where distortion turns back, the picture is
   // mirrored there: seen from the camera, a turn from x to y is no longer one in the picture.
@@ -104,6 +169,7 @@ class Projector {
     const Vec3 v = direction / l;
     if (!behind_ && v.z <= 0) return std::nullopt;
     if (std::atan2(hypotenuse(v.x, v.y), v.z) > max_angle_rad_) return std::nullopt;
+    if (fold_.lies_before(v)) return std::nullopt;
     const mrcal_point3_t p{{v.x, v.y, v.z}};
     mrcal_point2_t q{};
     std::array<mrcal_point3_t, 2> gradient{};
@@ -141,6 +207,7 @@ class Projector {
   const double* parameters_;
   double max_angle_rad_;
   bool behind_;
+  mutable RadialFold fold_;
 };
 
 }  // namespace

@@ -237,5 +237,31 @@ TEST(Check, RefusesWhatIsNoLens) {
   }
 }
 
+TEST(Project, ShowsNothingBeyondTheFirstFold) {
+  // Their polynomials turn back, and turn again farther out: ghosts, some inside the picture.
+  const std::vector<Lens> lenses{
+      {"LENSMODEL_OPENCV4", 640, 480, {530, 530, 319.5, 239.5, -.3, 0, 0, 0}},
+      {"LENSMODEL_OPENCV4", 640, 480, {530, 530, 319.5, 239.5, -.28, .03, .002, -.001}},
+      {"LENSMODEL_OPENCV5", 640, 480, {536, 536, 342, 235, -.265, -.0467, .0018, -.0003, .2522}},
+      {"LENSMODEL_OPENCV8", 640, 480, {530, 530, 319.5, 239.5, -.3, .1, 0, 0, .01, .05, -.06, 0}},
+  };
+  for (const Lens& lens : lenses) {
+    for (double azimuth = 0; azimuth < 6.28; azimuth += 0.0871) {
+      bool ended = false;
+      for (double angle = 0; angle < 1.56; angle += 0.004) {
+        const Vec3 v{std::sin(angle) * std::cos(azimuth), std::sin(angle) * std::sin(azimuth),
+                     std::cos(angle)};
+        const auto q = project(lens, v);
+        EXPECT_FALSE(q && ended) << lens.model << " at " << angle;
+        ended = ended || !q;
+        if (!q || q->x < 0 || q->y < 0 || q->x > 639 || q->y > 479) continue;
+        const auto back = unproject(lens, *q);
+        if (!back) continue;
+        EXPECT_LT(length(*back - v), 1e-4) << lens.model << " at " << angle;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace calibrate::lens_test
