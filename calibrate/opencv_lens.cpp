@@ -245,9 +245,24 @@ Lens named_parameters(const OpencvStorage& file) {
     core[i] = *value;
   }
   const int line = file.find("parameter/fx")->line;
-  if (!named("k1")) return lens_of(file, Family::perspective, core, {}, line);
+  const bool distorted = file.has("parameter/k1");
+  const bool tangential = file.has("parameter/p1") || file.has("parameter/p2");
+  // A parameter without a place in the lens would change it unseen.
+  for (const StoredValue& value : file.values_below("parameter")) {
+    const std::string key = value.key.substr(value.key.find('/') + 1);
+    const bool known = std::ranges::find(core_names, key) != core_names.end() ||
+                       (distorted && (key == "k1" || key == "k2" || key == "k3" ||
+                                      (tangential ? key == "p1" || key == "p2" : key == "k4")));
+    double number = 0;
+    if (known || (parse_number(value.text, number) && number == 0)) continue;
+    file.fail(value.line, "parameter " + quoted(key) +
+                              (distorted ? std::string(" has no place in a lens of ") +
+                                               (tangential ? "k1 to k3, p1 and p2" : "k1 to k4")
+                                         : " has no place in a lens without k1"));
+  }
+  if (!distorted) return lens_of(file, Family::perspective, core, {}, line);
   const double k1 = *named("k1"), k2 = named("k2").value_or(0), k3 = named("k3").value_or(0);
-  if (named("p1") || named("p2")) {
+  if (tangential) {
     return lens_of(file, Family::perspective, core,
                    {k1, k2, named("p1").value_or(0), named("p2").value_or(0), k3}, line);
   }

@@ -124,6 +124,15 @@ bool OpencvStorage::has(std::string_view key) const {
   });
 }
 
+std::vector<StoredValue> OpencvStorage::values_below(std::string_view key) const {
+  const std::string prefix = std::string(key) + "/";
+  std::vector<StoredValue> below;
+  for (const StoredValue& value : values_) {
+    if (value.key.starts_with(prefix)) below.push_back(value);
+  }
+  return below;
+}
+
 std::vector<std::string> OpencvStorage::top_keys() const {
   std::vector<std::string> keys;
   for (const StoredValue& value : values_) {

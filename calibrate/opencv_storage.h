@@ -28,6 +28,8 @@ class OpencvStorage {
   bool has(std::string_view key) const;
   // Of the outermost values.
   std::vector<std::string> top_keys() const;
+  // The values below a key, at any depth.
+  std::vector<StoredValue> values_below(std::string_view key) const;
 
   [[noreturn]] void fail(int line, const std::string& why) const;
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <numbers>
 #include <random>
 #include <sstream>
@@ -125,6 +126,29 @@ TEST(ReadOpencvLens, ReadsWhatOpencvWrites) {
     EXPECT_EQ(fisheye.model, "kannala_brandt");
     EXPECT_EQ(fisheye.parameters.back(), 0.01 * 4 - 0.02);
   }
+}
+
+TEST(ReadOpencvLens, RefusesParametersThatItWouldDrop) {
+  const auto directory = made::make_temporary_directory();
+  const std::string path = directory / "lens.yml";
+  const auto reason_of = [&](const std::string& parameters) -> std::string {
+    std::ofstream(path) << "image:\n  width: 640\n  height: 480\nparameter:\n  fx: 530\n"
+                           "  fy: 530\n  cx: 320\n  cy: 240\n" +
+                               parameters;
+    try {
+      return read_lens(path).model;
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+  };
+  EXPECT_EQ(reason_of(""), "pinhole");
+  EXPECT_EQ(reason_of("  k2: 0\n"), "pinhole");
+  EXPECT_EQ(reason_of("  k1: 0.1\n  p1: 0.01\n  k3: 0.2\n"), "LENSMODEL_OPENCV5");
+  EXPECT_EQ(reason_of("  k1: 0.1\n  k4: 0.2\n"), "kannala_brandt");
+  EXPECT_THAT(reason_of("  k2: 0.1\n"), HasSubstr("lens.yml:9: parameter \"k2\""));
+  EXPECT_THAT(reason_of("  p1: 0.1\n  p2: 0.1\n"), HasSubstr("without k1"));
+  EXPECT_THAT(reason_of("  k1: 0.1\n  p1: 0\n  k4: 0.2\n"), HasSubstr("\"k4\""));
+  EXPECT_THAT(reason_of("  k1: 0.1\n  skew: 2\n"), HasSubstr("\"skew\""));
 }
 
 TEST(ReadOpencvLens, ReadsTheFilesOfRosAndKalibr) {
