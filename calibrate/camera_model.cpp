@@ -266,6 +266,10 @@ CameraModel read_camera_model(const std::string& path) {
       reader.fail_at(contents.extrinsics->line, "'extrinsics' must be 6 numbers");
     }
     const std::vector<double>& rt = contents.extrinsics->value;
+    constexpr double most = 1e9;  // radians and metres; the squares of larger ones overflow
+    if (!std::ranges::all_of(rt, [](double x) { return std::abs(x) <= most; })) {
+      reader.fail_at(contents.extrinsics->line, "'extrinsics' must be within 1e9 of 0");
+    }
     model.cam_from_ref = Pose{rotation_of({rt[0], rt[1], rt[2]}), {rt[3], rt[4], rt[5]}};
   }
   return model;

@@ -6,6 +6,7 @@
 #include <clocale>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 
 #include "tests/made_files.h"
 
@@ -179,6 +180,14 @@ TEST(ReadCameraModel, EndsAtEveryTruncationAndEveryFlippedByte) {
     }
     EXPECT_NO_THROW(check(lens));
   }
+}
+
+TEST(ReadCameraModel, RefusesExtrinsicsThatAreNoPose) {
+  const std::string path = made::make_temporary_directory() / "lens.cameramodel";
+  std::ofstream(path) << "{ 'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': [ 500, 500, 320, 240 "
+                         "],\n'extrinsics': [ 1e308, 1e308, 0, 0, 0, 0 ], 'imagersize': [ 640, 480 "
+                         "] }\n";
+  EXPECT_THROW(read_camera_model(path), std::runtime_error);
 }
 
 }  // namespace
