@@ -32,11 +32,6 @@ constexpr double rival_within = 9.2;  // 1 in 100 by chance, of two degrees of f
 // Extent of points that lie on a line, or in a plane, across it, relative to the largest.
 constexpr double thin = 1e-3;
 constexpr double flat = 0.05;
-// Of made calibrations of normal lenses and fish-eyes, from 6 to 30 views, the poses are off by
-// what is told (lens_error_in_pose_test.cpp) if their lenses' errors change over this share of the
-// picture's diagonal, and if this share of their variance more is one of scale.
-constexpr double lens_error_reach = 0.3;
-constexpr double lens_error_in_scale = 0.3;
 
 bool finite(Vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
@@ -274,42 +269,10 @@ Agreement find_agreement(std::span<const Sight> sights, const Pose& pose, double
   return agreement;
 }
 
-// What a lens's error adds to the information: J^T C J, with C the covariance of the residuals that
-// it makes, a smooth field and a scale that is off.
-Matrix6 lens_part(std::span<const Sight> sights, const Pose& pose, const LensError& error) {
-  Matrix6 part = Matrix6::Zero();
-  if (!(error.sigma_px > 0)) return part;
-  std::vector<Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> slopes;
-  for (const Sight& sight : sights) {
-    const SightSlopes told = slopes_of(sight, pose);
-    slopes.emplace_back(
-        Eigen::Map<const Eigen::Matrix<double, 2, 6, Eigen::RowMajor>>(told.data()));
-  }
-  for (std::size_t i = 0; i < sights.size(); ++i) {
-    for (std::size_t j = 0; j < sights.size(); ++j) {
-      const double angle =
-          std::acos(std::clamp(dot(sights[i].v_cam, sights[j].v_cam), -1.0, 1.0)) / error.reach_rad;
-      part += std::exp(-0.5 * angle * angle) * slopes[i].transpose() * slopes[j];
-    }
-  }
-  Eigen::Matrix<double, 6, 1> scaled = Eigen::Matrix<double, 6, 1>::Zero();
-  for (std::size_t i = 0; i < sights.size(); ++i) {
-    const Vec3 v = sights[i].v_cam;
-    const double sine = std::hypot(v.x, v.y);
-    if (sine < 1e-9) continue;
-    // Away from the axis, and as far as the angle off it.
-    const Vec3 out = Vec3{v.x * v.z / sine, v.y * v.z / sine, -sine} * std::atan2(sine, v.z);
-    const Eigen::Vector2d away(dot(sights[i].right, out), dot(sights[i].down, out));
-    scaled += slopes[i].transpose() * away;
-  }
-  part += lens_error_in_scale / (error.radius_px * error.radius_px) * scaled * scaled.transpose();
-  return error.sigma_px * error.sigma_px * part;
-}
-
 void set_covariance(Registration& registration,
                     const PoseMatrix& information,
                     double variance,
-                    const Matrix6& lens_part) {
+                    const PoseMatrix& of_lens) {
   const Matrix6 matrix = Eigen::Map<const Matrix6>(information.data());
   // Radians and metres differ in size: balanced first.
   const Eigen::Matrix<double, 6, 1> scale = matrix.diagonal().cwiseSqrt().cwiseInverse();
@@ -322,7 +285,8 @@ void set_covariance(Registration& registration,
         "place of the camera; add some near it or on other sides");
   }
   const Matrix6 inverse = scale.asDiagonal() * balanced.inverse() * scale.asDiagonal();
-  const Matrix6 covariance = variance * inverse + inverse * lens_part * inverse;
+  const Eigen::Map<const Matrix6> part(of_lens.data());
+  const Matrix6 covariance = variance * inverse + inverse * part * inverse;
   Eigen::Map<Matrix6>(registration.covariance.data()) = covariance;
   registration.turn_sigma_rad = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   registration.position_sigma_m = std::sqrt(covariance.bottomRightCorner<3, 3>().trace());
@@ -356,16 +320,6 @@ void add_warnings(Registration& registration,
 }
 
 }  // namespace
-
-LensError error_of(const Lens& lens) {
-  const double diagonal_px = std::hypot(lens.width, lens.height);
-  LensError error{lens.error_px, 1, diagonal_px / std::sqrt(24.0)};
-  const Vec2 middle{0.5 * (lens.width - 1), 0.5 * (lens.height - 1)};
-  if (const auto sight = sight_of(lens, middle, {})) {
-    error.reach_rad = lens_error_reach * diagonal_px / length(sight->right);
-  }
-  return error;
-}
 
 Registration register_camera(std::span<const Sight> sights, const RegistrationOptions& options) {
   check(sights, options);

@@ -6,18 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "calibrate/lens_error.h"
 #include "calibrate/sight.h"
 
 namespace calibrate {
-
-// What a lens is thought to be off by: a smooth field over the picture, which shifts neighbouring
-// sights alike, and a scale.
-struct LensError {
-  double sigma_px = 0;   // along each axis; 0 = unknown, and left out
-  double reach_rad = 1;  // angle between sights over which the field changes
-  double radius_px = 1;  // at which the scale is off by as much: the picture's RMS along an axis
-};
-LensError error_of(const Lens& lens);
 
 struct RegistrationOptions {
   // Standard deviation of a sight along each pixel axis that is to be expected; residuals that are

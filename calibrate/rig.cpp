@@ -326,15 +326,15 @@ void judge(RigFit& fit,
 
 // The camera's own part of everything's covariance.
 void tell_uncertainty(RigCameraFit& fit,
-                      std::span<const double> all,
+                      const RigCovariance& all,
                       std::size_t index,
                       std::size_t count,
                       double sigma_px) {
   const std::size_t n = 6 * (count - 1);
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = 0; j < 6; ++j) {
-      fit.covariance[6 * i + j] =
-          sigma_px * sigma_px * all[n * (6 * (index - 1) + i) + 6 * (index - 1) + j];
+      const std::size_t at = n * (6 * (index - 1) + i) + 6 * (index - 1) + j;
+      fit.covariance[6 * i + j] = sigma_px * sigma_px * all.of_noise[at] + all.of_lenses[at];
     }
   }
   const auto& m = fit.covariance;
@@ -378,8 +378,10 @@ RigFit fit_rig(const RigProblem& problem, const RigOptions& options) {
       2.0 * static_cast<double>(count) -
       6.0 * static_cast<double>(start.instants.size() + problem.cameras.size() - 1);
   const double sigma_px = std::max(options.noise_px, std::sqrt(squares / std::max(freedoms, 1.0)));
-  const std::vector<double> all = covariance(start.bundle, start.corners, used);
-  if (all.empty()) {
+  std::vector<LensError> errors;
+  for (const RigCamera& camera : problem.cameras) errors.push_back(error_of(camera.lens));
+  const RigCovariance all = covariance(start.bundle, start.corners, used, errors);
+  if (all.of_noise.empty()) {
     throw std::runtime_error("the boards leave a camera's pose open: take more pictures of them");
   }
   for (std::size_t c = 0; c < fit.cameras.size(); ++c) {

@@ -58,6 +58,8 @@ struct RigFit {
 // plain squares over corners within 4.5 standard deviations. A chessboard that looks the same after
 // half a turn may be counted from either end, one of as many rows as columns, if they are even,
 // from any of its four corners: that is found out.
+// The uncertainty counts what lenses are off by where they tell it (Lens::error_px); a turn of all
+// of a lens's directions is none of it.
 //
 // Throws std::invalid_argument: a bad board or lens, fewer than two cameras, a name that is empty
 // or twice, views that are not as many as the first camera's or not of the board's corners, noise

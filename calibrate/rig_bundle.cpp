@@ -1,6 +1,7 @@
 // The least-squares core of a rig: poses of cameras, poses of boards, lenses held.
 #include "calibrate/rig_bundle.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
@@ -102,6 +103,52 @@ std::optional<Derivatives> derivatives(const RigCorner& corner, const RigBundle&
   return d;
 }
 
+using PullSlopes = Eigen::Matrix<double, 2, Eigen::Dynamic>;
+
+// What one lens's error does to all cameras' poses. Corners that lie close in its picture are
+// shifted alike, and summed up.
+class LensPull {
+ public:
+  LensPull(const LensError& error, Eigen::Index n) : error_(error), n_(n), scaled_(n) {
+    scaled_.setZero();
+  }
+
+  void add(const Sight& sight, const PullSlopes& slopes) {
+    if (!(error_.sigma_px > 0)) return;
+    constexpr double alike = 0.97;
+    auto cell = std::ranges::find_if(
+        cells_, [&](const Cell& one) { return likeness(error_, one.v_cam, sight.v_cam) > alike; });
+    if (cell == cells_.end()) {
+      cell = cells_.insert(cell, {sight.v_cam, PullSlopes::Zero(2, n_)});
+    }
+    cell->slopes += slopes;
+    const Vec2 away = scale_shift(sight);
+    scaled_ += slopes.transpose() * Eigen::Vector2d(away.x, away.y);
+  }
+
+  // J^T C J, as lens_part()'s.
+  Eigen::MatrixXd part() const {
+    const double variance = error_.sigma_px * error_.sigma_px;
+    Eigen::MatrixXd sum = scale_variance(error_) * scaled_ * scaled_.transpose();
+    for (const Cell& a : cells_) {
+      for (const Cell& b : cells_) {
+        sum += variance * likeness(error_, a.v_cam, b.v_cam) * a.slopes.transpose() * b.slopes;
+      }
+    }
+    return sum;
+  }
+
+ private:
+  struct Cell {
+    Vec3 v_cam;
+    PullSlopes slopes;
+  };
+  LensError error_;
+  Eigen::Index n_;
+  Eigen::VectorXd scaled_;
+  std::vector<Cell> cells_;
+};
+
 }  // namespace
 
 bool minimise(RigBundle& bundle,
@@ -150,18 +197,20 @@ bool minimise(RigBundle& bundle,
   return true;
 }
 
-std::vector<double> covariance(const RigBundle& bundle,
-                               std::span<const RigCorner> corners,
-                               std::span<const std::uint8_t> used) {
+RigCovariance covariance(const RigBundle& bundle,
+                         std::span<const RigCorner> corners,
+                         std::span<const std::uint8_t> used,
+                         std::span<const LensError> errors) {
   using Matrix6 = Eigen::Matrix<double, 6, 6>;
   const auto n = static_cast<Eigen::Index>(6 * (bundle.cam_from_rig.size() - 1));
   Eigen::MatrixXd shared = Eigen::MatrixXd::Zero(n, n);
   std::vector<Eigen::MatrixXd> between(bundle.rig_from_board.size(), Eigen::MatrixXd::Zero(n, 6));
   std::vector<Matrix6> own(bundle.rig_from_board.size(), Matrix6::Zero());
+  std::vector<std::optional<Derivatives>> slopes(corners.size());
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (used[i] == 0) continue;
     const RigCorner& corner = corners[i];
-    const auto d = derivatives(corner, bundle);
+    const auto& d = slopes[i] = derivatives(corner, bundle);
     if (!d) continue;
     own[corner.board].noalias() += d->by_board.transpose() * d->by_board;
     if (corner.camera == 0) continue;
@@ -169,16 +218,38 @@ std::vector<double> covariance(const RigBundle& bundle,
     shared.block<6, 6>(at, at).noalias() += d->by_camera.transpose() * d->by_camera;
     between[corner.board].middleRows<6>(at).noalias() += d->by_camera.transpose() * d->by_board;
   }
+  // How the boards' poses follow the cameras'.
+  std::vector<Eigen::MatrixXd> follow(own.size(), Eigen::MatrixXd::Zero(6, n));
   for (std::size_t board = 0; board < own.size(); ++board) {
     if (own[board].isZero()) continue;
     own[board].diagonal() *= 1 + 1e-12;
-    shared.noalias() -= between[board] * own[board].ldlt().solve(between[board].transpose());
+    follow[board] = own[board].ldlt().solve(between[board].transpose());
+    shared.noalias() -= between[board] * follow[board];
   }
   const Eigen::MatrixXd symmetric = 0.5 * (shared + shared.transpose());
   const Eigen::LLT<Eigen::MatrixXd> solver(symmetric);
   if (solver.info() != Eigen::Success) return {};
-  std::vector<double> result(static_cast<std::size_t>(n * n));
-  Eigen::Map<Eigen::MatrixXd>(result.data(), n, n) = solver.solve(Eigen::MatrixXd::Identity(n, n));
+  const Eigen::MatrixXd inverse = solver.solve(Eigen::MatrixXd::Identity(n, n));
+
+  std::vector<LensPull> pulls;
+  for (const LensError& error : errors) pulls.emplace_back(error, n);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (!slopes[i]) continue;
+    const RigCorner& corner = corners[i];
+    PullSlopes by_cameras = -(slopes[i]->by_board * follow[corner.board]);
+    if (corner.camera > 0) {
+      by_cameras.middleCols<6>(static_cast<Eigen::Index>(6 * (corner.camera - 1))) +=
+          slopes[i]->by_camera;
+    }
+    pulls[corner.camera].add(corner.sight, by_cameras);
+  }
+  Eigen::MatrixXd part = Eigen::MatrixXd::Zero(n, n);
+  for (const LensPull& pull : pulls) part += pull.part();
+  RigCovariance result;
+  result.of_noise.resize(static_cast<std::size_t>(n * n));
+  result.of_lenses.resize(result.of_noise.size());
+  Eigen::Map<Eigen::MatrixXd>(result.of_noise.data(), n, n) = inverse;
+  Eigen::Map<Eigen::MatrixXd>(result.of_lenses.data(), n, n) = inverse * part * inverse;
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "calibrate/lens_error.h"
 #include "calibrate/pose.h"
 #include "calibrate/sight.h"
 
@@ -31,11 +32,16 @@ bool minimise(RigBundle& bundle,
               std::span<const std::uint8_t> used,
               double loss_px);
 
-// Of turn and move of each camera but the first, one after the other, if residuals have a standard
-// deviation of 1 px: a square matrix of 6 values per camera, row by row. Empty if a camera's pose
-// is open.
-std::vector<double> covariance(const RigBundle& bundle,
-                               std::span<const RigCorner> corners,
-                               std::span<const std::uint8_t> used);
+// Of turn and move of each camera but the first, one after the other: square matrices of 6 values
+// per camera, row by row.
+struct RigCovariance {
+  std::vector<double> of_noise;   // if residuals have a standard deviation of 1 px
+  std::vector<double> of_lenses;  // by what each is off by, to be added
+};
+// `errors` are the cameras' lenses'. Empty matrices if a camera's pose is open.
+RigCovariance covariance(const RigBundle& bundle,
+                         std::span<const RigCorner> corners,
+                         std::span<const std::uint8_t> used,
+                         std::span<const LensError> errors);
 
 }  // namespace calibrate

@@ -162,6 +162,7 @@ RotationFit fit_rotation(std::span<const SeenDirection> directions) {
     squared_angles += fit.residuals_rad[i] * fit.residuals_rad[i];
   }
   const auto n = static_cast<double>(count);
+  fit.excess = std::sqrt(squares / (2 * n - 3));
   const Eigen::Matrix3d covariance = std::max(1.0, squares / (2 * n - 3)) * information.inverse();
   if (!covariance.allFinite() || count < 2) {
     throw std::runtime_error("the directions do not agree on a rotation");
@@ -176,6 +177,31 @@ RotationFit fit_rotation(std::span<const SeenDirection> directions) {
         "the lens is this camera's");
   }
   return fit;
+}
+
+void add_lens_error(RotationFit& fit,
+                    std::span<const Sight> sights,
+                    Vec3 position,
+                    const LensError& error) {
+  if (sights.size() != fit.agrees.size()) {
+    throw std::invalid_argument("a lens's error needs the sights that the rotation is from");
+  }
+  const Pose cam_from_set{fit.cam_from_set, -(fit.cam_from_set * position)};
+  std::vector<Sight> agreeing;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    if (!fit.agrees[i]) continue;
+    agreeing.push_back(sights[i]);
+    const SightSlopes told = slopes_of(sights[i], cam_from_set);
+    const Eigen::Map<const Eigen::Matrix<double, 2, 6, Eigen::RowMajor>> slopes(told.data());
+    information += slopes.leftCols<3>().transpose() * slopes.leftCols<3>();
+  }
+  const PoseMatrix told = lens_part(agreeing, cam_from_set, error);
+  const Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>> part(told.data());
+  const Eigen::Matrix3d inverse = information.inverse();
+  Eigen::Map<Eigen::Matrix3d> covariance(fit.covariance.data());
+  covariance += inverse * part.topLeftCorner<3, 3>() * inverse;
+  fit.turn_sigma_rad = std::sqrt(covariance.trace());
 }
 
 Mat3 best_rotation(std::span<const Vec3> from, std::span<const Vec3> to) {

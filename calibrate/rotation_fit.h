@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "calibrate/lens_error.h"
 #include "calibrate/sight.h"
 
 namespace calibrate {
@@ -22,6 +23,7 @@ struct RotationFit {
   std::array<double, 9> covariance{};  // of a small turn, rad^2: cam_from_set becomes exp(turn) * R
   double turn_sigma_rad = 0;           // root of its total variance
   double rms_rad = 0;                  // of the directions that agree
+  double excess = 0;                   // their residuals, over the errors expected: about 1
   std::vector<double> residuals_rad;   // of every direction
   std::vector<bool> agrees;            // false: taken for wrong, and without a say
 };
@@ -39,6 +41,13 @@ RotationFit fit_rotation(std::span<const SeenDirection> directions);
 // Rotation to Relate Two Sets of Vectors", Acta Crystallographica A32, 1976. Throws
 // std::invalid_argument if they are not as many.
 Mat3 best_rotation(std::span<const Vec3> from, std::span<const Vec3> to);
+
+// Adds to a fit's uncertainty what the lens is off by, of directions_from() these sights and
+// position, in their order.
+void add_lens_error(RotationFit& fit,
+                    std::span<const Sight> sights,
+                    Vec3 position,
+                    const LensError& error);
 
 // Sights from a known position in the set; `noise_px` along each pixel axis. Throws
 // std::invalid_argument if a sight's point is that position.

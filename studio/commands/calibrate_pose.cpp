@@ -136,10 +136,7 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   say_markers(markers, found, !by_board, console);
   say_pose(found.cam_from_set, sigma_deg, sigma_mm, console);
   console.figures(figures.dump(2));
-  if (!(lens.error_px > 0)) {
-    console.warn(options.lens +
-                 ": does not tell its own error (error_px), which is left out of +-");
-  }
+  warn_of_unknown_error(lens, options.lens, console);
   for (const std::string& warning : found.warnings) console.warn(warning);
   console.say(fmt::format("{}: from {} {}, {:.2f} px off", options.out, markers.size(), what,
                           found.rms_px));

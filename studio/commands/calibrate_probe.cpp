@@ -74,10 +74,18 @@ std::optional<calibrate::Vec3> position_given(const ProbeOptions& options) {
 // Where the probe stands is known: only how it is turned is asked for.
 Found turn_by_markers(const std::vector<calibrate::Marker>& markers,
                       const std::vector<calibrate::Sight>& sights,
+                      const calibrate::Lens& lens,
                       calibrate::Vec3 position,
                       double noise_px) {
-  const auto fit = calibrate::fit_rotation(calibrate::directions_from(sights, position, noise_px));
+  auto fit = calibrate::fit_rotation(calibrate::directions_from(sights, position, noise_px));
+  add_lens_error(fit, sights, position, calibrate::error_of(lens));
   Found found;
+  constexpr double far_above = 5;
+  if (fit.excess > far_above) {
+    found.warnings.emplace_back(
+        "the residuals are far above the noise to be expected: a marker or the position is wrong, "
+        "or the lens is off");
+  }
   found.probe_from_set = calibrate::pose_from_rotation(fit.cam_from_set, position);
   found.sigma_deg = fit.turn_sigma_rad / degree;
   Json list = Json::array();
@@ -122,7 +130,7 @@ Found find_by_markers(const ProbeOptions& options, const calibrate::Lens& lens) 
   const double noise_px = options.noise_px.value_or(0.5);
   try {
     const auto sights = calibrate::sights_of(lens, markers);
-    Found found = position ? turn_by_markers(markers, sights, *position, noise_px)
+    Found found = position ? turn_by_markers(markers, sights, lens, *position, noise_px)
                            : place_by_markers(markers, sights, lens, noise_px);
     found.from = fmt::format("{} markers", markers.size());
     return found;
@@ -206,6 +214,7 @@ void calibrate_probe(const ProbeOptions& options, Console& console) {
   figures["warnings"] = found.warnings;
   say_pose(found.probe_from_set, found.sigma_deg, found.sigma_mm, console);
   console.figures(figures.dump(2));
+  if (!by_sources) warn_of_unknown_error(lens, options.lens, console);
   for (const std::string& warning : found.warnings) console.warn(warning);
   console.say(fmt::format("{}: from {}", options.out, found.from));
 }

@@ -26,6 +26,7 @@
 #include "capture/parallel_loop.h"
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/pose_report.h"
 
 namespace studio {
 namespace {
@@ -272,7 +273,11 @@ void calibrate_rig(const RigOptions& options, Console& console) {
   calibrate::write_rig(options.out, members,
                        fmt::format("by platelight calibrate rig, {:.2f} px off", fit.rms_px));
   console.figures(
-      Json{{"rms_px", fit.rms_px}, {"cameras", cameras}, {"warnings", fit.warnings}}.dump(2));
+      Json{{"rms_px", fit.rms_px}, {"cameras", cameras}, {"warnings", fit.warnings}}.dump(
+          2, ' ', false, Json::error_handler_t::replace));
+  for (std::size_t c = 0; c < sources.size(); ++c) {
+    warn_of_unknown_error(lenses[c], sources[c].lens_file, console);
+  }
   for (const std::string& warning : fit.warnings) console.warn(warning);
   console.say(
       fmt::format("{}: {} cameras, {:.2f} px off", options.out, sources.size(), fit.rms_px));

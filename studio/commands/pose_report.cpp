@@ -87,4 +87,9 @@ void say_pose(const calibrate::Pose& cam_from_set,
                           axis.y, axis.z, turned, sigma_deg));
 }
 
+void warn_of_unknown_error(const calibrate::Lens& lens, const std::string& file, Console& console) {
+  if (lens.error_px > 0) return;
+  console.warn(file + ": does not tell its own error (error_px), which is left out of +-");
+}
+
 }  // namespace studio

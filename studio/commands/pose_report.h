@@ -35,4 +35,7 @@ void say_pose(const calibrate::Pose& cam_from_set,
               double sigma_mm,
               Console& console);
 
+// Warns where a lens does not tell what it is off by, which no +- can count then.
+void warn_of_unknown_error(const calibrate::Lens& lens, const std::string& file, Console& console);
+
 }  // namespace studio

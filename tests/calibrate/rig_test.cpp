@@ -185,6 +185,38 @@ TEST(FitRig, RaisesItsUncertaintyIfALensIsWrong) {
   EXPECT_GT(fit.cameras[1].position_sigma_m, 1.5 * before);
 }
 
+TEST(FitRig, TellsWhatItsLensesAreOffBy) {
+  made::Random random(11);
+  std::vector<double> shares;
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    MadeRig rig = made_rig(10, 0.05, seed);
+    rig.problem.cameras.pop_back();
+    const double unaware = fit_rig(rig.problem).cameras[1].position_sigma_m;
+    for (RigCamera& camera : rig.problem.cameras) {
+      Lens& lens = camera.lens;
+      const Lens truth = lens;
+      const double scale = 1 + 0.002 * random.normal();
+      lens.parameters[0] *= scale;
+      lens.parameters[1] *= scale;
+      lens.parameters[4] += 0.005 * random.normal();
+      double squares = 0;
+      for (int i = 0; i < 81; ++i) {
+        const Vec2 q{160.0 * (i % 9), 90.0 * (i / 9)};
+        const Vec2 seen = project(lens, *unproject(truth, q)).value();
+        squares += squared(Vec2{seen.x - q.x, seen.y - q.y}) / (2 * 81);
+      }
+      lens.error_px = std::sqrt(squares);
+    }
+    const RigFit fit = fit_rig(rig.problem);
+    const made::PoseError error = made::error_of(fit.cameras[1].cam_from_rig, rig.cam_from_rig[1]);
+    EXPECT_GT(fit.cameras[1].position_sigma_m, 3 * unaware);
+    shares.push_back(error.position_m / fit.cameras[1].position_sigma_m);
+  }
+  std::ranges::sort(shares);
+  EXPECT_LT(shares[6], 2.5);
+  EXPECT_GT(shares[4], 0.15);  // not by telling just anything
+}
+
 TEST(FitRig, RefusesACameraWhosePicturesAreOfOtherInstants) {
   MadeRig rig = made_rig(12, 0.1, 4);
   auto& views = rig.problem.cameras[1].views;

@@ -52,6 +52,42 @@ TEST(FitRotation, FindsItAndKnowsHowWell) {
   }
 }
 
+TEST(AddLensError, CountsAnErrorThatDiffersFromSightToSightAsNoise) {
+  made::Random random(4);
+  const Lens lens = made::fish_eye();
+  const Pose pose = made::random_pose(random);
+  std::vector<Sight> sights;
+  while (sights.size() < 12) {
+    const Vec2 q{random.uniform(0, lens.width - 1.0), random.uniform(0, lens.height - 1.0)};
+    const auto v = unproject(lens, q);
+    if (!v) continue;
+    if (const auto sight = sight_of(lens, q, inverse(pose) * (3 * *v))) sights.push_back(*sight);
+  }
+  const Vec3 position = position_of(pose);
+  const RotationFit noisy = fit_rotation(directions_from(sights, position, 2));
+  RotationFit fit = fit_rotation(directions_from(sights, position, 0.02));
+  add_lens_error(fit, sights, position, {});
+  EXPECT_LT(fit.turn_sigma_rad, 0.02 * noisy.turn_sigma_rad);  // unknown: nothing is added
+  add_lens_error(fit, sights, position, {2, 1e-3, 1e9});
+  EXPECT_NEAR(fit.turn_sigma_rad / noisy.turn_sigma_rad, 1, 0.2);
+  // Neighbours that err alike tell less together.
+  RotationFit smooth = fit_rotation(directions_from(sights, position, 0.02));
+  add_lens_error(smooth, sights, position, {2, 0.5, 1e9});
+  EXPECT_GT(smooth.turn_sigma_rad, fit.turn_sigma_rad);
+  sights.pop_back();
+  EXPECT_THROW(add_lens_error(fit, sights, position, {}), std::invalid_argument);
+}
+
+TEST(FitRotation, TellsResidualsFarAboveTheErrorsExpected) {
+  made::Random random(5);
+  Scene scene = random_scene(4, sigma_rad, random);
+  EXPECT_LT(fit_rotation(scene.directions).excess, 3);
+  Vec3& v = scene.directions[1].v_cam;
+  const Vec3 across = normalize(cross(v, std::abs(v.x) < 0.7 ? Vec3{1, 0, 0} : Vec3{0, 1, 0}));
+  v = normalize(v + std::tan(8 * made::degree) * across);
+  EXPECT_GT(fit_rotation(scene.directions).excess, 10);
+}
+
 TEST(FitRotation, IsExactForTwoDirectionsWithoutNoise) {
   made::Random random(2);
   for (int i = 0; i < 50; ++i) {

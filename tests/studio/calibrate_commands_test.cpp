@@ -251,6 +251,29 @@ TEST_F(CalibrateCommands, ProbeIsTurnedByMarkersFromAKnownPosition) {
   EXPECT_EQ(run(command + few + " --position 0.4,-0.3,x").status, 2);
 }
 
+TEST_F(CalibrateCommands, ProbesTurnCountsItsLensAndDoubtsAWrongMarker) {
+  const calibrate::Pose truth = calibrate::pose_from_axis({0.4, -0.3, 1.2}, {0.1, 0.2, 1}, 0.6);
+  calibrate::Lens lens = made::fish_eye();
+  const std::string markers = markers_text(lens, truth, 4, "probe");
+  const std::string command = "calibrate probe --lens " + path("lens.toml") + " -o " +
+                              path("pose.toml") + " --position 0.4,-0.3,1.2 --markers ";
+  calibrate::write_lens(path("lens.toml"), lens);
+  const Outcome unknown = run_with_figures(command + write("markers.toml", markers));
+  ASSERT_EQ(unknown.status, 0);
+  EXPECT_THAT(unknown.err, HasSubstr("does not tell its own error"));
+  EXPECT_TRUE(figures()["warnings"].empty());
+  const double without = figures()["sigma_deg"];
+  lens.error_px = 10;
+  calibrate::write_lens(path("lens.toml"), lens);
+  ASSERT_EQ(run_with_figures(command + path("markers.toml")).status, 0);
+  EXPECT_GT(double{figures()["sigma_deg"]}, 5 * without);
+  EXPECT_EQ(run_with_figures(command + path("markers.toml")).err, "");
+  // From a place that is 20 cm off.
+  const std::string off = "calibrate probe --lens " + path("lens.toml") + " -o " +
+                          path("pose.toml") + " --position 0.6,-0.3,1.2 --markers ";
+  EXPECT_THAT(run(off + path("markers.toml")).err, HasSubstr("far above the noise"));
+}
+
 TEST_F(CalibrateCommands, ProbeIsTurnedByLampsThatTheSceneCameraSeesToo) {
   const made::LampWorld world{{{calibrate::normalize(calibrate::Vec3{-0.4, 1, 0.2})},
                                {calibrate::normalize(calibrate::Vec3{0.1, 1, 0.3}), 0.03, 8},
