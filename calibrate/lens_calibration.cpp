@@ -320,7 +320,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   const bool warp = is_bent(problem, robust);
   if (options.form) forms = {*options.form};
   result.selection = select_lens(problem, result.start, forms, warp);
-  if (!options.form) try_spline(problem, warp, result);
+  if (!options.form && options.splines) try_spline(problem, warp, result);
   const LensCandidate& chosen = result.selection.candidates[result.selection.chosen];
   result.form = chosen.form;
   result.warp_m = chosen.solve->bundle.warp_m;

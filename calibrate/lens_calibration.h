@@ -18,6 +18,8 @@ struct LensCalibrationOptions {
   Models models = Models::any;
   // Chooses this form without asking the held-out corners; they are still measured.
   std::optional<LensForm> form;
+  // Whether mrcal's splines may be chosen, where corners ask for them: OpenCV has none.
+  bool splines = true;
 };
 
 // What became of one picture.

@@ -1,6 +1,5 @@
 // platelight calibrate lens: a camera's lens, from pictures of a board.
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -249,15 +248,19 @@ void say(const LensCalibration& c, Console& console) {
       100.0 * static_cast<double>(errors.size()) / (across * across), c.coverage_deg));
 }
 
+bool is_of_opencv(const std::string& file) {
+  return file.ends_with(".yml") || file.ends_with(".yaml") || file.ends_with(".xml");
+}
+
 // mrcal's files, and OpenCV's.
 bool fits_perspective_only(const std::string& file) {
-  return std::ranges::any_of(std::array{".cameramodel", ".yml", ".yaml", ".xml"},
-                             [&](const char* ending) { return file.ends_with(ending); });
+  return file.ends_with(".cameramodel") || is_of_opencv(file);
 }
 
 LensCalibrationOptions models_of(const LensOptions& options) {
   using Models = LensCalibrationOptions::Models;
   LensCalibrationOptions models;
+  models.splines = !is_of_opencv(options.out);
   if (options.model == "auto") {
     models.models = fits_perspective_only(options.out) ? Models::perspective : Models::any;
   } else if (options.model == "perspective") {
@@ -274,6 +277,12 @@ LensCalibrationOptions models_of(const LensOptions& options) {
     } catch (const std::invalid_argument& error) {
       throw UsageError(error.what());
     }
+    if (is_of_opencv(options.out) && options.model != "LENSMODEL_PINHOLE" &&
+        !options.model.starts_with("LENSMODEL_OPENCV")) {
+      throw UsageError(
+          fmt::format("OpenCV has no model for a lens of {}: let -o name a .cameramodel or .toml",
+                      options.model));
+    }
   } else {
     throw UsageError("--model is auto, perspective, fisheye or one of mrcal's LENSMODEL_...");
   }
@@ -288,6 +297,13 @@ void calibrate_lens(const LensOptions& options, Console& console) {
   LensOptions adjusted = options;
   adjusted.fisheye = options.model == "fisheye";
   const LensCalibrationOptions models = models_of(options);
+  // Before all the work.
+  for (const std::string& file : {options.out, options.report}) {
+    const auto directory = std::filesystem::path(file).parent_path();
+    if (!directory.empty() && !std::filesystem::is_directory(directory)) {
+      throw std::runtime_error(fmt::format("{}: there is no such directory", directory.string()));
+    }
+  }
   const std::vector<Picture> pictures = read_pictures(options, console);
 
   const auto begin = std::chrono::steady_clock::now();

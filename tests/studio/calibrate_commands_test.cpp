@@ -274,6 +274,16 @@ TEST_F(CalibrateCommands, ProbesTurnCountsItsLensAndDoubtsAWrongMarker) {
   EXPECT_THAT(run(off + path("markers.toml")).err, HasSubstr("far above the noise"));
 }
 
+TEST_F(CalibrateCommands, LensRefusesBeforeItsWorkWhatCannotBeWritten) {
+  const std::string command = "calibrate lens none.png --board 9x6 --square 0.05 ";
+  const Outcome form = run(command + "--model LENSMODEL_CAHVOR -o " + path("lens.yml"));
+  EXPECT_EQ(form.status, 2);
+  EXPECT_THAT(form.err, HasSubstr("OpenCV has no model for a lens of LENSMODEL_CAHVOR"));
+  const Outcome place = run(command + "-o " + path("nowhere/lens.toml"));
+  EXPECT_EQ(place.status, 1);
+  EXPECT_THAT(place.err, HasSubstr("no such directory"));
+}
+
 TEST_F(CalibrateCommands, ProbeIsTurnedByLampsThatTheSceneCameraSeesToo) {
   const made::LampWorld world{{{calibrate::normalize(calibrate::Vec3{-0.4, 1, 0.2})},
                                {calibrate::normalize(calibrate::Vec3{0.1, 1, 0.3}), 0.03, 8},
