@@ -274,6 +274,27 @@ TEST_F(CalibrateCommands, ProbesTurnCountsItsLensAndDoubtsAWrongMarker) {
   EXPECT_THAT(run(off + path("markers.toml")).err, HasSubstr("far above the noise"));
 }
 
+TEST_F(CalibrateCommands, LensTakesPicturesWhoseNamesAreNoUtf8) {
+  const calibrate::Board board{calibrate::Board::Kind::chessboard, 6, 5, 0.05, 0, ""};
+  const calibrate::Lens lens{"pinhole", 320, 240, {270, 270, 159.5, 119.5}};
+  std::mt19937 random(3);
+  std::string pictures;
+  for (int i = 0; i < 5; ++i) {
+    const calibrate::Pose cam_from_board =
+        made::make_board_pose(board, {0.02 * i - 0.04, 0.01 * i - 0.02, 1}, 0.55, 0.5, 0.3, random);
+    const calibrate::GreyPicture picture = made::render_board(board, cam_from_board, lens);
+    const std::string name = path("caf\xe9" + std::to_string(i) + ".png");  // Latin-1
+    capture::write_png(name, picture.width, picture.height, 1, picture.pixels);
+    pictures += " " + name;
+  }
+  const Outcome outcome = run_with_figures(
+      "calibrate lens" + pictures + " --board 6x5 --square 0.05 --model LENSMODEL_PINHOLE -o " +
+      path("lens.yml"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(calibrate::read_lens(path("lens.yml")).model, "pinhole");
+  EXPECT_THAT(std::string{figures()["views"][0]["name"]}, HasSubstr("caf\xef\xbf\xbd"));
+}
+
 TEST_F(CalibrateCommands, LensRefusesBeforeItsWorkWhatCannotBeWritten) {
   const std::string command = "calibrate lens none.png --board 9x6 --square 0.05 ";
   const Outcome form = run(command + "--model LENSMODEL_CAHVOR -o " + path("lens.yml"));
