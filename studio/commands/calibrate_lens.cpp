@@ -60,15 +60,15 @@ std::vector<Picture> read_pictures(const LensOptions& options, Console& console)
     std::int64_t frame_number = 0;
     while (const auto frame = camera->next()) {
       if (frame->image != nullptr && frame_number % every == 0) {
+        if (pictures.size() == most_pictures) {
+          throw std::runtime_error(fmt::format("{}: more than {} pictures; take fewer with --every",
+                                               source, most_pictures));
+        }
         pictures.push_back(
             {frame_number == 0 ? source : fmt::format("{} frame {}", source, frame_number),
              calibrate::grey_picture(*frame->image)});
       }
       ++frame_number;
-      if (pictures.size() == most_pictures) {
-        throw std::runtime_error(fmt::format("{}: more than {} pictures; take fewer with --every",
-                                             source, most_pictures));
-      }
     }
   }
   if (pictures.empty()) throw std::runtime_error("there is no picture to look for a board in");
