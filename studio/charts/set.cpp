@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A directory for one take, removed at the end.
+// A directory for takes, removed at the end.
 class Scratch {
  public:
   Scratch() : path_(fs::temp_directory_path() / fmt::format("platelight_chart_{}", getpid())) {
@@ -33,7 +33,14 @@ class Scratch {
     std::error_code ignored;
     fs::remove_all(path_, ignored);
   }
-  std::string take() const { return (path_ / "take.mkv").string(); }
+  // Where a set's recording goes instead; EXR frames are left out.
+  RecordSettings in_place_of(RecordSettings record) const {
+    record.exr.clear();
+    if (!record.file.empty()) record.file = (path_ / "take.mkv").string();
+    if (!record.fill.empty()) record.fill = (path_ / "fill.mkv").string();
+    if (!record.key.empty()) record.key = (path_ / "key.mkv").string();
+    return record;
+  }
 
  private:
   fs::path path_;
@@ -108,8 +115,7 @@ ChartPoint point_of(const EffortSetting& setting, const Take& take, const render
 Chart chart_set(const std::string& set_path, const SetChartSettings& settings, Console& console) {
   Set set = read_set(set_path);
   const Scratch scratch;
-  set.record.exr.clear();
-  if (!set.record.file.empty()) set.record.file = scratch.take();
+  set.record = scratch.in_place_of(set.record);
   const std::int64_t frames = settings.quick ? 3 : 16;
 
   Chart chart;

@@ -234,6 +234,20 @@ TEST_F(Runs, TakeTheEffortThatTheChartOfTheirSetFoundBest) {
   EXPECT_EQ(run("run " + set + " --fps 25 --error .01").status, 2);
 }
 
+TEST_F(Runs, AreChartedWithoutWritingOverTheirTakes) {
+  write_set();  // its plate
+  const std::string set = write_made_set(
+      dir_, "file:plate_%d.png",
+      "[record]\nfile = \"take.mkv\"\nfill = \"fill.mkv\"\nkey = \"key.mkv\"\nexr = \"take\"\n");
+  for (const char* take : {"take.mkv", "fill.mkv", "key.mkv"}) write(take, "yesterday's");
+  const Outcome outcome = run("chart set " + set + " --quick --samples 2");
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  for (const char* take : {"take.mkv", "fill.mkv", "key.mkv"}) {
+    EXPECT_EQ(content_of(dir_ / take), "yesterday's") << take;
+  }
+  EXPECT_FALSE(fs::exists(dir_ / "take"));
+}
+
 TEST_F(Runs, AreNotChartedWithoutAnythingVirtual) {
   write_set();  // its plate
   const std::string set = write("bare.toml",
