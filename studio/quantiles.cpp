@@ -22,11 +22,13 @@ void Quantiles::add(double milliseconds) {
 
 double Quantiles::at(double share) const {
   if (count_ == 0) return 0;
-  const double wanted = std::clamp(share, 0.0, 1.0) * static_cast<double>(count_ - 1);
+  constexpr double rounding = 1e-9;  // .07 * 100 is a little more than 7
+  const double rank =
+      std::ceil(std::clamp(share, 0.0, 1.0) * static_cast<double>(count_) - rounding);
   double passed = 0;
   for (std::size_t i = 0; i < bins; ++i) {
     passed += bin_[i];
-    if (passed > wanted) {
+    if (passed >= std::max(rank, 1.0)) {
       const double middle = smallest_ms * std::pow(step, static_cast<double>(i) + 0.5);
       return std::min(middle, largest_);
     }

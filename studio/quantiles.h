@@ -12,7 +12,8 @@ class Quantiles {
  public:
   void add(double milliseconds);
   std::int64_t count() const { return count_; }
-  // The value below which `share` (0 to 1) of all lie; 0 if there are none.
+  // The smallest value that at least `share` (0 to 1) of all do not exceed: by nearest rank, so
+  // that .99 of fewer than 100 is the largest. 0 if there are none.
   double at(double share) const;
   double mean() const { return count_ > 0 ? sum_ / static_cast<double>(count_) : 0; }
   double largest() const { return largest_; }

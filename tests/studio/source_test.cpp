@@ -157,10 +157,21 @@ TEST(Quantiles, AreRightToOnePercent) {
   }
   std::ranges::sort(all);
   for (const double share : {0.0, 0.1, 0.5, 0.9, 0.99, 1.0}) {
-    const double exact = all[static_cast<std::size_t>(share * 4999)];
+    const double exact = all[static_cast<std::size_t>(std::max(share * 5000 - 1, 0.0))];
     EXPECT_NEAR(quantiles.at(share) / exact, 1, 0.011) << share;
   }
   EXPECT_EQ(Quantiles().at(0.5), 0);
+}
+
+TEST(Quantiles, AreNotExceededByTheirShareOfAFewValues) {
+  Quantiles quantiles;
+  for (int count = 1; count <= 120; ++count) {
+    quantiles.add(count);
+    for (const int percent : {7, 50, 90, 99, 100}) {
+      const int rank = (percent * count + 99) / 100;
+      EXPECT_NEAR(quantiles.at(0.01 * percent) / rank, 1, 0.011) << percent << " % of " << count;
+    }
+  }
 }
 
 // A shot of a scene of constant radiance, clipped at 1.
