@@ -130,6 +130,7 @@ std::string chart_json(const Chart& chart) {
             {"subtitle", chart.subtitle},
             {"points", points},
             {"stressors", stressors}};
+  if (!chart.set_digest.empty()) json["set_digest"] = chart.set_digest;
   for (const ErrorSteps& s : chart.steps) {
     Json steps = Json::array();
     for (const ErrorStep& step : s.steps) {

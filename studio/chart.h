@@ -83,6 +83,7 @@ struct Chart {
   bool relative = true;                       // errors are shares, written in percent
   std::string stressed_error_name = "error";  // of the stressors' axes
   std::string variant_name;                   // what variants differ in
+  std::string set_digest{};  // of the set file that was measured (set_digest.h); "" = none was
   std::vector<ChartPoint> points;
   std::vector<FigurePanel> panels;
   std::vector<Stressor> stressors;

@@ -1,6 +1,5 @@
 // Points of effort, to and from files.
 #include "studio/effort_points.h"
-#include "render/kernel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +10,9 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/files.h"
+#include "render/kernel.h"
 #include "studio/machine.h"
+#include "studio/set_digest.h"
 
 namespace studio {
 namespace {
@@ -20,9 +21,14 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t most_bytes = std::size_t{16} << 20;
 
+// Of a set's file of points.
+std::string with_remedy(const std::string& set_path, const std::string& why) {
+  return fmt::format("{} {}; platelight chart set {} measures it anew",
+                     effort_points_file(set_path), why, set_path);
+}
+
 [[noreturn]] void fail(const std::string& set_path, const std::string& why) {
-  throw std::runtime_error(fmt::format("{} {}; platelight chart set {} measures it anew",
-                                       effort_points_file(set_path), why, set_path));
+  throw std::runtime_error(with_remedy(set_path, why));
 }
 
 int whole(const Json& settings, const char* name, int low, int high) {
@@ -74,8 +80,7 @@ std::string effort_points_file(const std::string& set_path) {
   return std::filesystem::path(set_path).replace_extension(".chart.json").string();
 }
 
-std::vector<EffortPoint> read_effort_points(const std::string& set_path,
-                                            const render::Effort& base) {
+EffortPoints read_effort_points(const std::string& set_path, const render::Effort& base) {
   const std::string path = effort_points_file(set_path);
   if (!std::filesystem::exists(path)) fail(set_path, "is not there");
   try {
@@ -87,10 +92,13 @@ std::vector<EffortPoint> read_effort_points(const std::string& set_path,
     if (measured_on.at("cpu") != machine.cpu || measured_on.at("threads") != machine.threads) {
       throw std::runtime_error("was measured on another machine");
     }
-    std::vector<EffortPoint> points;
-    for (const Json& point : chart.at("points")) points.push_back(point_of(point, base));
-    if (points.empty()) throw std::runtime_error("has no points");
-    return points;
+    EffortPoints read;
+    for (const Json& point : chart.at("points")) read.points.push_back(point_of(point, base));
+    if (read.points.empty()) throw std::runtime_error("has no points");
+    if (chart.value("set_digest", "") != set_digest(set_path)) {
+      read.doubt = with_remedy(set_path, "was measured of another set, or before this one changed");
+    }
+    return read;
   } catch (const Json::exception& error) {
     fail(set_path, std::string("is no chart of a set: ") + error.what());
   } catch (const std::runtime_error& error) {

@@ -23,11 +23,17 @@ std::vector<std::pair<std::string, ChartValue>> settings_of(const render::Effort
 // Where a set's points are kept: beside it, "car.chart.json" for "car.toml".
 std::string effort_points_file(const std::string& set_path);
 
-// The points of a set, at least one; what they do not name stays as in `base`, the set's own
-// effort. Throws std::runtime_error, with the command that makes the file, if it is missing, no
-// chart of a set, or measured on another machine.
-std::vector<EffortPoint> read_effort_points(const std::string& set_path,
-                                            const render::Effort& base);
+struct EffortPoints {
+  std::vector<EffortPoint> points;  // at least one
+  // Why they may not hold for the set any more, and the command that measures it anew; "" = they
+  // are of the set as it is.
+  std::string doubt;
+};
+
+// The points of a set; what they do not name stays as in `base`, the set's own effort. Throws
+// std::runtime_error, with the command that makes the file, if it is missing, no chart of a set, or
+// measured on another machine, or if the set file cannot be read.
+EffortPoints read_effort_points(const std::string& set_path, const render::Effort& base);
 
 // What was asked for, and whether the point does it. If none does: the fastest, or the most
 // accurate one.

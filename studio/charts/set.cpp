@@ -14,6 +14,7 @@
 #include "studio/effort_points.h"
 #include "studio/effort_settings.h"
 #include "studio/picture_error.h"
+#include "studio/set_digest.h"
 #include "studio/show.h"
 
 namespace studio {
@@ -114,6 +115,7 @@ ChartPoint point_of(const EffortSetting& setting, const Take& take, const render
 
 Chart chart_set(const std::string& set_path, const SetChartSettings& settings, Console& console) {
   Set set = read_set(set_path);
+  const std::string digest = set_digest(set_path);  // now: charts take minutes, and sets are edited
   const Scratch scratch;
   set.record = scratch.in_place_of(set.record);
   const std::int64_t frames = settings.quick ? 3 : 16;
@@ -125,6 +127,7 @@ Chart chart_set(const std::string& set_path, const SetChartSettings& settings, C
       fmt::format("{}x{}, from one shown frame to the next; labels: the setting's value",
                   set.show.width, set.show.height);
   chart.time_name = "time per frame, ms";
+  chart.set_digest = digest;
   const std::vector<EffortSetting> all = settings_to_measure(set.effort, settings.quick);
   Truth truth;
   double done = 0;

@@ -52,7 +52,8 @@ void apply_options(const RunOptions& options, Set& set) {
 
 // The effort that a chart of the set found best for what was asked.
 void choose_effort(const RunOptions& options, Set& set, Console& console) {
-  const std::vector<EffortPoint> points = read_effort_points(options.set, set.effort);
+  const auto [points, doubt] = read_effort_points(options.set, set.effort);
+  if (!doubt.empty()) console.warn(doubt);
   const EffortChoice choice =
       options.fps ? most_accurate_at(points, *options.fps) : fastest_within(points, *options.error);
   const auto& [effort, time_ms, error] = choice.point;

@@ -228,6 +228,12 @@ TEST_F(Runs, TakeTheEffortThatTheChartOfTheirSetFoundBest) {
   for (const char* name : {"aa_tolerance", "glint_contrast", "accuracy"}) {
     EXPECT_NEAR(taken[name].get<double>(), (*best)["settings"][name].get<double>(), 1e-6) << name;
   }
+  EXPECT_EQ(slow.err, "");
+  std::ofstream(set, std::ios::app) << "max_depth = 32\n";  // of [effort]
+  const Outcome changed = run("run " + set + " --frames 1 --fps 0.01");
+  EXPECT_EQ(changed.status, 0);
+  expect_one_line(changed.err);
+  EXPECT_THAT(changed.err, HasSubstr("platelight chart set"));
   const Outcome hopeless = run("run " + set + " --frames 1 --error 0");
   EXPECT_EQ(hopeless.status, 0);
   EXPECT_THAT(hopeless.err, HasSubstr("no measured setting is within 0 %"));

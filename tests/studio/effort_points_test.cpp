@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "studio/machine.h"
+#include "studio/set_digest.h"
 
 namespace studio::effort_points_test {
 namespace {
@@ -66,6 +67,21 @@ class EffortPointsFile : public testing::Test {
   }
   void TearDown() override { fs::remove_all(dir_); }
   std::string set() const { return (dir_ / "car.toml").string(); }
+  void write_set(const std::string& content) const { std::ofstream(set()) << content; }
+  // As `chart set` writes it.
+  Chart chart_of_set() const {
+    Chart chart;
+    chart.stage = "car.chart";
+    chart.set_digest = set_digest(set());
+    for (const EffortPoint& p : points) {
+      ChartPoint measured;
+      measured.settings = settings_of(p.effort);
+      measured.time_ms = p.time_ms;
+      measured.error = p.error;
+      chart.points.push_back(measured);
+    }
+    return chart;
+  }
   void write(const std::string& content) const {
     std::ofstream(effort_points_file(set())) << content;
   }
@@ -74,19 +90,12 @@ class EffortPointsFile : public testing::Test {
 };
 
 TEST_F(EffortPointsFile, GivesBackWhatTheChartMeasured) {
-  Chart chart;
-  chart.stage = "car.chart";
   render::Effort base;
   base.max_depth = 5;
-  for (const EffortPoint& p : points) {
-    ChartPoint measured;
-    measured.settings = settings_of(p.effort);
-    measured.time_ms = p.time_ms;
-    measured.error = p.error;
-    chart.points.push_back(measured);
-  }
-  write_chart(chart, dir_.string());
-  const std::vector<EffortPoint> read = read_effort_points(set(), base);
+  write_set("[show]\nwidth = 640\n");
+  write_chart(chart_of_set(), dir_.string());
+  const auto [read, doubt] = read_effort_points(set(), base);
+  EXPECT_EQ(doubt, "");
   ASSERT_EQ(read.size(), points.size());
   for (std::size_t i = 0; i < read.size(); ++i) {
     render::Effort effort = points[i].effort;
@@ -95,6 +104,36 @@ TEST_F(EffortPointsFile, GivesBackWhatTheChartMeasured) {
     EXPECT_EQ(read[i].time_ms, points[i].time_ms);
     EXPECT_EQ(read[i].error, points[i].error);
   }
+}
+
+TEST_F(EffortPointsFile, IsDoubtedOnceItsSetSaysAnythingElse) {
+  const std::string said =
+      "[show]\nwidth = 640\n[[object]]\nname = \"car\"\n[effort]\nmax_depth = 9\n";
+  write_set(said);
+  write_chart(chart_of_set(), dir_.string());
+  for (const char* same :
+       {"# a car\n[show]\nwidth=640.0 # wide\n\n[[object]]\nname = 'car'\n[effort]\nmax_depth = "
+        "9\n",
+        "[effort]\nmax_depth = 9\nlight_samples = 8\naa_tolerance = 0.3\n[show]\nwidth = 640\n"
+        "[[object]]\nname = \"car\"\n"}) {
+    write_set(same);
+    EXPECT_EQ(read_effort_points(set(), {}).doubt, "") << same;
+  }
+  for (const char* other :
+       {"", "[show]\nwidth = 641\n[[object]]\nname = \"car\"\n[effort]\nmax_depth = 9\n",
+        "[show]\nwidth = 640\n[[object]]\nname = \"car\"\n[effort]\nmax_depth = 8\n",
+        "[show]\nwidth = 640\n[[object]]\nname = \"car\"\n[[object]]\n[effort]\nmax_depth = 9\n"}) {
+    write_set(other);
+    const EffortPoints read = read_effort_points(set(), {});
+    EXPECT_EQ(read.points.size(), points.size());
+    EXPECT_THAT(read.doubt, HasSubstr("another set")) << other;
+    EXPECT_THAT(read.doubt, HasSubstr("platelight chart set " + set())) << other;
+  }
+  write_set(said);
+  Chart old = chart_of_set();
+  old.set_digest.clear();
+  write_chart(old, dir_.string());
+  EXPECT_THAT(read_effort_points(set(), {}).doubt, HasSubstr("another set"));
 }
 
 TEST_F(EffortPointsFile, IsRefusedWithTheCommandThatMakesItAnew) {
