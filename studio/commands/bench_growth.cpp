@@ -53,7 +53,6 @@ BenchScene shot_of_hills(int triangles) {
   shot.job.cam_from_set = calibrate::look_at({0, -2.6, 3.2}, {0, -0.1, 0}, 0);
   shot.job.lights = make_light_table(shot.environment, {.count = default_lights});
   shot.job.effort = plain_effort(shot.job.effort);
-  shot.job.effort.aa_samples = 1;
   return shot;
 }
 

@@ -62,7 +62,9 @@ double measure_kept(const BenchScene& shot, const render::FrameJob& job, int run
 }
 
 render::Effort plain_effort(render::Effort effort) {
+  effort.aa_samples = 1;
   effort.adaptive_visibility = false;
+  effort.cull_lights = false;
   effort.interleave = 1;
   effort.aa_tolerance = 0;
   effort.glint_contrast = 0;

@@ -21,7 +21,7 @@ KernelRate measure_kernel(const BenchScene& shot, const render::FrameJob& job, i
 // the best of `runs`.
 double measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs);
 
-// Every pixel tests every light that it faces, and nothing adapts.
+// One camera ray a pixel, whose every surface tests every light that it faces, and nothing adapts.
 render::Effort plain_effort(render::Effort effort);
 
 }  // namespace studio
