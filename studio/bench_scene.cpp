@@ -157,10 +157,12 @@ BenchScene make_bench_scene(int width, int height, BenchFinish finish) {
 }
 
 void drift(render::FrameJob& job) {
-  for (render::DirectionalLight& light : job.lights.lights) {
-    if (light.planned == render::Vec3f{}) light.planned = light.irradiance;
-    light.irradiance *= 1.0001F;
-  }
+  const auto strengthen = [](render::Vec3f& strength, render::Vec3f& planned) {
+    if (planned == render::Vec3f{}) planned = strength;
+    strength *= 1.0001F;
+  };
+  for (render::DirectionalLight& l : job.lights.lights) strengthen(l.irradiance, l.planned);
+  for (render::LocalLight& l : job.lights.lamps) strengthen(l.intensity, l.planned);
 }
 
 }  // namespace studio

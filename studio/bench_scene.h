@@ -68,7 +68,8 @@ BenchLight follow_bench_sky(render::LightFollower& follower,
                             const render::Environment& sky,
                             const render::LightTableSettings& settings);
 
-// As live light does from frame to frame: each light a little stronger, what is planned as it was.
+// As live light does from frame to frame: each light and lamp a little stronger, what is planned as
+// it was.
 void drift(render::FrameJob& job);
 
 }  // namespace studio

@@ -131,8 +131,13 @@ Timed render(const BenchScene& shot, const Visibility& visibility, int runs) {
   render::KeptTransport kept;
   inputs.kept = &kept;
   frame_ms();
-  timed.still_ms = frame_ms();
-  for (int i = 1; i < runs; ++i) timed.still_ms = std::min(timed.still_ms, frame_ms());
+  // A video that runs: cells are lit anew, not shown again.
+  const auto still_ms = [&] {
+    drift(job);
+    return frame_ms();
+  };
+  timed.still_ms = still_ms();
+  for (int i = 1; i < runs; ++i) timed.still_ms = std::min(timed.still_ms, still_ms());
   return timed;
 }
 
