@@ -14,8 +14,8 @@ namespace compositing {
 struct ExrSequenceSettings {
   std::string dir;  // made if missing; frames of the same number are replaced
   capture::Rational rate;
-  capture::Rational pixel_aspect{1, 1};
   std::string compression = "none";  // or "rle", "zip", "piz": smaller and slower in this order
+  capture::Rational pixel_aspect{1, 1};
 };
 
 class ExrSequence {

@@ -187,8 +187,8 @@ class Recorder::Take {
 Recorder::Take::Take(const RecorderSettings& settings) : settings_(settings) {
   check(settings);  // so that no take is lost to the start of one that cannot be
   if (!settings.exr_dir.empty()) {
-    exr_.emplace(ExrSequenceSettings{settings.exr_dir, settings.rate, settings.pixel_aspect,
-                                     settings.exr_compression});
+    exr_.emplace(ExrSequenceSettings{settings.exr_dir, settings.rate, settings.exr_compression,
+                                     settings.pixel_aspect});
   }
   if (!settings.file.empty()) video_.emplace(video_settings(settings));
   if (has_pair(settings)) {
