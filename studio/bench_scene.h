@@ -68,6 +68,11 @@ BenchLight follow_bench_sky(render::LightFollower& follower,
                             const render::Environment& sky,
                             const render::LightTableSettings& settings);
 
+// That were taken: primary, shadow and secondary ones.
+inline std::uint64_t all_rays(const render::RenderStatistics& s) {
+  return s.primary_rays + s.shadow_rays + s.secondary_rays;
+}
+
 // As live light does from frame to frame: each light and lamp a little stronger, what is planned as
 // it was.
 void drift(render::FrameJob& job);

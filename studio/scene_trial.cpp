@@ -80,6 +80,7 @@ TriedEffort SceneTrial::measure(const render::Effort& effort, int runs) const {
   tried.still_ms = still();
   const int still_again = tried.still_ms > slow_ms ? 0 : 2 * runs;
   for (int i = 0; i < still_again; ++i) tried.still_ms = std::min(tried.still_ms, still());
+  tried.still_statistics = result.statistics;
   tried.kept_mb = static_cast<double>(kept.bytes()) / (1 << 20);
   return tried;
 }

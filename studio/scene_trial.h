@@ -17,8 +17,10 @@ struct TriedEffort {
   std::vector<render::GroupError> groups;  // where the scene covers any of them
   render::RenderStatistics statistics;     // of a frame in which everything moves
   double moving_ms = 0;                    // all rays taken; the fastest of several frames
-  double still_ms = 0;    // nothing but the light has changed; as above. 0 = not measured
-  double kept_mb = 0;     // of memory that still frames take
+  double still_ms = 0;  // nothing but the light has changed; as above. 0 = not measured
+  double kept_mb = 0;   // of memory that still frames take
+  // Of a still frame: rays that it takes all the same, since not all cells find room to be kept.
+  render::RenderStatistics still_statistics;
   float table_error = 0;  // that the light table expects of itself
 };
 

@@ -121,15 +121,14 @@ class RenderChart {
     point.time_ms = moves ? tried.moving_ms : tried.still_ms;
     point.error = tried.error.relative_rms;
     point.error_p99 = tried.error.p99;
-    const render::RenderStatistics& s = tried.statistics;
+    const render::RenderStatistics& s = moves ? tried.statistics : tried.still_statistics;
     const std::vector<GroupError> worst = worst_groups(tried.groups, 1);
     point.figures = {
         {"delta_e", tried.error.delta_e_mean},
         {"reference_noise", tried.error.reference_noise},
         {"groups_within_5_percent", share_within(tried.groups, &GroupError::mean, good_group)},
         {"groups_rms_within_5_percent", share_within(tried.groups, &GroupError::rms, good_group)},
-        {"rays",
-         moves ? static_cast<double>(s.primary_rays + s.shadow_rays + s.secondary_rays) : 0.0},
+        {"rays", static_cast<double>(all_rays(s))},
         {"kept_mb", moves ? 0 : tried.kept_mb}};
     if (!worst.empty() && std::isfinite(worst[0].mean)) {
       point.figures.emplace_back("worst_group_error", worst[0].mean);

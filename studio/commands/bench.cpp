@@ -26,7 +26,7 @@ void bench_kernel(int runs, Console& console) {
   const KernelRate plain = measure_kernel(shot, job, runs);
   const KernelRate adaptive = measure_kernel(shot, by_default, runs);
 
-  const double kept_ms = measure_kept(shot, by_default, runs);
+  const KeptRate kept = measure_kept(shot, by_default, runs);
 
   const double share = plain.bare_ms / plain.kernel_ms;
   const double frame_share = adaptive.kernel_ms / plain.bare_ms;
@@ -45,12 +45,13 @@ void bench_kernel(int runs, Console& console) {
       fmt::format("default effort {:8} rays  kernel {:7.1f} ms = {:.2f} of bare Embree's time for "
                   "the plain rays",
                   adaptive.rays, adaptive.kernel_ms, frame_share));
-  console.say(fmt::format("the same, kept  no rays        kernel {:7.1f} ms = {:.2f} of it",
-                          kept_ms, kept_ms / plain.bare_ms));
+  console.say(fmt::format("the same, kept {:8} rays  kernel {:7.1f} ms = {:.2f} of it", kept.rays,
+                          kept.ms, kept.ms / plain.bare_ms));
   const Machine machine = this_machine();
   console.figures(nlohmann::ordered_json{
-      {"kept_frame_ms", kept_ms},
-      {"kept_frame_over_bare", kept_ms / plain.bare_ms},
+      {"kept_frame_ms", kept.ms},
+      {"kept_frame_over_bare", kept.ms / plain.bare_ms},
+      {"rays_kept", kept.rays},
       {"rays_plain", plain.rays},
       {"bare_ms", plain.bare_ms},
       {"kernel_ms", plain.kernel_ms},

@@ -48,10 +48,6 @@ Json rays_of(const BenchScene& shot, const render::FrameJob& job) {
           {"ray_limit_hits", s.ray_limit_hits}};
 }
 
-std::uint64_t all_rays(const render::RenderStatistics& s) {
-  return s.primary_rays + s.shadow_rays + s.secondary_rays;
-}
-
 render::PairedError paired(const capture::Image& picture, const Truth& truth) {
   return render::paired_error({&picture, &picture}, {&truth.references[0], &truth.references[1]},
                               truth.mask);
@@ -95,7 +91,7 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
   render::FrameResult whole;
   const double whole_ms =
       least_time_ms([&] { render_frame(shot.inputs(), shot.job, shot.half_plate, whole); }, 1);
-  const double still_ms = measure_kept(shot, shot.job, whole_ms > very_slow_ms ? 1 : bench.runs);
+  const KeptRate still = measure_kept(shot, shot.job, whole_ms > very_slow_ms ? 1 : bench.runs);
   Json row{{"scene", name},
            {"triangles", triangle_count(shot.scene->description())},
            {"width", width},
@@ -103,10 +99,11 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
            {"threads", tbb::this_task_arena::max_concurrency()},
            {"fps", 1000 / moving.kernel_ms},
            {"fps_default", 1000 / whole_ms},
-           {"fps_still", 1000 / still_ms},
+           {"fps_still", 1000 / still.ms},
            {"rays_per_frame", moving.rays},
            {"rays", rays_of(shot, fast)},
            {"rays_per_frame_default", all_rays(whole.statistics)},
+           {"rays_per_frame_still", still.rays},
            {"embree_share", share.bare_ms / share.kernel_ms},
            {"compile_ms", compile_ms},
            {"error", nullptr},

@@ -46,19 +46,20 @@ KernelRate measure_kernel(const BenchScene& shot, const render::FrameJob& job, i
   return m;
 }
 
-double measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs) {
+KeptRate measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs) {
   render::KeptTransport kept;
   render::FrameInputs inputs = shot.inputs();
   inputs.kept = &kept;
   render::FrameResult result;
   render_frame(inputs, job, shot.half_plate, result);
   render::FrameJob live = job;
-  return least_time_ms(
+  const double ms = least_time_ms(
       [&] {
         drift(live);
         render_frame(inputs, live, shot.half_plate, result);
       },
       runs);
+  return {ms, all_rays(result.statistics)};
 }
 
 render::Effort plain_effort(render::Effort effort) {

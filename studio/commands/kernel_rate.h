@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "studio/bench_scene.h"
 
@@ -17,9 +18,13 @@ struct KernelRate {
 // machine.
 KernelRate measure_kernel(const BenchScene& shot, const render::FrameJob& job, int runs);
 
-// A frame of a still shot under light that drifts, all of whose transport is kept: milliseconds,
-// the best of `runs`.
-double measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs);
+struct KeptRate {
+  double ms = 0;
+  std::uint64_t rays = 0;  // > 0 where the memory for kept transport does not hold all cells
+};
+
+// A frame of a still shot under light that drifts, whose transport is kept: the best of `runs`.
+KeptRate measure_kept(const BenchScene& shot, const render::FrameJob& job, int runs);
 
 // One camera ray a pixel, whose every surface tests every light that it faces, and nothing adapts.
 render::Effort plain_effort(render::Effort effort);

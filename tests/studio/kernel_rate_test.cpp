@@ -20,5 +20,15 @@ TEST(PlainEffort, TakesOneCameraRayAPixelAndTestsEveryLight) {
   EXPECT_GT(plain.statistics.shadow_rays, culled.statistics.shadow_rays);
 }
 
+TEST(MeasureKept, CountsTheRaysOfAStillFrameOfWhichThereAreNoneIfAllCellsAreKept) {
+  BenchScene shot = make_bench_scene(64, 48, BenchFinish::matte);
+  shot.job.lights = make_light_table(shot.environment, {.count = 4});
+  shot.job.effort.aa_samples = 4;
+  shot.job.effort.aa_tolerance = 0;
+  const KeptRate kept = measure_kept(shot, shot.job, 1);
+  EXPECT_GT(kept.ms, 0);
+  EXPECT_EQ(kept.rays, 0U);
+}
+
 }  // namespace
 }  // namespace studio::kernel_rate_test
