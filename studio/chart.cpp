@@ -28,7 +28,7 @@ void check(const Chart& chart) {
   }
   for (const ChartPoint& p : chart.points) {
     if (!(p.time_ms > 0) || !std::isfinite(p.time_ms) || !(p.error >= 0) ||
-        !std::isfinite(p.error) || !std::isfinite(p.error_p99)) {
+        !std::isfinite(p.error) || !std::isfinite(p.error_p99.value_or(0))) {
       throw std::invalid_argument(
           fmt::format("the point {} of method \"{}\" takes {} ms at error {}", p.label, p.method,
                       p.time_ms, p.error));
@@ -102,9 +102,11 @@ std::string chart_json(const Chart& chart) {
   for (const ChartPoint& p : chart.points) {
     Json settings = Json::object();
     for (const auto& [name, value] : p.settings) settings[name] = to_json(value);
-    Json point{{"method", p.method},    {"peer", p.peer},   {"settings", settings},
-               {"time_ms", p.time_ms},  {"error", p.error}, {"error_p99", p.error_p99},
-               {"on_front", p.on_front}};
+    Json point{
+        {"method", p.method},    {"peer", p.peer},
+        {"settings", settings},  {"time_ms", p.time_ms},
+        {"error", p.error},      {"error_p99", p.error_p99 ? Json(*p.error_p99) : Json(nullptr)},
+        {"on_front", p.on_front}};
     if (!p.scene.empty()) point["scene"] = p.scene;
     for (const auto& [name, value] : p.figures) point[name] = value;
     points.push_back(std::move(point));
@@ -157,7 +159,8 @@ std::string chart_csv(const Chart& chart) {
     if (scenes) csv += csv_cell(p.scene) + ",";
     csv += csv_cell(p.method) + "," + csv_cell(p.peer);
     for (const std::string& name : settings) csv += "," + csv_cell_of(p.settings, name);
-    csv += "," + csv_cell(p.time_ms) + "," + csv_cell(p.error) + "," + csv_cell(p.error_p99);
+    csv += "," + csv_cell(p.time_ms) + "," + csv_cell(p.error) + ",";
+    if (p.error_p99) csv += csv_cell(*p.error_p99);
     for (const std::string& name : figures) csv += "," + csv_cell_of(p.figures, name);
     csv += "," + csv_cell(p.on_front) + "\n";
   }

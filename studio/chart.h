@@ -20,8 +20,8 @@ struct ChartPoint {
   bool peer = false;    // another tool's
   std::vector<std::pair<std::string, ChartValue>> settings;  // in the order to show
   double time_ms = 0;                                        // > 0
-  double error = 0;  // as the chart's `error_name` says; >= 0
-  double error_p99 = 0;
+  double error = 0;                 // as the chart's `error_name` says; >= 0
+  std::optional<double> error_p99;  // the error that 99 % stay below; none = not measured
   std::vector<std::pair<std::string, double>> figures;  // what else was measured: flicker, memory
   std::string label;        // a few characters beside the mark: "N 64"; "" = none
   bool by_default = false;  // what the program does if it is told nothing else

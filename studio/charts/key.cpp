@@ -111,7 +111,6 @@ class KeyChart {
 
   void add(Chart& chart, ChartPoint point, const KeyScore& score) const {
     point.error = score.error.composite;
-    point.error_p99 = score.error.edge;
     point.figures = {{"edge", score.error.edge},
                      {"alpha_mse_e3", 1e3 * score.error.alpha_mse},
                      {"flicker_e3", 1e3 * score.flicker},

@@ -135,7 +135,8 @@ class LensChart {
     }
     chart.panels.push_back(
         {"RMS ray error, mrad", {{"error", ""}}, "parameters", "free parameters"});
-    chart.panels.push_back({"largest of the throws' errors, mrad", {{"error_p99", ""}}, "", ""});
+    chart.panels.push_back(
+        {"largest of the throws' errors, mrad", {{"largest_error", ""}}, "", ""});
     add_stressors(chart);
     return chart;
   }
@@ -159,7 +160,7 @@ class LensChart {
     constexpr double worthless_mrad = 1000;
     if (!throws.finite() || throws.largest > worthless_mrad) return;
     point.error = std::sqrt(throws.squares / static_cast<double>(throws.count));
-    point.error_p99 = throws.largest;
+    point.figures.emplace_back("largest_error", throws.largest);
     point.time_ms = throws.least_ms;
     point.settings.emplace_back("throws", static_cast<double>(throws.count));
     chart.points.push_back(std::move(point));

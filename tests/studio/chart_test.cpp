@@ -156,6 +156,13 @@ TEST(ChartCsv, HasARowForEveryPoint) {
       << csv;
 }
 
+TEST(ChartJson, HasNo99thPercentileOfAnErrorThatWasNotMeasured) {
+  const auto points = nlohmann::json::parse(chart_json(made_chart()))["points"];
+  EXPECT_TRUE(points[0]["error_p99"].is_number());
+  EXPECT_TRUE(points.back()["error_p99"].is_null()) << "Cycles'";
+  EXPECT_THAT(chart_csv(made_chart()), HasSubstr("Cycles 3.4,true,,,240,0.11,,,"));
+}
+
 TEST(WriteChart, WritesFourFiles) {
   const fs::path dir =
       fs::path(testing::TempDir()) / ("platelight_chart" + std::to_string(getpid()));

@@ -17,6 +17,7 @@ TEST(HullChart, HasAHullThatErrsLessThanBillboardsFromThirtyDegreesOn) {
   int defaults = 0;
   for (const ChartPoint& p : chart.points) {
     EXPECT_GT(p.time_ms, 0);
+    EXPECT_FALSE(p.error_p99);
     EXPECT_TRUE(std::isfinite(p.error));
     defaults += p.by_default;
   }

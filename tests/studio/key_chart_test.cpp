@@ -18,6 +18,7 @@ TEST(KeyChart, HasADefaultThatErrsLessThanEachOtherToolAndSaysWhenItIsUnsure) {
   int peers = 0;
   for (const ChartPoint& p : chart.points) {
     EXPECT_GT(p.time_ms, 0);
+    EXPECT_FALSE(p.error_p99) << "it has a mean error of edges, and no percentile";
     if (!p.peer) continue;
     ++peers;
     EXPECT_LT(ours->error, p.error) << p.method;

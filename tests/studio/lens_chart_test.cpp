@@ -104,6 +104,9 @@ TEST(LensChart, ShowsWhatIsAskedOfIt) {
   for (const ChartPoint& p : chart.points) {
     EXPECT_GT(p.time_ms, 0);
     EXPECT_GT(p.error, 0);
+    EXPECT_FALSE(p.error_p99);
+    EXPECT_EQ(std::ranges::count(p.figures, "largest_error", [](const auto& f) { return f.first; }),
+              1);
     peers += p.peer;
   }
   EXPECT_GE(peers, 1u);
