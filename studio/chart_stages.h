@@ -25,6 +25,7 @@ struct ChartStage {
   std::string_view summary;  // one line
   // Measures. Says how far it is through the console. Its points need not be marked.
   std::function<Chart(const ChartRequest&, Console&)> measure;
+  bool takes_set = false;  // whether it looks at the request's set file
 };
 
 std::span<const ChartStage> chart_stages();

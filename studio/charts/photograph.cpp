@@ -190,7 +190,8 @@ ChartStage photograph_chart() {
           "the composite against the photograph of the same world, split by its causes",
           [](const ChartRequest& request, Console& console) {
             return PhotographChart(request, console).measure();
-          }};
+          },
+          true};
 }
 
 }  // namespace studio

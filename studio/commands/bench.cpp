@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -77,6 +78,31 @@ struct BenchOptions {
   std::optional<std::int64_t> width = 640, height = 480;
 };
 
+std::string listed(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
+// What is named for a benchmark that does not look at it.
+void refuse_what_is_ignored(const BenchOptions& o) {
+  struct Option {
+    const char* name;
+    bool is_given;
+    std::vector<std::string> takers;
+  };
+  for (const Option& option :
+       {Option{"--set", !o.set.empty(), {"inputs"}}, Option{"--model", !o.files.empty(), {"load"}},
+        Option{"--scene", !o.scene.empty(), {"papers", "drag", "cycles"}},
+        Option{"--pictures", !o.pictures.empty(), {"papers", "drag", "cycles"}}}) {
+    if (!option.is_given || std::ranges::find(option.takers, o.what) != option.takers.end()) {
+      continue;
+    }
+    throw UsageError(fmt::format("bench {} takes no {}: it is for {}", o.what, option.name,
+                                 listed(option.takers)));
+  }
+}
+
 }  // namespace
 
 Command bench_command() {
@@ -110,6 +136,13 @@ Command bench_command() {
         arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
         return [o](Console& console) {
           const int runs = static_cast<int>(*o->runs);
+          const std::vector<std::string> names{"kernel", "growth", "papers", "drag", "deform",
+                                               "cycles", "inputs", "hdr",    "load"};
+          if (std::ranges::find(names, o->what) == names.end()) {
+            throw UsageError(fmt::format("there is no benchmark of \"{}\": there are {}", o->what,
+                                         listed(names)));
+          }
+          refuse_what_is_ignored(*o);
           if (o->what == "kernel") return bench_kernel(runs, console);
           if (o->what == "growth") return bench_growth(runs, console);
           if (o->what == "hdr") return bench_hdr(runs, console);
@@ -126,12 +159,6 @@ Command bench_command() {
             return bench_cycles({o->pictures, runs, std::max(1, static_cast<int>(*o->check)),
                                  static_cast<int>(*o->converged), o->scene},
                                 console);
-          }
-          if (o->what != "inputs") {
-            throw UsageError(fmt::format(
-                "there is no benchmark of \"{}\": there are kernel, growth, papers, drag, deform, "
-                "cycles, inputs, hdr and load",
-                o->what));
           }
           if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");
           bench_inputs(o->set, runs, console);

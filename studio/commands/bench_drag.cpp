@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/kernel.h"
+#include "studio/arguments.h"
 #include "studio/commands/bench_rows.h"
 #include "studio/commands/benches.h"
 #include "studio/display_png.h"
@@ -164,6 +165,16 @@ class Dragging {
 }  // namespace
 
 void bench_drag(const std::string& only, const std::string& pictures, Console& console) {
+  if (!only.empty() &&
+      std::ranges::none_of(drags, [&](const Drag& d) { return only == d.scene; })) {
+    std::string known;
+    for (const Drag& drag : drags) {
+      if (known.find(drag.scene) != std::string::npos) continue;
+      known += fmt::format("{}{}", known.empty() ? "" : ", ", drag.scene);
+    }
+    throw UsageError(
+        fmt::format("nothing is dragged in a scene \"{}\": there are {}", only, known));
+  }
   if (!pictures.empty()) std::filesystem::create_directories(pictures);
   Json rows = Json::array();
   console.say(

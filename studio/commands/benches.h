@@ -24,6 +24,7 @@ void bench_papers(const PapersBench& bench, Console& console);
 // A part of each scene of the papers, or of one, dragged for a second of frames at 25 a second and
 // then left alone, as a live show does it: when it shows, what a frame takes, when it is sharp.
 // `pictures`: a directory for what is shown at the end of the drag and a second later, or none.
+// Throws UsageError, listing the scenes, for one in which nothing is dragged.
 void bench_drag(const std::string& scene, const std::string& pictures, Console& console);
 
 // Time a frame, and of bare Embree over the same rays, from 100,000 triangles to 800,000 that are

@@ -26,6 +26,9 @@ struct ChartOptions {
 // "set SET.toml": beside the set file, where `run` looks for it, if nothing else is said.
 void chart_of_set(const ChartOptions& options, Console& console) {
   if (options.stages.size() != 2) throw UsageError("chart set needs one set file: set SET.toml");
+  if (!options.request.set.empty()) {
+    throw UsageError("chart set measures the set that is named after it: --set is for photograph");
+  }
   const std::string& set = options.stages[1];
   SetChartSettings settings;
   settings.quick = options.request.quick;
@@ -57,6 +60,14 @@ void chart(const ChartOptions& options, Console& console) {
     known += " set SET.toml,";
     throw UsageError(fmt::format("there is no chart of \"{}\": there are{} all", name, known));
   }
+  if (options.samples) throw UsageError("--samples is for chart set SET.toml");
+  for (const ChartStage* stage : wanted) {
+    if (all || options.request.set.empty() || stage->takes_set) continue;
+    throw UsageError(fmt::format(
+        "chart {} measures made scenes alone: --set is for photograph; a whole set is measured by "
+        "chart set SET.toml",
+        stage->name));
+  }
   if (wanted.size() > 1 && console.wants_figures()) {
     throw UsageError("--json takes the figures of one stage; --out has them all");
   }
@@ -75,25 +86,25 @@ void chart(const ChartOptions& options, Console& console) {
 }  // namespace
 
 Command chart_command() {
-  return {"chart", "Measure error against time over the settings of a stage",
-          "platelight chart lights --out charts/",
-          [](Arguments& arguments) -> std::function<void(Console&)> {
-            auto o = std::make_shared<ChartOptions>();
-            std::string stages = "what to measure: all, or some of";
-            for (const ChartStage& stage : chart_stages()) {
-              stages += fmt::format("\n{} ({})", stage.name, stage.summary);
-            }
-            stages += "\nset SET.toml (a whole set on this machine, for run --fps and --error)";
-            arguments.positionals("STAGE", o->stages, stages);
-            arguments.option(
-                "--out", o->out,
-                "directory that the charts are written to (this one; of a set, its own)");
-            arguments.option("--set", o->request.set, "measure with this set file's scene");
-            arguments.option("--samples", o->samples, 2, 1 << 20,
-                             "of a set's reference, paths per pixel (256)");
-            arguments.flag("--quick", o->request.quick, "fewer points, for a first look");
-            return [o](Console& console) { chart(*o, console); };
-          }};
+  return {
+      "chart", "Measure error against time over the settings of a stage",
+      "platelight chart lights --out charts/",
+      [](Arguments& arguments) -> std::function<void(Console&)> {
+        auto o = std::make_shared<ChartOptions>();
+        std::string stages = "what to measure: all, or some of";
+        for (const ChartStage& stage : chart_stages()) {
+          stages += fmt::format("\n{} ({})", stage.name, stage.summary);
+        }
+        stages += "\nset SET.toml (a whole set on this machine, for run --fps and --error)";
+        arguments.positionals("STAGE", o->stages, stages);
+        arguments.option("--out", o->out,
+                         "directory that the charts are written to (this one; of a set, its own)");
+        arguments.option("--set", o->request.set, "photograph: measure with this set file's scene");
+        arguments.option("--samples", o->samples, 2, 1 << 20,
+                         "set: of the reference, paths per pixel (256)");
+        arguments.flag("--quick", o->request.quick, "fewer points, for a first look");
+        return [o](Console& console) { chart(*o, console); };
+      }};
 }
 
 }  // namespace studio

@@ -92,6 +92,26 @@ TEST_F(CommandLine, RefusesABenchmarkWithoutItsSubject) {
   }
 }
 
+TEST_F(CommandLine, RefusesWhatAChartOrABenchmarkWouldNotLookAt) {
+  for (const auto& [words, possible] :
+       {std::pair{"chart hdr --quick --set /nonexistent.toml", "photograph"},
+        {"chart photograph hdr --quick --set /nonexistent.toml", "photograph"},
+        {"chart set a.toml --set b.toml", "photograph"},
+        {"chart hdr --quick --samples 7", "chart set"},
+        {"bench drag --scene nosuch", "headlight, glass_sphere, tv_room, car"},
+        {"bench drag --scene billboards", "headlight, glass_sphere, tv_room, car"},
+        {"bench kernel --scene car", "papers, drag, cycles"},
+        {"bench growth --pictures here", "papers, drag, cycles"},
+        {"bench kernel --set a.toml", "inputs"},
+        {"bench hdr --model a.obj", "load"}}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 2) << words;
+    expect_one_line(outcome.err);
+    EXPECT_THAT(outcome.err, HasSubstr(possible)) << words;
+    EXPECT_EQ(outcome.out, "") << words;
+  }
+}
+
 TEST_F(CommandLine, ReturnsOneAndOneLineForAFileThatIsNotThere) {
   const Outcome outcome = run("check " + (dir_ / "absent.toml").string());
   EXPECT_EQ(outcome.status, 1);
