@@ -76,6 +76,7 @@ struct BenchOptions {
   std::optional<std::int64_t> check = 64;
   std::optional<std::int64_t> converged = 1024;
   std::optional<std::int64_t> width = 640, height = 480;
+  std::optional<std::int64_t> frames = 250;
 };
 
 std::string listed(const std::vector<std::string>& names) {
@@ -133,6 +134,7 @@ Command bench_command() {
                          "cycles: samples a pixel of Cycles' own converged picture");
         arguments.option("--width", o->width, 16, 7680, "papers: of the pictures, in pixels");
         arguments.option("--height", o->height, 16, 4320, "papers: of the pictures, in pixels");
+        arguments.option("--frames", o->frames, 2, 1 << 20, "inputs: at most so many of the set's");
         arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
         return [o](Console& console) {
           const int runs = static_cast<int>(*o->runs);
@@ -161,7 +163,7 @@ Command bench_command() {
                                 console);
           }
           if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");
-          bench_inputs(o->set, runs, console);
+          bench_inputs(o->set, runs, *o->frames, console);
         };
       }};
 }

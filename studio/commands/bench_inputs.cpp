@@ -21,8 +21,8 @@ struct Pass {
   std::array<double, stages> stage_ms{};  // a frame, by the clock
 };
 
-// All frames of a set, without the first, which builds what is kept.
-Pass make_all(const Set& set) {
+// The frames of a set, without the first, which builds what is kept.
+Pass make_all(const Set& set, std::int64_t most_frames) {
   FrameMaker maker(set);
   maker.make(0);
   Pass pass;
@@ -30,7 +30,7 @@ Pass make_all(const Set& set) {
   while (const std::optional<PreparedFrame> frame = maker.make(pass.frames + 1)) {
     for (std::size_t i = 0; i < stages; ++i) pass.stage_ms[i] += frame->stage_ms[i];
     ++pass.frames;
-    if (set.show.frames && pass.frames + 1 >= *set.show.frames) break;
+    if (pass.frames + 1 >= std::min(most_frames, set.show.frames.value_or(most_frames))) break;
   }
   const double frames = std::max(pass.frames, 1);
   pass.cpu_ms = (cpu_ms_so_far() - start_ms) / frames;
@@ -40,11 +40,14 @@ Pass make_all(const Set& set) {
 
 }  // namespace
 
-void bench_inputs(const std::string& set_path, int runs, Console& console) {
+void bench_inputs(const std::string& set_path,
+                  int runs,
+                  std::int64_t most_frames,
+                  Console& console) {
   const Set set = read_set(set_path);
-  Pass best = make_all(set);
+  Pass best = make_all(set, most_frames);
   for (int i = 1; i < runs; ++i) {
-    const Pass pass = make_all(set);
+    const Pass pass = make_all(set, most_frames);
     if (pass.cpu_ms < best.cpu_ms) best = pass;
   }
   nlohmann::ordered_json stage_ms;

@@ -1,6 +1,7 @@
 // The benchmarks of `platelight bench`, one function each.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -47,9 +48,12 @@ struct CyclesBench {
 // apart, and error against time of both. Throws std::runtime_error if Blender is missing or fails.
 void bench_cycles(const CyclesBench& bench, Console& console);
 
-// CPU time a frame that a set's inputs take: plate, probe, light table; the best of `runs` passes.
-// Throws SetError.
-void bench_inputs(const std::string& set_path, int runs, Console& console);
+// CPU time a frame that a set's inputs take: plate, probe, light table; the best of `runs` passes
+// over the show's frames, but at most so many: a still plate has no last one. Throws SetError.
+void bench_inputs(const std::string& set_path,
+                  int runs,
+                  std::int64_t most_frames,
+                  Console& console);
 
 // CPU time of a live lightprobe's HDR frame of 1024x1024 pixels, a bracket of five, by the camera's
 // format: from its bytes to light, labelled, and merged; the best of `runs` passes.

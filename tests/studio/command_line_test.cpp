@@ -296,6 +296,15 @@ TEST_F(Runs, TellWhatTheirInputsCost) {
   EXPECT_TRUE(json["stage_ms"]["probe"].is_number());
 }
 
+TEST_F(Runs, TellWhatInputsOfAStillPlateCostAndEnd) {
+  write_set();  // its plate
+  const std::string json_path = (dir_ / "inputs.json").string();
+  const Outcome outcome = run("bench inputs --runs 1 --frames 5 --set " +
+                              write_made_set(dir_, "file:plate_0.png") + " --json " + json_path);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(content_of(json_path))["frames"], 4);
+}
+
 TEST_F(Runs, RecordVideoAndExr) {
   const std::string take = (dir_ / "take.mkv").string();
   const Outcome outcome = run("run --quiet " + write_set() + " --record " + take + " --exr " +
