@@ -18,7 +18,7 @@ std::vector<EffortSetting> effort_dial(const render::Effort& base) {
                             {4, 0, 0, 32, 1, true, 0.95F},
                             {4, 0.4F, 0.4F, 32, 1, true, 0.95F},
                             {4, 0.2F, 0.2F, 64, 1, true, 0.95F},
-                            {16, 0.06F, 0.1F, 64, 1, true, 0.97F},
+                            {16, 0.05F, 0.09F, 64, 1, true, 0.97F},
                             {16, 0.03F, 0.05F, 128, 1, false, 0.98F},
                             {64, 0.02F, 0.03F, 256, 1, false, 0.99F}};
   std::vector<EffortSetting> settings;
