@@ -177,7 +177,8 @@ class LensChart {
         const calibrate::LensStart start = calibrate::start_lens(problem, one_parameter_form(form));
         const auto solve = calibrate::solve_lens(problem, form, start, {.warp = false});
         if (!solve) continue;
-        throws.add(ray_error_mrad(camera.truth, solve->lens, camera.max_deg), now_ms() - begin);
+        const double taken_ms = now_ms() - begin;
+        throws.add(ray_error_mrad(camera.truth, solve->lens, camera.max_deg), taken_ms);
       }
       ChartPoint point;
       point.method =
@@ -200,7 +201,8 @@ class LensChart {
       console_.progress(0.3, "selection");
       const double begin = now_ms();
       const LensCalibration c = calibrate::calibrate_lens(problem);
-      throws.add(ray_error_mrad(camera.truth, c.lens, camera.max_deg), now_ms() - begin);
+      const double taken_ms = now_ms() - begin;
+      throws.add(ray_error_mrad(camera.truth, c.lens, camera.max_deg), taken_ms);
     }
     ChartPoint point;
     point.method = camera.name + ": selection";
