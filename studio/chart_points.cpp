@@ -110,6 +110,9 @@ void label_points(Svg& svg,
   }
 }
 
+// 0 has none on a logarithmic axis: at its lower end it would look measured as that.
+bool has_place(const Axis& axis, double value) { return !axis.logarithmic || value > 0; }
+
 // The points' values against their time.
 void draw_points(Svg& svg,
                  const std::vector<Series>& all,
@@ -124,7 +127,7 @@ void draw_points(Svg& svg,
       for (const ChartPoint* p : series.points) {
         const auto u = across(*p);
         const auto v = value(*p);
-        if (u && v) places.emplace_back(x(*u), y(*v));
+        if (u && v && has_place(x, *u) && has_place(y, *v)) places.emplace_back(x(*u), y(*v));
       }
       if (lines && places.size() > 1) {
         svg.polyline(places, series.colour, series.peer ? 1.8 : 1, series.peer ? peer_dashes : "");
@@ -229,7 +232,8 @@ void draw_scene(Svg& svg,
                 const std::string& scene,
                 const PanelPlace& place,
                 double text_size) {
-  const Points points = points_of(chart, scene);
+  Points points = points_of(chart, scene);
+  std::erase_if(points, [](const ChartPoint* p) { return !(p->error > 0); });
   std::vector<double> errors, times;
   for (const ChartPoint* p : points) {
     errors.push_back(p->error);

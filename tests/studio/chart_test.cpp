@@ -156,6 +156,15 @@ TEST(ChartCsv, HasARowForEveryPoint) {
       << csv;
 }
 
+TEST(ChartSvg, DrawsNoFigureOf0OnALogarithmicAxis) {
+  Chart with = made_chart();
+  with.panels.push_back({"flicker", {{"flicker", ""}}});
+  Chart without = with;
+  with.points[3].figures[0].second = 0;
+  without.points[3].figures.clear();
+  EXPECT_EQ(chart_svg(with), chart_svg(without));
+}
+
 TEST(ChartJson, HasNo99thPercentileOfAnErrorThatWasNotMeasured) {
   const auto points = nlohmann::json::parse(chart_json(made_chart()))["points"];
   EXPECT_TRUE(points[0]["error_p99"].is_number());
