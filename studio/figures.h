@@ -10,7 +10,8 @@
 
 namespace studio {
 
-// The JSON text of `run --json`: see studio/docs/figures.md.
+// The JSON text of `run --json`: what ShowStatus has, in its units, with the effort, what was
+// recorded, memory, and the error if it was measured.
 std::string show_figures(const Set& set,
                          const ShowStatus& status,
                          const std::optional<render::PictureError>& error);
