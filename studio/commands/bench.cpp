@@ -129,7 +129,8 @@ Command bench_command() {
             "cycles: for the scenes as files and all pictures");
         arguments.option("--scene", o->scene, "papers, drag, cycles: only this one");
         arguments.option("--check-error", o->check, 0, 65536,
-                         "papers, cycles: paths a pixel of the reference; 0 = none");
+                         "papers: paths a pixel of both references together, 0 = no error; cycles: "
+                         "of each of two, at least 1");
         arguments.option("--converged", o->converged, 2, 65536,
                          "cycles: samples a pixel of Cycles' own converged picture");
         arguments.option("--width", o->width, 16, 7680, "papers: of the pictures, in pixels");

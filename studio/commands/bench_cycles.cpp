@@ -102,7 +102,10 @@ std::map<std::string, std::vector<bool>> regions_of(const BenchScene& shot) {
 }
 
 // Runs Blender on a scene's folder; what it says goes to a file there.
-void run_blender(const fs::path& directory, int converged, const std::vector<int>& counts) {
+void run_blender(const fs::path& directory,
+                 int runs,
+                 int converged,
+                 const std::vector<int>& counts) {
   const fs::path script = directory / "compare_with_cycles.py", log = directory / "blender.log";
   std::ofstream(script) << compare_with_cycles;
   std::vector<std::string> words{"blender",
@@ -114,6 +117,7 @@ void run_blender(const fs::path& directory, int converged, const std::vector<int
                                  "--",
                                  directory.string(),
                                  std::to_string(tbb::this_task_arena::max_concurrency()),
+                                 std::to_string(runs),
                                  std::to_string(converged)};
   for (const int count : counts) words.push_back(std::to_string(count));
   std::vector<char*> arguments;
@@ -227,7 +231,7 @@ Json compare(const std::string& name, const CyclesBench& bench, Console& console
   write_peer_scene(scene, directory);
   std::vector<int> counts;
   for (int count = 1; count <= std::min(bench.converged, 256); count *= 4) counts.push_back(count);
-  run_blender(directory, bench.converged, counts);
+  run_blender(directory, bench.runs, bench.converged, counts);
   Json theirs;
   std::ifstream(directory / "cycles.json") >> theirs;
 

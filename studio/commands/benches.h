@@ -39,7 +39,7 @@ void bench_deform(int runs, Console& console);
 struct CyclesBench {
   std::string
       directory;         // for the scenes as files, both renderers' pictures, and what Blender says
-  int runs = 5;          // of each of our points: the best counts
+  int runs = 5;          // of each point, ours and theirs: the best counts
   int check = 256;       // paths a pixel of each of our two references
   int converged = 1024;  // samples of each of Cycles' two
   std::string scene;     // this one only; "" = all

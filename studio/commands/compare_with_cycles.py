@@ -1,7 +1,7 @@
 # Renders a scene that `platelight bench cycles` wrote with Blender's Cycles, at several numbers of samples.
-#   blender -b --factory-startup -P compare_with_cycles.py -- DIR THREADS CONVERGED SAMPLES...
+#   blender -b --factory-startup -P compare_with_cycles.py -- DIR THREADS RUNS CONVERGED SAMPLES...
 # Writes DIR/cycles_SAMPLES_SEED.exr (RGBA, linear, premultiplied) and DIR/cycles.json with the times. CONVERGED samples
-# are rendered with the seeds 2 and 3, the others with seed 1.
+# are rendered with the seeds 2 and 3, the others with seed 1, RUNS times: the least times count.
 import array
 import json
 import os
@@ -14,8 +14,8 @@ import time
 import bpy
 import mathutils
 
-directory, threads, converged = sys.argv[sys.argv.index('--') + 1:][:3]
-counts = [int(word) for word in sys.argv[sys.argv.index('--') + 4:]]
+directory, threads, runs, converged = sys.argv[sys.argv.index('--') + 1:][:4]
+counts = [int(word) for word in sys.argv[sys.argv.index('--') + 5:]]
 with open(os.path.join(directory, 'scene.json')) as file:
     made = json.load(file)
 
@@ -216,7 +216,12 @@ def rendered(name, samples, seed, width, height):
 preparing = min(rendered('cycles_tiny.exr', 1, 1, 8, 6)['cpu_s'] for _ in range(2))
 pictures = []
 for count, seed in [(count, 1) for count in counts] + [(int(converged), 2), (int(converged), 3)]:
-    picture = rendered('cycles_%d_%d.exr' % (count, seed), count, seed, made['width'], made['height'])
+    name = 'cycles_%d_%d.exr' % (count, seed)
+    made_so = [rendered(name, count, seed, made['width'], made['height'])
+               for _ in range(int(runs) if seed == 1 else 1)]
+    picture = dict(made_so[0])
+    for kind in ('cpu_s', 'wall_s', 'render_s'):
+        picture[kind] = min(once[kind] for once in made_so)
     picture['cpu_s'] -= preparing
     pictures.append(picture)
     print('platelight', json.dumps(picture), flush=True)
