@@ -40,7 +40,9 @@ std::optional<Rational> nominal_rate(double rate, double tolerance) {
   if (!(rate > 0) || !(rate < largest)) {
     return std::nullopt;
   }
-  const Rational whole{std::llround(rate), 1}, ntsc{1000 * std::llround(rate * 1.001), 1001};
+  const std::int64_t of_ntsc = std::llround(rate * 1.001);
+  const bool is_known = of_ntsc % 24 == 0 || of_ntsc % 30 == 0;  // there is no 49.95
+  const Rational whole{std::llround(rate), 1}, ntsc{is_known ? 1000 * of_ntsc : 0, 1001};
   const auto off = [&](const Rational& named) {
     return named.num > 0 ? std::abs(rate / named.value() - 1) : HUGE_VAL;
   };

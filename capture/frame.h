@@ -32,8 +32,8 @@ Time time_of_frame(std::int64_t n, Rational rate);
 // frame 0. Exact for times of centuries at any broadcast rate.
 std::int64_t frame_at(Time time, Rational rate);
 
-// The rate that a measured one is meant to be: whole, or whole times 1000/1001, whichever is
-// nearer, if that is it to a relative `tolerance`.
+// The rate that a measured one is meant to be: whole, or a multiple of 24 or 30 times 1000/1001,
+// whichever is nearer, if that is it to a relative `tolerance`.
 std::optional<Rational> nominal_rate(double rate, double tolerance);
 
 enum class FrameStatus {

@@ -84,8 +84,9 @@ void read_match(Section& section, std::array<int, 2> picture, MatchSettings& mat
     std::string word;
     if (section.text("match", word) && word != "auto") {
       section.fault("match",
-                    "must be \"auto\", the numbers that calibrate light gives, or a table "
-                    "of gain, matrix or patch");
+                    fmt::format("is \"{}\", but must be \"auto\", the numbers that calibrate "
+                                "light gives, or a table of gain, matrix or patch",
+                                word));
     }
   }
 }

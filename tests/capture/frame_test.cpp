@@ -47,6 +47,7 @@ TEST(NominalRate, IsWholeOrThatOfNtsc) {
   EXPECT_EQ(nominal_rate(19001.0 / 317, 1e-6), (Rational{60000, 1001}));
   EXPECT_EQ(nominal_rate(29.97, 1e-3), (Rational{30000, 1001}));
   EXPECT_EQ(nominal_rate(25.000001, 1e-6), (Rational{25, 1}));
+  EXPECT_EQ(nominal_rate(49.95, 1e-2), (Rational{50, 1})) << "no camera has 49.95";
   EXPECT_EQ(nominal_rate(25.01, 1e-6), std::nullopt);
   for (const double none : {0.0, -25.0, std::nan(""), HUGE_VAL}) {
     EXPECT_EQ(nominal_rate(none, 1e-3), std::nullopt) << none;
