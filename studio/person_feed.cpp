@@ -107,9 +107,7 @@ class PersonFeed::Claims {
       if (person->cameras.size() != s.cameras.size()) return false;
       for (std::size_t k = 0; k < s.cameras.size(); ++k) {
         const PersonCameraFeed& feed = person->cameras[k].feed;
-        const bool there = person->settings.cameras[k].cam_from_set == s.cameras[k].cam_from_set;
-        if (!there || is_claimed(feed) || !feed.serves(s.cameras[k], options_of(s, k)))
-          return false;
+        if (is_claimed(feed) || !feed.serves(s.cameras[k], options_of(s, k))) return false;
       }
       return true;
     };
