@@ -10,6 +10,7 @@
 #include "capture/genicam_format.h"
 #include "capture/v4l2_format.h"
 #include "capture/v4l2_request.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -170,9 +171,7 @@ std::string cameras_json(const capture::V4l2Listing& listing,
   for (const capture::V4l2Listing::Closed& one : listing.closed) {
     closed.push_back({{"path", one.path}, {"reason", one.reason}});
   }
-  // Devices' names may hold any bytes.
-  return Json{{"cameras", cameras}, {"closed", closed}}.dump(2, ' ', false,
-                                                             Json::error_handler_t::replace);
+  return json_text(Json{{"cameras", cameras}, {"closed", closed}});
 }
 
 }  // namespace studio

@@ -1,5 +1,6 @@
 // Figures of shows.
 #include "studio/figures.h"
+#include "studio/json_text.h"
 
 #include <sys/resource.h>
 
@@ -161,8 +162,7 @@ std::string show_figures(const Set& set,
          {{"mean", error->delta_e_mean}, {"p95", error->delta_e_p95}, {"p99", error->delta_e_p99}}},
         {"pixels", error->pixels}};
   }
-  // Paths need not be UTF-8.
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return json_text(json);
 }
 
 }  // namespace studio

@@ -14,6 +14,7 @@
 #include "render/scene.h"
 #include "render/standard.h"
 #include "studio/commands/benches.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -145,7 +146,7 @@ void bench_deform(int runs, Console& console) {
                        {"other_mrays_fitted", rates[2]},
                        {"other_mrays_built", rates[3]}});
   }
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
 }
 
 }  // namespace studio

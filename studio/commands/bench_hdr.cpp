@@ -19,6 +19,7 @@
 #include "capture/pool.h"
 #include "capture/v4l2_format.h"
 #include "studio/commands/benches.h"
+#include "studio/json_text.h"
 #include "studio/machine.h"
 #include "studio/rolling_bracket.h"
 
@@ -183,7 +184,7 @@ void bench_hdr(int runs, Console& console) {
                                   {"of_two_cores_at_60", share}});
   }
   figures["machine"] = {{"cpu", machine.cpu}, {"threads", machine.threads}};
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
 }
 
 }  // namespace studio

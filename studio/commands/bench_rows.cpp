@@ -1,6 +1,7 @@
 // Rows as figures.
 #include "studio/commands/bench_rows.h"
 
+#include "studio/json_text.h"
 #include "studio/machine.h"
 
 namespace studio {
@@ -10,7 +11,7 @@ void give_rows(const nlohmann::ordered_json& rows, Console& console) {
   const nlohmann::ordered_json figures{
       {"rows", rows},
       {"machine", {{"cpu", machine.cpu}, {"threads", machine.threads}, {"arch", machine.arch}}}};
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
 }
 
 }  // namespace studio

@@ -12,6 +12,7 @@
 #include "capture/files.h"
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -54,7 +55,7 @@ void calibrate_board(const DrawingOptions& options, Console& console) {
     figures["dictionary"] = board.dictionary;
   }
   figures["paper_mm"] = {sheet.paper.width_mm, sheet.paper.height_mm};
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
   constexpr double mm = 1000;
   console.say(fmt::format("{}: {}x{} inner corners, squares of {} mm{}, on {}", path, board.columns,
                           board.rows, mm * board.square_m,

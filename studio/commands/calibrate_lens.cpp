@@ -23,6 +23,7 @@
 #include "studio/calibration_report.h"
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -328,8 +329,7 @@ void calibrate_lens(const LensOptions& options, Console& console) {
   calibrate::write_text_file(
       report, calibration_report(result.problem, c,
                                  "Lens of " + std::filesystem::path(options.out).stem().string()));
-  console.figures(figures_of(result, pictures, found, whole_ms - c.time_ms)
-                      .dump(2, ' ', false, Json::error_handler_t::replace));
+  console.figures(json_text(figures_of(result, pictures, found, whole_ms - c.time_ms)));
   say(c, console);
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     if (found.detections[i].view) continue;

@@ -19,6 +19,7 @@
 #include "render/match.h"
 #include "studio/commands/commands.h"
 #include "studio/frame_maker.h"
+#include "studio/json_text.h"
 #include "studio/light_pairs.h"
 #include "studio/section.h"
 
@@ -237,7 +238,7 @@ void calibrate_light(const LightOptions& options, Console& console) {
   if (found.matrix) figures["matrix"] = *found.matrix;
   figures["match"] = match;
   figures["warnings"] = found.warnings;
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
   for (const std::string& warning : found.warnings) console.warn(warning);
   console.say(fmt::format("from {} {}: +- {:.2f}, {:.2f}, {:.2f} %{}", pairs,
                           patches.empty() ? "directions that both cameras see" : "painted patches",

@@ -12,6 +12,7 @@
 #include "calibrate/lens.h"
 #include "calibrate/line_fit.h"
 #include "studio/commands/commands.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -134,7 +135,7 @@ void calibrate_lines(const LinesOptions& options, Console& console) {
   }();
   calibrate::write_lens(options.out, fit.lens);
   say(marks, fit, console);
-  console.figures(figures_of(marks, fit).dump(2));
+  console.figures(json_text(figures_of(marks, fit)));
   console.say(fmt::format("{}: {}, f = {:.1f} +- {:.1f} px, from {} lines, {:.2f} px off",
                           options.out, options.model, fit.lens.parameters[0], fit.focal_sigma_px,
                           marks.lines.size(), fit.rms_px));

@@ -20,6 +20,7 @@
 #include "studio/commands/board_options.h"
 #include "studio/commands/board_places.h"
 #include "studio/commands/commands.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -162,7 +163,7 @@ calibrate::TimeOffset offset_by_lamp(const OffsetOptions& options, Console& cons
   }
   Json figures = figures_of(found);
   figures["frames"] = {a.brightness.size(), b.brightness.size()};
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
   if (found.sigma_s > aimed_at_s) {
     console.warn("the offset is uncertain by more than a millisecond: " +
                  advice(options, watched, found) + "; or move a board (--board)");
@@ -195,7 +196,7 @@ calibrate::TimeOffset offset_by_board(const OffsetOptions& options,
   Json figures = figures_of(found);
   figures["frames"] = {a.frames, b.frames};
   figures["boards"] = {a.points.size(), b.points.size()};
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
   console.say(counts);
   if (found.sigma_s > aimed_at_s) {
     console.warn(

@@ -19,6 +19,7 @@
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -135,7 +136,7 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
                               markers.size(), what, sigma_deg, sigma_mm));
   say_markers(markers, found, !by_board, console);
   say_pose(found.cam_from_set, sigma_deg, sigma_mm, console);
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
   warn_of_unknown_error(lens, options.lens, console);
   for (const std::string& warning : found.warnings) console.warn(warning);
   console.say(fmt::format("{}: from {} {}, {:.2f} px off", options.out, markers.size(), what,

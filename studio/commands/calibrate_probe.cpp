@@ -21,6 +21,7 @@
 #include "capture/camera.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -213,7 +214,7 @@ void calibrate_probe(const ProbeOptions& options, Console& console) {
   figures.update(found.details);
   figures["warnings"] = found.warnings;
   say_pose(found.probe_from_set, found.sigma_deg, found.sigma_mm, console);
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
   if (!by_sources) warn_of_unknown_error(lens, options.lens, console);
   for (const std::string& warning : found.warnings) console.warn(warning);
   console.say(fmt::format("{}: from {}", options.out, found.from));

@@ -18,6 +18,7 @@
 #include "capture/response.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/exposure_list.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -241,7 +242,7 @@ void calibrate_response(const ResponseOptions& options, Console& console) {
   if (!options.compare.empty()) compare(options, shots, found, figures, console);
   figures["warnings"] = found.warnings;
   figures["time_ms"] = time_ms;
-  console.figures(figures.dump(2));
+  console.figures(json_text(figures));
   for (const std::string& warning : found.warnings) console.warn(warning);
   console.say(fmt::format("{}: {} from {} shots", options.out, found.response.curve.name,
                           shots.codes.size()));

@@ -27,6 +27,7 @@
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -273,8 +274,7 @@ void calibrate_rig(const RigOptions& options, Console& console) {
   calibrate::write_rig(options.out, members,
                        fmt::format("by platelight calibrate rig, {:.2f} px off", fit.rms_px));
   console.figures(
-      Json{{"rms_px", fit.rms_px}, {"cameras", cameras}, {"warnings", fit.warnings}}.dump(
-          2, ' ', false, Json::error_handler_t::replace));
+      json_text(Json{{"rms_px", fit.rms_px}, {"cameras", cameras}, {"warnings", fit.warnings}}));
   for (std::size_t c = 0; c < sources.size(); ++c) {
     warn_of_unknown_error(lenses[c], sources[c].lens_file, console);
   }

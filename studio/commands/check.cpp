@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "studio/commands/commands.h"
+#include "studio/json_text.h"
 #include "studio/set.h"
 #include "studio/set_files.h"
 #include "studio/set_scene.h"
@@ -95,8 +96,8 @@ void check(const std::string& path, Console& console) {
           fmt::format("  {} was not opened, and so no other source, nor the recording", device));
     }
   } catch (const SetError& error) {
-    console.figures(nlohmann::ordered_json{{"diagnostics", to_json(error.diagnostics())}}.dump(
-        2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    console.figures(
+        json_text(nlohmann::ordered_json{{"diagnostics", to_json(error.diagnostics())}}));
     throw;
   }
 }

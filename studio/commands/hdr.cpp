@@ -15,6 +15,7 @@
 #include "capture/make_hdr.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/exposure_list.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -73,8 +74,7 @@ void hdr(const HdrCommandOptions& options, Console& console) {
   if (!options.response_out.empty()) save_response(options, result);
   capture::write_exr(options.out, result.radiance);
   const double stops = capture::range_stops(result.radiance);
-  console.figures(
-      to_json(result, stops).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  console.figures(json_text(to_json(result, stops)));
   for (const std::string& warning : result.warnings) console.warn(warning);
   console.say(fmt::format("{}: {}x{}, {:.1f} stops from {} files, response {}", options.out,
                           result.radiance.width, result.radiance.height, stops,
