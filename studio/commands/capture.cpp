@@ -14,6 +14,7 @@
 #include "capture/recording.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/interruptible.h"
+#include "studio/json_text.h"
 
 namespace studio {
 namespace {
@@ -74,7 +75,7 @@ void record_camera(const CaptureOptions& o, Console& console) {
         fmt::format("cannot record {}: it is no live camera; copy its files instead", o.camera));
   }
   const Taken taken = record(o, std::move(first), *camera, console);
-  console.figures(
+  console.figures(json_text(
       nlohmann::ordered_json{{"camera", info.description},
                              {"width", info.width},
                              {"height", info.height},
@@ -83,8 +84,7 @@ void record_camera(const CaptureOptions& o, Console& console) {
                              {"skipped", taken.written.skipped},
                              {"damaged", taken.camera.damaged},
                              {"seconds", taken.seconds},
-                             {"megabytes", static_cast<double>(taken.written.bytes) * 1e-6}}
-          .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+                             {"megabytes", static_cast<double>(taken.written.bytes) * 1e-6}}));
   console.say(fmt::format("{}: {} frames of {}, {} lost, {:.1f} s; play it as replay:{}", o.folder,
                           taken.written.frames, info.description, taken.written.lost, taken.seconds,
                           o.folder));
