@@ -22,6 +22,7 @@
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfTimeCode.h>
+#include <OpenEXR/ImfVecAttribute.h>
 
 #include "capture/exr_wire.h"
 #include "capture/primaries.h"
@@ -119,6 +120,10 @@ Imf::Header make_header(int width, int height, const ExrOptions& options) {
     Imf::addFramesPerSecond(
         header, Imf::Rational(static_cast<int>(rate.num), static_cast<unsigned>(rate.den)));
   }
+  if (options.noise) {
+    header.insert(wire::noise_attribute,
+                  Imf::V2fAttribute(Imath::V2f(options.noise->gain, options.noise->floor)));
+  }
   return header;
 }
 
@@ -207,11 +212,16 @@ std::uint32_t expect(SandboxedChild& child, wire::Kind kind) {
   return prefix.bytes;
 }
 
-Image receive(SandboxedChild& child, const ExrLimits& limits) {
+wire::Header receive_header(SandboxedChild& child) {
   wire::Header header;
   if (expect(child, wire::Kind::header) != sizeof header || !read_value(child, header)) {
     throw std::runtime_error("its decoder went wrong");
   }
+  return header;
+}
+
+Image receive(SandboxedChild& child, const ExrLimits& limits) {
+  const wire::Header header = receive_header(child);
   if (header.width < 1 || header.width > wire::max_side || header.height < 1 ||
       header.height > wire::max_side || header.channels < 1 || header.channels > 4) {
     throw std::runtime_error("its decoder went wrong");
@@ -249,6 +259,19 @@ Image receive(SandboxedChild& child, const ExrLimits& limits) {
     convert_to_rec709(image, {{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}});
   }
   return image;
+}
+
+// What `visit` makes of the child that decodes a file.
+template <class Visit>
+auto decode(const std::string& path, const ExrLimits& limits, Visit visit) {
+  const std::string decoder = helper_path("platelight-decode");
+  try {
+    const OpenFile file(path);
+    SandboxedChild child(decoder, file.fd, limits.time);
+    return visit(child);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(path + ": " + error.what());
+  }
 }
 
 }  // namespace
@@ -304,14 +327,16 @@ void write_exr(const std::string& path, const Image& image, const ExrOptions& op
 }
 
 Image read_exr(const std::string& path, const ExrLimits& limits) {
-  const std::string decoder = helper_path("platelight-decode");
-  try {
-    const OpenFile file(path);
-    SandboxedChild child(decoder, file.fd, limits.time);
-    return receive(child, limits);
-  } catch (const std::exception& error) {
-    throw std::runtime_error(path + ": " + error.what());
-  }
+  return decode(path, limits, [&](SandboxedChild& child) { return receive(child, limits); });
+}
+
+std::optional<LightNoise> read_exr_noise(const std::string& path, const ExrLimits& limits) {
+  return decode(path, limits, [](SandboxedChild& child) -> std::optional<LightNoise> {
+    const wire::Header header = receive_header(child);
+    const auto is_variance = [](float value) { return std::isfinite(value) && value >= 0; };
+    if (header.has_noise == 0 || !std::ranges::all_of(header.noise, is_variance)) return {};
+    return LightNoise{header.noise[0], header.noise[1]};
+  });
 }
 
 }  // namespace capture

@@ -32,11 +32,20 @@ enum class ExrCompression {
   piz,   // slow, smallest for noisy pictures
 };
 
+// Of one frame's pixel: variance = gain * light + floor, scene-linear.
+struct LightNoise {
+  float gain = 0;
+  float floor = 0;
+  friend bool operator==(const LightNoise&, const LightNoise&) = default;
+};
+
 struct ExrOptions {
   ExrCompression compression = ExrCompression::none;
   std::optional<ExrTimecode> timecode{};
   std::optional<Rational> frames_per_second{};
   Rational pixel_aspect{1, 1};  // a pixel's width over its height
+  // Of the frames that the picture is a mean of: attribute "frameNoise", V2f of gain and floor.
+  std::optional<LightNoise> noise{};
 };
 
 // An image's channels under these names, in its order.
@@ -73,5 +82,9 @@ struct ExrLimits {
 // it. Throws std::runtime_error with path and reason: missing, damaged, too large (a side over
 // 16,384 pixels, or the limits), deep data, other channels than these.
 Image read_exr(const std::string& path, const ExrLimits& limits = {});
+
+// What a file tells of its frames' noise (ExrOptions::noise), if it does and both are finite and
+// not negative. Throws as read_exr, of what comes before the pixels.
+std::optional<LightNoise> read_exr_noise(const std::string& path, const ExrLimits& limits = {});
 
 }  // namespace capture

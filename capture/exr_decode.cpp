@@ -21,6 +21,7 @@
 #include <OpenEXR/ImfRgbaFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
 #include <OpenEXR/ImfTestFile.h>
+#include <OpenEXR/ImfVecAttribute.h>
 
 #include "capture/exr_wire.h"
 #include "capture/sandbox.h"
@@ -183,12 +184,18 @@ void send_header(const Imf::Header& header, const Window& display, std::size_t c
                    static_cast<std::int32_t>(display.height),
                    static_cast<std::int32_t>(channels),
                    0,
+                   {},
+                   0,
                    {}};
   if (Imf::hasChromaticities(header)) {
     const Imf::Chromaticities& c = Imf::chromaticities(header);
     out.has_primaries = 1;
     out.primaries = {c.red.x,  c.red.y,  c.green.x, c.green.y,
                      c.blue.x, c.blue.y, c.white.x, c.white.y};
+  }
+  if (const auto* noise = header.findTypedAttribute<Imf::V2fAttribute>(wire::noise_attribute)) {
+    out.has_noise = 1;
+    out.noise = {noise->value().x, noise->value().y};
   }
   send(wire::Kind::header, &out, sizeof out);
 }

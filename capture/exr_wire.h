@@ -22,7 +22,11 @@ struct Header {
   std::int32_t channels = 0;
   std::int32_t has_primaries = 0;
   std::array<float, 8> primaries{};  // x y of red, green, blue, white
+  std::int32_t has_noise = 0;
+  std::array<float, 2> noise{};  // gain, floor
 };
+
+inline constexpr const char* noise_attribute = "frameNoise";
 
 // Larger pictures are refused by both ends.
 inline constexpr int max_side = 16384;

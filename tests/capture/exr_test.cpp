@@ -92,6 +92,22 @@ TEST(WriteExr, PassesAnIndependentReaderWithItsAttributes) {
   EXPECT_EQ(info.find("FAILED"), std::string::npos) << info;
 }
 
+TEST(WriteExr, KeepsWhatIsKnownOfNoise) {
+  const std::string path = made::make_temporary_directory() / "a.exr";
+  const Image image = make_image(3, 4);
+  write_exr(path, image);
+  EXPECT_EQ(read_exr_noise(path), std::nullopt);
+  write_exr(path, image, {.noise = LightNoise{2e-4F, 3e-6F}});
+  EXPECT_EQ(read_exr_noise(path), (LightNoise{2e-4F, 3e-6F}));
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float infinity = std::numeric_limits<float>::infinity();
+  for (const LightNoise& bad : {LightNoise{nan, 0}, LightNoise{0, infinity}, LightNoise{-1, 0}}) {
+    write_exr(path, image, {.noise = bad});
+    EXPECT_EQ(read_exr_noise(path), std::nullopt) << bad.gain << " " << bad.floor;
+    EXPECT_EQ(read_exr(path).pixels, image.pixels);
+  }
+}
+
 TEST(WriteExr, LeavesNoFileWhenTheDiskIsFull) {
   const auto directory = made::make_temporary_directory();
   const std::string path = directory / "a.exr";
