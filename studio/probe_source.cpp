@@ -306,6 +306,7 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time) {
   if (camera_) {
     const capture::Time on_its_clock = time + offset_;
     take(camera_->advance(on_its_clock));
+    if (camera_->has_ended(on_its_clock)) status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;
   }
   return newest_;

@@ -13,6 +13,7 @@ using namespace std::chrono_literals;
 
 constexpr capture::Time first_patience = 5s;  // for a live camera's first frame
 constexpr std::size_t most_waiting = 16;      // live frames that nobody has asked for
+constexpr capture::Time of_rounding = 1us;    // a file's frame is due so much before its time
 
 }  // namespace
 
@@ -26,8 +27,10 @@ Source::Source(std::unique_ptr<capture::Camera> camera) : camera_(std::move(came
     read_ahead();
   }
   if (next_.empty()) {
-    throw std::runtime_error(live_ ? "no frame came within 5 s"
-                                   : "the source ends before its first frame: is it empty?");
+    throw std::runtime_error(
+        live_ ? "no frame came within 5 s"
+              : "the source ends before its first frame: is it empty, or is the frame "
+                "that it is to begin with after its end?");
   }
   current_ = std::move(next_.front());
   next_.pop_front();
@@ -57,7 +60,7 @@ void Source::fetch(capture::Time until) {
 std::vector<capture::Frame> Source::advance(capture::Time time) {
   if (live_) fetch({});
   std::vector<capture::Frame> passed;
-  while (!next_.empty() && next_.front().frame.time <= time) {
+  while (!next_.empty() && next_.front().frame.time <= time + early()) {
     period_ = std::max(next_.front().frame.time - current_.frame.time, capture::Time{1});
     current_ = std::move(next_.front());
     next_.pop_front();
@@ -69,10 +72,18 @@ std::vector<capture::Frame> Source::advance(capture::Time time) {
 
 std::optional<capture::Frame> Source::at(capture::Time time) {
   static_cast<void>(advance(time));
-  const bool ended = live_ ? live_->ended() && next_.empty() : next_.empty() && !still_;
-  if (ended && time >= current_.frame.time + period_) return std::nullopt;
+  if (has_ended(time)) return std::nullopt;
   return current_.frame;
 }
+
+bool Source::has_ended(capture::Time time) const {
+  const bool last = next_.empty() && (live_ ? live_->ended() : !still_);
+  return last && time + early() >= current_.frame.time + period_;
+}
+
+// Frames' times are rounded to nanoseconds, and so are those that are asked for: of a video that
+// does not begin with its first frame, some would come a nanosecond late, and others twice.
+capture::Time Source::early() const { return live_ ? capture::Time{} : of_rounding; }
 
 std::optional<capture::Time> Source::next_time() const {
   return next_.empty() ? std::nullopt : std::optional(next_.front().frame.time);

@@ -11,8 +11,9 @@
 
 namespace studio {
 
-// Gives the newest frame whose time is not after a time asked for; frames in between are passed
-// over. So two sources of different rates stay together, and one that stalls shows its last frame.
+// Gives the newest frame whose time is not after a time asked for (of a file: by more than a
+// microsecond, for times are rounded); frames in between are passed over. So two sources of
+// different rates stay together, and one that stalls shows its last frame.
 // A live camera is read on a thread of its own: only what has come counts, and nobody waits.
 class Source {
  public:
@@ -33,6 +34,10 @@ class Source {
 
   // Every frame since the last call, or the last at(), up to and including those of this time.
   std::vector<capture::Frame> advance(capture::Time time);
+  // The frame that at() or advance() came to last, though the source has ended.
+  const capture::Frame& current() const { return current_.frame; }
+  // Whether it has no more frames, and its last was due for longer than a frame lasts.
+  bool has_ended(capture::Time time) const;
   // Of the frame that comes next; nothing at the end, and before a live one has come.
   std::optional<capture::Time> next_time() const;
 
@@ -51,6 +56,7 @@ class Source {
  private:
   void read_ahead();
   void fetch(capture::Time until);
+  capture::Time early() const;
   const capture::Frame& newest() const;
 
   std::unique_ptr<capture::Camera> camera_;    // null = a live one

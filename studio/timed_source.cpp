@@ -43,6 +43,8 @@ std::optional<capture::Frame> TimedSource::at(capture::Time time) {
   if (holds && !holds_) note_ = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
   holds_ = holds;
   if (frame && !lost) pictured_ = frame;
+  // Asked for the first time, and after its end.
+  if (!frame && !pictured_ && source_.current().image) pictured_ = source_.current();
   age_ = source_.is_still() || !pictured_ ? capture::Time{}
                                           : std::max(asked - pictured_->time, capture::Time{});
   return frame;

@@ -87,7 +87,7 @@ void VideoFeed::update(Player& player, capture::Time time) {
   }
   if (player.frame.texture != nullptr && (!frame || frame->image == player.image)) return;
   auto texture = player.textures.lend();
-  const capture::Frame& shown = frame ? *frame : source.first();
+  const capture::Frame& shown = frame ? *frame : source.newest();
   render::make_video_texture(shown.image ? *shown.image : capture::make_image(1, 1), *texture);
   player.image = shown.image;
   if (texture->not_numbers > 0 && !player.reported) {

@@ -37,7 +37,9 @@ struct Moment {
 // A camera of three exposures in turn that films what the test says.
 class ScriptedCamera final : public capture::Camera {
  public:
-  explicit ScriptedCamera(std::function<Moment(std::int64_t)> script) : script_(std::move(script)) {
+  explicit ScriptedCamera(std::function<Moment(std::int64_t)> script,
+                          std::int64_t frames = INT64_MAX)
+      : script_(std::move(script)), frames_(frames) {
     info_.width = 8;
     info_.height = 4;
     info_.rate = rate;
@@ -45,6 +47,7 @@ class ScriptedCamera final : public capture::Camera {
   const capture::CameraInfo& info() const override { return info_; }
   capture::CameraStatistics statistics() const override { return {}; }
   std::optional<capture::Frame> next() override {
+    if (number_ == frames_) return std::nullopt;
     const Moment moment = script_(number_);
     const double exposure_s = exposures_s[static_cast<std::size_t>(number_ % 3)];
     capture::Frame frame;
@@ -68,6 +71,7 @@ class ScriptedCamera final : public capture::Camera {
 
  private:
   std::function<Moment(std::int64_t)> script_;
+  std::int64_t frames_;
   capture::CameraInfo info_;
   std::int64_t number_ = 0;
   std::shared_ptr<const capture::Image> last_;
@@ -167,6 +171,22 @@ TEST_F(ProbeSourceTest, KeepsTheLastGoodLightWhileTheCameraIsAway) {
   EXPECT_EQ(statuses_.back().kept_because, "");
   EXPECT_EQ(statuses_.back().lost, 25);
   EXPECT_NEAR(light.back(), 300, 3);
+}
+
+TEST_F(ProbeSourceTest, SaysThatItsCameraHasEnded) {
+  capture::register_camera("scripted", [](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<ScriptedCamera>([](std::int64_t) { return Moment{.radiance = 100}; },
+                                            12);
+  });
+  Set set;
+  set.probe.emplace();
+  set.probe->kind = ProbeSettings::Kind::camera;
+  set.probe->source = "scripted:";
+  ProbeSource source(set);
+  source.at(capture::time_of_frame(11, rate));
+  EXPECT_EQ(source.status().kept_because, "");
+  source.at(capture::time_of_frame(13, rate));
+  EXPECT_EQ(source.status().kept_because, "the probe has ended");
 }
 
 TEST_F(ProbeSourceTest, LeavesOutShotsWhoseExposureIsNotKnown) {

@@ -35,16 +35,38 @@ TEST(Source, GivesTheNewestFrameThatIsNotAfterTheTime) {
       time += capture::Time(random() % 90'000'000);
       const auto frame = source.at(time);
       ASSERT_TRUE(frame);
-      EXPECT_LE(frame->time, time);
+      EXPECT_LE(frame->time, time + 1us);
       EXPECT_GT(capture::time_of_frame(frame->number + 1, {fps, 1}), time);
+    }
+  }
+}
+
+TEST(Source, GivesEveryFrameOnceWhicheverItBeginsWith) {
+  for (const capture::Rational rate : {capture::Rational{24, 1},
+                                       {25, 1},
+                                       {30, 1},
+                                       {60, 1},
+                                       {24000, 1001},
+                                       {30000, 1001},
+                                       {60000, 1001}}) {
+    for (const std::int64_t first : {1, 5, 7, 101}) {
+      auto camera = std::make_unique<GreyCamera>(first + 50, rate, 0);
+      for (std::int64_t i = 0; i < first; ++i) camera->next();
+      Source source(std::move(camera));
+      for (std::int64_t n = 0; n < 50; ++n) {
+        const auto frame = source.at(source.first().time + capture::time_of_frame(n, rate));
+        ASSERT_TRUE(frame);
+        ASSERT_EQ(frame->number, first + n) << rate.num << "/" << rate.den;
+      }
+      EXPECT_FALSE(source.at(source.first().time + capture::time_of_frame(50, rate)));
     }
   }
 }
 
 TEST(Source, EndsWhenItsLastFrameHasBeenShownForAsLongAsTheOthers) {
   Source source = grey_source(3, 10);
-  EXPECT_EQ(source.at(capture::Time{299'999'999})->number, 2);
-  EXPECT_FALSE(source.at(capture::Time{300'000'000}));
+  EXPECT_EQ(source.at(299ms)->number, 2);
+  EXPECT_FALSE(source.at(300ms));
 }
 
 TEST(Source, ShowsASinglePictureForEver) {
@@ -73,6 +95,16 @@ TEST(TimedSource, SaysHowOldItsNewestPictureIs) {
   TimedSource still = source_of("grey:1,10,0");
   EXPECT_TRUE(still.at(100s));
   EXPECT_EQ(still.age(), 0s);
+}
+
+// As a still of a late frame asks for it.
+TEST(TimedSource, HoldsItsLastPictureThoughNobodyAskedBefore) {
+  register_grey_camera();
+  TimedSource source({"grey:3,10,0", "", false, 0, capture::Transfer::linear}, capture::Time{},
+                     false);
+  EXPECT_EQ(source.newest().number, 0);
+  EXPECT_FALSE(source.at(5s));
+  EXPECT_EQ(source.newest().number, 2);
 }
 
 TEST(Source, GivesWhatHasComeOfALiveCameraWithoutWaiting) {
