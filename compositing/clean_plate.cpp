@@ -17,6 +17,8 @@ using capture::Image;
 constexpr float least_share = 0.6F;  // of the key's excess: what counts as screen in footage
 constexpr float chroma_tolerance = 0.12F;
 constexpr std::size_t most_frames = 256;  // that a footage plate looks at
+// How far from its median a pixel of a background that holds still may be: of its light, and more.
+constexpr float still_share = 0.1F, still_least = 4e-3F;
 
 std::string size_of(const Image& image) {
   return std::to_string(image.width) + "x" + std::to_string(image.height);
@@ -58,7 +60,7 @@ void measure_noise(std::span<const Image> frames, CleanPlate& plate) {
   if (n < 100 || !(spread > 0)) return;
   const double gain = std::max(0.0, (n * sxy - sx * sy) / spread);
   plate.noise_gain = static_cast<float>(gain);
-  plate.noise_floor = static_cast<float>(std::max(1e-8, (sy - gain * sx) / n));
+  plate.noise_floor = std::max(least_noise_floor, static_cast<float>((sy - gain * sx) / n));
 }
 
 struct Ordered {
@@ -133,6 +135,7 @@ void blur_screen(Image& light) {
 
 float screen_share(const Image& light, ScreenColour colour) {
   const Ordered key = find_key({&light, 1}, colour);
+  if (key.excess <= 0) return 0;
   const std::size_t pixels = light.pixels.size() / 3;
   std::size_t screen = 0;
   for (std::size_t i = 0; i < pixels; ++i) {
@@ -163,6 +166,28 @@ CleanPlate average_plate(std::span<const Image> frames) {
   }
   plate.colour = most_saturated(frames).value_or(mean_colour(plate.light));
   measure_noise(frames, plate);
+  return plate;
+}
+
+CleanPlate background_from_footage(std::span<const Image> frames) {
+  check_frames(frames);
+  CleanPlate plate;
+  plate.light = capture::make_image(frames[0].height, frames[0].width);
+  plate.colour = most_saturated(frames).value_or(ScreenColour::green);
+  std::vector<float> seen(frames.size());
+  std::size_t known = 0;
+  for (std::size_t i = 0; i < plate.light.pixels.size(); ++i) {
+    std::ranges::transform(frames, seen.begin(),
+                           [&](const Image& f) { return clean(f.pixels[i]); });
+    const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
+    std::nth_element(seen.begin(), middle, seen.end());
+    const float median = plate.light.pixels[i] = *middle;
+    const float near = still_share * median + still_least;
+    const auto alike =
+        std::ranges::count_if(seen, [&](float v) { return std::abs(v - median) <= near; });
+    known += 2 * static_cast<std::size_t>(alike) > seen.size() ? 1 : 0;
+  }
+  plate.known = static_cast<float>(known) / static_cast<float>(plate.light.pixels.size());
   return plate;
 }
 

@@ -25,6 +25,9 @@ struct CodedFrame {
   capture::Transfer transfer = capture::Transfer::srgb;
 };
 
+// Less than that is not measured.
+inline constexpr float least_noise_floor = 1e-8F;
+
 // Scene-linear, as the frames are.
 struct CleanPlate {
   capture::Image light;  // (height, width, 3); finite, not negative
@@ -47,11 +50,16 @@ CleanPlate average_plate(std::span<const capture::Image> frames);
 CleanPlate plate_from_footage(std::span<const capture::Image> frames);
 CleanPlate plate_from_footage(std::span<const capture::Image> frames, ScreenColour colour);
 
+// The same of any still background, from footage in which the person moves: of each pixel the
+// median over the frames. `known` tells the share of pixels in which most frames are near it.
+CleanPlate background_from_footage(std::span<const capture::Image> frames);
+
 // Takes the noise out of a screen's light, which is smooth, in place: mean over a box of 5x5
 // pixels, cut at the borders. (height, width, 3).
 void blur_screen(capture::Image& light);
 
-// How much of a plate looks as its screen does, 0..1. (height, width, 3), not empty.
+// How much of a plate looks as its screen does, 0..1; 0 of a grey one. (height, width, 3), not
+// empty.
 float screen_share(const capture::Image& light, ScreenColour colour);
 
 // The colour of a picture's mean. (height, width, 3), not empty.

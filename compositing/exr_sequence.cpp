@@ -72,6 +72,10 @@ std::string ExrSequence::path_of(std::int64_t number) const {
   return (std::filesystem::path(settings_.dir) / name.data()).string();
 }
 
+std::string ExrSequence::pattern_in(const std::string& folder) {
+  return (std::filesystem::path(folder) / "frame.%06d.exr").string();
+}
+
 std::int64_t ExrSequence::frames_in(const std::string& folder) {
   std::int64_t frames = 0;
   std::error_code none;

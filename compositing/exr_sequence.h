@@ -34,6 +34,8 @@ class ExrSequence {
              const std::optional<Timecode>& timecode) const;
 
   std::string path_of(std::int64_t number) const;
+  // Of all frames in a folder, as a camera's URI has it: "DIR/frame.%06d.exr".
+  static std::string pattern_in(const std::string& folder);
 
   // Frames, by their names, that are in a folder: of an earlier take, before the first is written.
   static std::int64_t frames_in(const std::string& folder);

@@ -43,7 +43,8 @@ bool is_one_file(const std::string& a, const std::string& b) {
     std::filesystem::path real = std::filesystem::weakly_canonical(absolute, failed);
     return failed ? absolute.lexically_normal() : real;
   };
-  return whole(a) == whole(b);
+  std::error_code failed;  // where either is not there
+  return whole(a) == whole(b) || std::filesystem::equivalent(a, b, failed);  // by another link
 }
 
 void require_writable(const std::string& path) {
@@ -51,6 +52,23 @@ void require_writable(const std::string& path) {
   const bool there = ::lstat(path.c_str(), &found) == 0;
   ::close(open_to_write(path, 0));
   if (!there) ::unlink(path.c_str());
+}
+
+void require_writable_folder(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code none;
+  fs::path there = fs::absolute(path, none).lexically_normal();
+  while (!there.empty() && there != there.root_path() &&
+         !fs::exists(fs::symlink_status(there, none))) {
+    there = there.parent_path();
+  }
+  if (!fs::is_directory(there, none)) {
+    throw std::runtime_error(path + ": cannot be made: " + there.string() + " is no folder");
+  }
+  if (::access(there.c_str(), W_OK | X_OK) != 0) {
+    throw std::runtime_error(path + ": cannot be written to: " + there.string() + ": " +
+                             std::generic_category().message(errno));
+  }
 }
 
 OutputFile::OutputFile(const std::string& path) : descriptor_(open_to_write(path, O_TRUNC)) {

@@ -16,6 +16,10 @@ bool is_one_file(const std::string& a, const std::string& b);
 // there. Throws std::runtime_error with path and reason if it could not.
 void require_writable(const std::string& path);
 
+// Whether a folder is there that can be written to, or can be made. Makes nothing. Throws as
+// require_writable.
+void require_writable_folder(const std::string& path);
+
 class OutputFile {
  public:
   // Creates or replaces the file. Throws std::runtime_error with path and reason.

@@ -6,21 +6,43 @@
 #include <stdexcept>
 #include <vector>
 
+#include "capture/exr.h"
+
 namespace studio {
 namespace {
 
 // Of footage without a clean plate, so many frames tell the screen, spread over it.
 constexpr int plate_frames = 48;
+// Of a pixel in display white, as variance: no camera is noisier, whatever a file says.
+constexpr float most_noise = 0.1F;
 
-std::vector<capture::Image> spread_frames(capture::Camera& camera, int count) {
-  const int step = std::max(1, count / plate_frames);
+// Of so many frames from one on, where the camera is.
+std::vector<capture::Image> spread_frames(capture::Camera& camera, int first, int count) {
+  // As many as there are, where that is told: of a short clip each one counts.
+  const std::int64_t rest = camera.info().frames - first;
+  if (camera.info().frames > 0 && rest > 0) {
+    count = static_cast<int>(std::min<std::int64_t>(count, rest));
+  }
+  const int step = (count + plate_frames - 1) / plate_frames;
   std::vector<capture::Image> frames;
   for (int i = 0; i < count; ++i) {
     const auto frame = camera.next();
     if (!frame) break;
-    if (i % step == 0 && frame->image) frames.push_back(*frame->image);
+    const bool lost = frame->status == capture::FrameStatus::lost;
+    if (i % step == 0 && frame->image && !lost) frames.push_back(*frame->image);
   }
   return frames;
+}
+
+compositing::CleanPlate read_plate(const std::string& path, capture::Transfer transfer) {
+  const capture::Image picture = read_picture(path, transfer);
+  compositing::CleanPlate plate = compositing::average_plate(std::span(&picture, 1));
+  if (!path.ends_with(".exr")) return plate;
+  if (const auto noise = capture::read_exr_noise(path)) {
+    plate.noise_gain = std::min(noise->gain, most_noise);
+    plate.noise_floor = std::clamp(noise->floor, compositing::least_noise_floor, most_noise);
+  }
+  return plate;
 }
 
 }  // namespace
@@ -35,22 +57,29 @@ capture::Image read_picture(const std::string& path, capture::Transfer transfer)
   return *frame->image;
 }
 
+std::string needs_plate(const std::string& uri) {
+  return uri + " is live and needs a clean plate: platelight key plate CAMERA -o plate.exr";
+}
+
 compositing::CleanPlate read_clean_plate(const std::string& path,
                                          const VideoSource& source,
+                                         compositing::KeyMethod method,
                                          std::array<int, 2> footage) {
-  if (!path.empty()) {
-    const capture::Image plate = read_picture(path, source.colour);
-    return compositing::average_plate(std::span(&plate, 1));
-  }
+  if (!path.empty()) return read_plate(path, source.colour);
   VideoSource whole = source;
   whole.first = footage[0];
   const auto camera = open_video(whole);
   if (camera->info().live) {
-    throw std::runtime_error(source.uri +
-                             " is live and needs a clean plate: platelight key plate CAMERA -o "
-                             "plate.exr");
+    throw std::runtime_error(needs_plate(source.uri));
   }
-  return compositing::plate_from_footage(spread_frames(*camera, footage[1] - footage[0] + 1));
+  const std::vector<capture::Image> frames =
+      spread_frames(*camera, footage[0], footage[1] - footage[0] + 1);
+  if (frames.empty()) {
+    throw std::runtime_error(source.uri + " has no frame " + std::to_string(footage[0]) +
+                             " to take the plate from");
+  }
+  return method == compositing::KeyMethod::screen ? compositing::plate_from_footage(frames)
+                                                  : compositing::background_from_footage(frames);
 }
 
 }  // namespace studio

@@ -6,6 +6,7 @@
 
 #include "capture/camera.h"
 #include "compositing/clean_plate.h"
+#include "compositing/keyer.h"
 #include "studio/timed_source.h"
 
 namespace studio {
@@ -14,10 +15,17 @@ namespace studio {
 // std::runtime_error if there is none.
 capture::Image read_picture(const std::string& path, capture::Transfer transfer);
 
-// The plate in a file; with no path, from the source's own frames from first to last. Throws
-// std::runtime_error if it cannot be read, or the source is live and has no file.
-compositing::CleanPlate read_clean_plate(const std::string& path,
-                                         const VideoSource& source,
-                                         std::array<int, 2> footage = {0, 479});
+// What to do about a live source without a plate.
+std::string needs_plate(const std::string& uri);
+
+// The plate in a file, with the noise that it tells (EXR of `platelight key plate`); with no path,
+// from the source's own frames from first to last, of which some that are spread over them are
+// looked at, as the method asks. Throws std::runtime_error if it cannot be read, or the source is
+// live and has no file.
+compositing::CleanPlate read_clean_plate(
+    const std::string& path,
+    const VideoSource& source,
+    compositing::KeyMethod method = compositing::KeyMethod::screen,
+    std::array<int, 2> footage = {0, 479});
 
 }  // namespace studio

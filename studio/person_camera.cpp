@@ -130,7 +130,10 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
   if (!s.key) return;
   try {
     const capture::CameraInfo& info = source_->info();
-    auto plate = read_clean_plate(s.key->plate, source, s.key->footage);
+    if (s.key->plate.empty() && info.live) {
+      throw std::invalid_argument(needs_plate(s.source));
+    }
+    auto plate = read_clean_plate(s.key->plate, source, s.key->settings.method, s.key->footage);
     if (plate.light.width != info.width || plate.light.height != info.height) {
       throw std::invalid_argument(
           fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", s.key->plate,

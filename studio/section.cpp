@@ -278,7 +278,16 @@ bool Section::file(std::string_view key, const std::filesystem::path& base, std:
     return false;
   }
   target = path.string();
+  names(key, target);
   return true;
+}
+
+void Section::of_use_only(bool useful, std::string_view key, std::string_view with) {
+  if (has(key) && !useful) fault(key, fmt::format("is of use only with {}", with));
+}
+
+void Section::names(std::string_view key, const std::string& path) {
+  faults_->name_file({full(key), path});
 }
 
 std::optional<Section> Section::table(std::string_view key) {

@@ -29,7 +29,12 @@ struct Diagnostic {
 // "FILE:LINE:COLUMN: MESSAGE", or "FILE: MESSAGE" without a place.
 std::string to_string(const Diagnostic& diagnostic);
 
-// The faults found so far in one file.
+// A file that another one names: by which key, and where it is.
+struct NamedFile {
+  std::string key, path;
+};
+
+// The faults found so far in one file, and what other files it names.
 class Faults {
  public:
   explicit Faults(std::string file) : file_(std::move(file)) {}
@@ -39,8 +44,12 @@ class Faults {
   // In the order of the file.
   std::vector<Diagnostic> sorted() const;
 
+  void name_file(NamedFile file) { named_.push_back(std::move(file)); }
+  const std::vector<NamedFile>& named() const { return named_; }
+
  private:
   std::string file_;
+  std::vector<NamedFile> named_;
   std::vector<Diagnostic> diagnostics_;
 };
 
@@ -88,6 +97,8 @@ class Section {
   bool integers(std::string_view key, std::span<int> target, int low, int high);
   // The file or directory that a path names, made absolute; relative ones start at `base`.
   bool file(std::string_view key, const std::filesystem::path& base, std::string& target);
+  // Tells of a file that the key's value leads to.
+  void names(std::string_view key, const std::string& path);
 
   // A table inside this one; nothing if it is absent or no table.
   std::optional<Section> table(std::string_view key);
@@ -99,6 +110,8 @@ class Section {
   void fault(std::string_view key, const std::string& message);
   // Adds a fault unless the key is there.
   void need(std::string_view key, std::string_view what_for);
+  // Adds a fault if the key is there and would do nothing, `useful` being false.
+  void of_use_only(bool useful, std::string_view key, std::string_view with);
   // Faults for keys that nothing asked for.
   void finish();
 

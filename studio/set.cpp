@@ -239,6 +239,7 @@ Set read_set(const std::string& path) {
 
   std::vector<Diagnostic> diagnostics = faults.sorted();
   if (!diagnostics.empty()) throw SetError(std::move(diagnostics));
+  set.files = faults.named();
   return set;
 }
 

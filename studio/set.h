@@ -261,6 +261,8 @@ struct Set {
   render::Effort effort;
   DisplayChoice display;
   RecordSettings record;
+  std::vector<NamedFile>
+      files;  // that keys name, but for URIs and lists; of the rig, what it names
 };
 
 // Limits that keep a set within what one machine can hold.

@@ -12,16 +12,15 @@
 
 #include <fmt/format.h>
 
+#include "compositing/exr_sequence.h"
 #include "compositing/output_file.h"
 
 namespace studio {
 namespace {
 
-namespace fs = std::filesystem;
+constexpr const char* set_file = "the set file";
 
-struct SetFile {
-  std::string what, path;
-};
+namespace fs = std::filesystem;
 
 // Whether a path is that of one of a sequence's pictures, there or not: "plate_%04d.png".
 bool is_of_sequence(const std::string& pattern, const std::string& path) {
@@ -62,68 +61,95 @@ bool is_named_by(const std::string& model, const std::string& path) {
   return false;
 }
 
-// A file, a folder of a recording, or that of a sequence of EXR frames; a camera has none.
-std::string path_of(std::string_view uri) {
-  for (const std::string_view scheme : {"file:", "replay:"}) {
-    if (!uri.starts_with(scheme)) continue;
-    const fs::path path = uri.substr(scheme.size());
-    const bool sequence = path.filename().string().find('%') != std::string::npos;
-    return sequence && path.extension() == ".exr" ? path.parent_path().string() : path.string();
-  }
-  return {};
+std::string name_or(const std::string& name, const char* kind) {
+  return name.empty() ? kind : name;
 }
 
-std::vector<SetFile> files_of(const Set& set) {
-  std::vector<SetFile> files{{"set file", set.path},
-                             {"plate", path_of(set.camera.source)},
-                             {"camera's response", set.camera.response},
-                             {"camera's track", set.camera.pose.track}};
+// All but what a model names itself.
+std::vector<ReadFile> read_by(const Set& set) {
+  std::vector<ReadFile> files{{set_file, set.path}};
+  const auto add = [&](std::string_view uri, const std::string& what) {
+    for (ReadFile& file : files_of(uri, what)) files.push_back(std::move(file));
+  };
+  add(set.camera.source, "the set's plate");
   if (set.probe) {
-    files.push_back({"probe", path_of(set.probe->source)});
-    files.push_back({"probe's response", set.probe->response});
-    for (const std::string& shot : set.probe->shots) files.push_back({"probe's shot", shot});
+    add(set.probe->source, "the set's probe");
+    for (const std::string& shot : set.probe->shots) files.push_back({"the probe's shot", shot});
   }
   for (const VideoSettings& video : set.videos) {
-    files.push_back({fmt::format("video {}", video.name), path_of(video.source)});
+    add(video.source, fmt::format("the set's video {}", video.name));
   }
   for (const PersonSettings& person : set.persons) {
     for (const PersonCamera& camera : person.cameras) {
-      files.push_back({fmt::format("video of {}", person.name), path_of(camera.source)});
-      if (!camera.key) continue;
-      const KeyChoice& key = *camera.key;
-      for (const std::string& picture : {key.plate, key.masks.garbage, key.masks.core}) {
-        files.push_back({fmt::format("screen of {}", person.name), picture});
-      }
+      add(camera.source, "the set's video of " + name_or(person.name, "a person"));
     }
   }
   for (const ObjectSettings& object : set.objects) {
-    files.push_back({fmt::format("model of {}", object.name), object.mesh});
+    const std::string what = "the set's model of " + name_or(object.name, "an object");
+    files.push_back({what, object.mesh});
     if (!object.shapes) continue;
-    for (const std::string& shape : object.shapes->files) {
-      files.push_back({fmt::format("model of {}", object.name), shape});
-    }
+    for (const std::string& shape : object.shapes->files) files.push_back({what, shape});
   }
-  std::erase_if(files, [](const SetFile& file) { return file.path.empty(); });
+  for (const NamedFile& file : set.files) {
+    files.push_back({fmt::format("the set's {}", file.key), file.path});
+  }
+  std::erase_if(files, [](const ReadFile& file) { return file.path.empty(); });
   return files;
 }
 
 }  // namespace
 
-void spare_sources(const Set& set, const std::string& written) {
+std::vector<ReadFile> files_of(std::string_view uri, const std::string& what) {
+  for (const std::string_view scheme : {"file:", "replay:"}) {
+    if (!uri.starts_with(scheme)) continue;
+    const fs::path path = uri.substr(scheme.size());
+    const bool sequence = path.filename().string().find('%') != std::string::npos;
+    std::vector<ReadFile> files{{what, path.string()}};
+    if (sequence && path.extension() == ".exr") {
+      const fs::path folder = path.parent_path();
+      files.push_back({what, folder.empty() ? "." : folder.string()});
+    }
+    return files;
+  }
+  return {};
+}
+
+void spare_files(std::span<const ReadFile> files, const std::string& written) {
   if (written.empty()) return;
-  for (const SetFile& file : files_of(set)) {
+  for (const ReadFile& file : files) {
     if (!compositing::is_one_file(file.path, written) && !is_of_sequence(file.path, written)) {
       continue;
     }
-    throw std::invalid_argument(fmt::format(
-        "{} is the set's {}, and would be lost: write to another place", written, file.what));
+    throw std::invalid_argument(
+        fmt::format("{} is {}, and would be lost: write to another place", written, file.what));
   }
+}
+
+void spare_from_frames(std::span<const ReadFile> files, const std::string& folder) {
+  if (folder.empty()) return;
+  const std::string frames = compositing::ExrSequence::pattern_in(folder);
+  for (const ReadFile& file : files) {
+    if (!is_of_sequence(frames, file.path)) continue;
+    throw std::invalid_argument(
+        fmt::format("{} is {}, and would be lost to a frame of its name: write to another folder",
+                    file.path, file.what));
+  }
+}
+
+void spare_set_file(const std::string& path, const std::string& written) {
+  const ReadFile file{set_file, path};
+  spare_files(std::span(&file, 1), written);
+}
+
+void spare_sources(const Set& set, const std::string& written) {
+  if (written.empty()) return;
+  spare_files(read_by(set), written);
   for (const ObjectSettings& object : set.objects) {
     if (object.mesh.empty() || !is_named_by(object.mesh, written)) continue;
     throw std::invalid_argument(
         fmt::format("{} is a part of the set's model of {}, and would be lost: write to another "
                     "place",
-                    written, object.name));
+                    written, name_or(object.name, "an object")));
   }
 }
 
@@ -140,6 +166,7 @@ void spare_sources(const Set& set, const RecordSettings& record) {
   for (const std::string* written : {&record.file, &record.exr, &record.fill, &record.key}) {
     spare_sources(set, *written);
   }
+  spare_from_frames(read_by(set), record.exr);
 }
 
 }  // namespace studio

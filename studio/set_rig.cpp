@@ -70,6 +70,9 @@ std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& con
                                             "not exist",
                                             camera.response));
   }
+  for (const std::string& named : {member->lens, member->response}) {
+    if (!named.empty()) section.names("rig_camera", named);
+  }
   try {
     camera.lens = calibrate::read_lens(member->lens);
   } catch (const std::runtime_error& error) {

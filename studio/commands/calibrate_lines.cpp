@@ -2,6 +2,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 
@@ -13,6 +14,7 @@
 #include "calibrate/line_fit.h"
 #include "studio/commands/commands.h"
 #include "studio/json_text.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -120,6 +122,8 @@ void say(const calibrate::LineMarks& marks, const calibrate::LineFit& fit, Conso
 }
 
 void calibrate_lines(const LinesOptions& options, Console& console) {
+  const ReadFile lines{"the lines", options.lines};
+  spare_files(std::span(&lines, 1), options.out);
   const calibrate::LineMarks marks = calibrate::read_line_marks(options.lines);
   calibrate::LineFitOptions fitting;
   fitting.law = options.model == "equisolid" ? calibrate::FisheyeLaw::equisolid

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
 #include "studio/json_text.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -102,6 +104,8 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   }
   const std::string& source = by_board ? options.board_picture : options.markers;
   const std::string what = by_board ? "corners" : "markers";
+  const ReadFile read{"what the pose is found by", source};
+  spare_files(std::span(&read, 1), options.out);
   const double usual_noise_px = by_board ? 0.2 : 0.5;
   const calibrate::Lens lens = calibrate::read_lens(options.lens);
   const std::vector<calibrate::Marker> markers =

@@ -79,15 +79,15 @@ std::vector<std::string> devices_of(const Set& set) {
 }
 
 void check(const std::string& path, Console& console) {
+  spare_set_file(path, console.figures_file());
   try {
     const Set set = read_set(path);
     spare_sources(set, console.figures_file());
     const std::vector<ModelReport> models = check_models(set);
     const std::vector<std::string> devices = devices_of(set);
     if (devices.empty()) check_show(set);
-    console.figures(nlohmann::ordered_json{{"diagnostics", nlohmann::json::array()},
-                                           {"models", to_json(models)}}
-                        .dump(2));
+    console.figures(json_text(nlohmann::ordered_json{{"diagnostics", nlohmann::json::array()},
+                                                     {"models", to_json(models)}}));
     for (const ModelReport& model : models) say(model, console);
     console.say(fmt::format("{}: good ({} objects, {} stand-ins)", path, set.objects.size(),
                             set.stand_ins.size()));

@@ -7,6 +7,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,7 +20,9 @@
 #include "compositing/keyer.h"
 #include "studio/clean_plates.h"
 #include "studio/commands/commands.h"
+#include "studio/json_text.h"
 #include "studio/key_masks.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -29,6 +32,7 @@ using Json = nlohmann::ordered_json;
 constexpr std::int64_t plate_frames = 50;
 constexpr double much_elsewhere = 0.1;  // share of a plate that is no screen
 constexpr double unsure = 0.5;          // confidence, in the mean
+constexpr int plate_footage = 480;      // frames that a clip without a plate is judged by
 
 struct KeyOptions {
   std::vector<std::string> what;
@@ -48,42 +52,68 @@ VideoSource source_of(const KeyOptions& options, const std::string& uri) {
   return source;
 }
 
+compositing::CleanPlate plate_of(const std::vector<capture::Image>& frames,
+                                 const KeyOptions& options) {
+  if (!options.person) return compositing::average_plate(frames);
+  return options.method == "screen" ? compositing::plate_from_footage(frames)
+                                    : compositing::background_from_footage(frames);
+}
+
 void make_plate(const KeyOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) {
     throw std::invalid_argument(options.out + ": plates are OpenEXR files, name it *.exr");
   }
   const VideoSource source = source_of(options, options.what.back());
+  spare_files(files_of(source.uri, "the plate's own footage"), options.out);
+  spare_files(files_of(source.uri, "the plate's own footage"), console.figures_file());
   const auto camera = open_video(source);
   std::vector<capture::Image> frames;
   const std::int64_t wanted = options.frames.value_or(plate_frames);
-  while (static_cast<std::int64_t>(frames.size()) < wanted) {
+  std::int64_t passed = 0;
+  for (; passed < wanted; ++passed) {
     const auto frame = camera->next();
     if (!frame) break;
-    if (frame->image) frames.push_back(*frame->image);
+    // What is lost repeats the picture before, and tells no noise.
+    const bool good = frame->status == capture::FrameStatus::good;
+    if (frame->image && good) frames.push_back(*frame->image);
   }
   if (frames.empty()) throw std::runtime_error(source.uri + " gives no picture");
-  const compositing::CleanPlate plate =
-      options.person ? compositing::plate_from_footage(frames) : compositing::average_plate(frames);
-  capture::write_exr(options.out, plate.light);
-  const std::string_view colour = compositing::name_of(plate.colour);
+  const std::int64_t bad = passed - static_cast<std::int64_t>(frames.size());
+  if (bad > 0) {
+    console.warn(fmt::format("{} of {} frames were lost or damaged, and left out", bad, passed));
+  }
+  const compositing::CleanPlate plate = plate_of(frames, options);
+  capture::ExrOptions noise_too;
+  // Of frames that are all the same, as of a video that holds still, it tells nothing.
+  const bool differ = plate.noise_gain > 0 || plate.noise_floor > compositing::least_noise_floor;
+  if (frames.size() > 1 && differ && !options.person)
+    noise_too.noise = {plate.noise_gain, plate.noise_floor};
+  capture::write_exr(options.out, plate.light, noise_too);
   const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
+  const std::string_view colour =
+      elsewhere < 1 ? compositing::name_of(plate.colour) : std::string_view("no");
   const bool by_screen = options.method == "screen";
-  if (by_screen && elsewhere > much_elsewhere) {
+  if (by_screen && elsewhere >= 1) {
+    console.warn("the plate has no colour, and is no screen: --method difference needs none");
+  } else if (by_screen && elsewhere > much_elsewhere) {
     console.warn(fmt::format(
         "{:.0f} % of the plate is not screen: if somebody is in the picture, take it anew or with "
         "--person; what else it is, a garbage mask is to cut away",
         100 * elsewhere));
   }
-  const double noise = std::sqrt(plate.noise_floor);
-  console.figures(Json{{"frames", frames.size()},
-                       {"width", plate.light.width},
-                       {"height", plate.light.height},
-                       {"colour", colour},
-                       {"noise_gain", plate.noise_gain},
-                       {"noise_floor", plate.noise_floor}}
-                      .dump(2));
-  console.say(fmt::format("{}: {}x{}, mean of {} frames, a {} screen, noise in black {:.4f}",
-                          options.out, plate.light.width, plate.light.height, frames.size(), colour,
+  Json figures{{"frames", frames.size()},      {"lost", bad},      {"width", plate.light.width},
+               {"height", plate.light.height}, {"colour", colour}, {"noise_gain", nullptr},
+               {"noise_floor", nullptr}};
+  std::string noise = "noise not measured";
+  if (noise_too.noise) {
+    figures["noise_gain"] = plate.noise_gain;
+    figures["noise_floor"] = plate.noise_floor;
+    noise = fmt::format("noise in black {:.4f}", std::sqrt(plate.noise_floor));
+  }
+  console.figures(json_text(figures));
+  console.say(fmt::format("{}: {}x{}, {} of {} frames, {} screen, {}", options.out,
+                          plate.light.width, plate.light.height, options.person ? "middle" : "mean",
+                          frames.size(), colour == "no" ? "no" : fmt::format("a {}", colour),
                           noise));
 }
 
@@ -102,9 +132,25 @@ compositing::KeySettings settings_of(const KeyOptions& options) {
   return settings;
 }
 
+// Throws if anything that is to be written is what is read.
+void spare_what_is_read(const KeyOptions& options, const VideoSource& source, Console& console) {
+  std::vector<ReadFile> files = files_of(source.uri, "the clip");
+  for (const std::string& path : {options.plate, options.masks.garbage, options.masks.core}) {
+    if (path.empty()) continue;
+    files.push_back({"what the clip is keyed by", path});
+  }
+  spare_files(files, options.out);
+  spare_from_frames(files, options.out);
+  spare_files(files, console.figures_file());
+}
+
 void key_clip(const KeyOptions& options, Console& console) {
   const VideoSource source = source_of(options, options.what.front());
-  compositing::CleanPlate plate = read_clean_plate(options.plate, source);
+  spare_what_is_read(options, source, console);
+  const int first = static_cast<int>(source.first);
+  const compositing::KeySettings settings = settings_of(options);
+  compositing::CleanPlate plate =
+      read_clean_plate(options.plate, source, settings.method, {first, first + plate_footage - 1});
   const double known = plate.known;
   const std::string colour(compositing::name_of(plate.colour));
   const auto camera = open_video(source);
@@ -115,11 +161,12 @@ void key_clip(const KeyOptions& options, Console& console) {
         fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", options.plate,
                     plate.light.width, plate.light.height, source.uri, width, height));
   }
-  compositing::Keyer keyer(std::move(plate), settings_of(options),
+  compositing::Keyer keyer(std::move(plate), settings,
                            read_key_masks(options.masks, width, height));
   compositing::ExrSequenceSettings take;
   take.dir = options.out;
   take.rate = camera->info().rate.num > 0 ? camera->info().rate : capture::Rational{25, 1};
+  const std::int64_t before = compositing::ExrSequence::frames_in(options.out);
   const compositing::ExrSequence sequence(take);
   compositing::KeyedFrame frame_keyed;
   const capture::HalfImage& keyed = frame_keyed.image();
@@ -127,11 +174,17 @@ void key_clip(const KeyOptions& options, Console& console) {
   Json rows = Json::array();
   double least = 1, sum = 0, key_ms = 0;
   std::string_view why = "good";  // of the least
-  std::int64_t number = 0;
+  std::int64_t number = 0, lost = 0, keyed_frames = 0;
   for (; number < options.frames.value_or(INT64_MAX); ++number) {
     const auto frame = camera->next();
     if (!frame) break;
-    if (!frame->image) continue;
+    // Its picture is the one before, if there is any.
+    const bool is_lost = frame->status == capture::FrameStatus::lost;
+    if (is_lost || !frame->image) {
+      ++lost;
+      rows.push_back({{"frame", number + options.first.value_or(0)}, {"status", "lost"}});
+      if (!frame->image) continue;
+    }
     const auto start = std::chrono::steady_clock::now();
     const compositing::KeyReport report = keyer.key(*frame->image, frame_keyed);
     key_ms +=
@@ -142,6 +195,8 @@ void key_clip(const KeyOptions& options, Console& console) {
       matte.pixels.push_back(keyed.pixels[i]);
     }
     sequence.write(number, keyed, matte, {});
+    if (is_lost) continue;
+    ++keyed_frames;
     if (report.confidence < least) why = compositing::name_of(report.status);
     least = std::min(least, double{report.confidence});
     sum += report.confidence;
@@ -158,20 +213,30 @@ void key_clip(const KeyOptions& options, Console& console) {
     }
   }
   if (number == 0) throw std::runtime_error(source.uri + " gives no picture");
-  const auto count = static_cast<double>(number);
-  console.figures(Json{
-      {"frames", number},
-      {"colour", colour},
-      {"plate_known", known},
-      {"confidence_mean", sum / count},
-      {"confidence_least", least},
-      {"key_ms", key_ms / count},
-      {"rows", rows}}.dump(2));
+  if (keyed_frames == 0) throw std::runtime_error(source.uri + " gives no picture");
+  const auto count = static_cast<double>(keyed_frames);
+  console.figures(json_text(Json{{"frames", number},
+                                 {"lost", lost},
+                                 {"colour", colour},
+                                 {"plate_known", known},
+                                 {"confidence_mean", sum / count},
+                                 {"confidence_least", least},
+                                 {"key_ms", key_ms / count},
+                                 {"rows", rows}}));
   console.say(
       fmt::format("{}: {} frames before a {} screen, confidence {:.2f} in the mean, {:.2f} at "
                   "least; {:.1f} ms a "
                   "frame",
                   options.out, number, colour, sum / count, least, key_ms / count));
+  if (before > 0) {
+    console.warn(fmt::format("{} had {} frames already: those with other numbers are still there",
+                             options.out, before));
+  }
+  if (lost > 0) {
+    console.warn(fmt::format(
+        "{} of {} frames were lost: the picture before stands in their place, if there is one",
+        lost, number));
+  }
   if (sum / count < unsure) {
     console.warn(fmt::format("the key is unsure ({}): look at it before it is used", why));
   }
@@ -180,7 +245,10 @@ void key_clip(const KeyOptions& options, Console& console) {
 void key(const KeyOptions& options, Console& console) {
   if (options.what.size() == 2 && options.what.front() == "plate")
     return make_plate(options, console);
-  if (options.what.size() != 1) throw UsageError("give a clip, or: plate CAMERA");
+  const bool lacks_camera = options.what.front() == "plate" && !std::filesystem::exists("plate");
+  if (options.what.size() != 1 || lacks_camera) {
+    throw UsageError("give a clip, or: plate CAMERA");
+  }
   key_clip(options, console);
 }
 
@@ -202,6 +270,8 @@ Command key_command() {
         arguments.required("--out");
         arguments.option("--plate", o->plate,
                          "picture of the empty screen; without it, from the footage alone");
+        arguments.flag("--person", o->person,
+                       "of a plate: somebody is in the picture, but nowhere all the time");
         arguments.choice("--method", o->method, {"screen", "difference"},
                          "by the screen's colour, or by the distance from any still background");
         arguments.option("--colour", o->colour, "the clip's transfer curve, as in a set");

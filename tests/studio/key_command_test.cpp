@@ -2,13 +2,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "capture/exr.h"
 #include "capture/png.h"
 #include "compositing/made_clip.h"
+#include "studio/clean_plates.h"
 #include "tests/studio/command_line.h"
 
 namespace studio::key_command_test {
@@ -60,6 +66,27 @@ TEST_F(KeyCommand, TakesAPlateAndKeysAClipWithIt) {
   EXPECT_LT(squares / (3.0 * truth_.height * truth_.width), 1e-3);
 }
 
+TEST_F(KeyCommand, APlatesFileTellsTheNoiseOfItsFrames) {
+  const Outcome plate = run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " +
+                            in("plate.exr") + " --json " + in("plate.json"));
+  ASSERT_EQ(plate.status, 0) << plate.err;
+  const auto told = nlohmann::json::parse(content_of(in("plate.json")));
+  const compositing::CleanPlate read = read_clean_plate(in("plate.exr"), {});
+  EXPECT_GT(read.noise_floor, compositing::least_noise_floor);
+  EXPECT_FLOAT_EQ(read.noise_gain, told["noise_gain"]);
+  EXPECT_FLOAT_EQ(read.noise_floor, told["noise_floor"]);
+  // Frames that are all the same tell nothing of it.
+  for (int i = 1; i < 4; ++i) {
+    fs::copy_file(in("empty_0000.png"), in("empty_000" + std::to_string(i) + ".png"),
+                  fs::copy_options::overwrite_existing);
+  }
+  ASSERT_EQ(
+      run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
+  const compositing::CleanPlate still = read_clean_plate(in("plate.exr"), {});
+  EXPECT_EQ(still.noise_gain, compositing::CleanPlate{}.noise_gain);
+  EXPECT_EQ(still.noise_floor, compositing::CleanPlate{}.noise_floor);
+}
+
 // What is keyed blurs it: twice would be once too often.
 TEST_F(KeyCommand, WritesAPlateOfOneFrameAsItIs) {
   const Outcome plate =
@@ -71,6 +98,127 @@ TEST_F(KeyCommand, WritesAPlateOfOneFrameAsItIs) {
   ASSERT_EQ(light.pixels.size(), shot.pixels.size());
   for (std::size_t i = 0; i < light.pixels.size(); ++i)
     ASSERT_NEAR(light.pixels[i], shot.pixels[i], 1e-3F) << i;
+}
+
+TEST_F(KeyCommand, SparesWhatItReads) {
+  ASSERT_EQ(
+      run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
+  ASSERT_EQ(run("key " + in("take_%04d.png") + " --colour sRGB --plate " + in("plate.exr") +
+                " -o " + in("keyed"))
+                .status,
+            0);
+  const std::string keyed = in("keyed/frame.%06d.exr"), plate = " --plate " + in("plate.exr");
+  fs::copy_file(in("plate.exr"), in("keyed/frame.000009.exr"));
+  fs::create_hard_link(in("plate.exr"), in("other.exr"));
+  const std::string before = content_of(in("plate.exr"));
+  const std::string frame = content_of(in("keyed/frame.000001.exr"));
+  for (const std::string& lossy :
+       {"key " + keyed + plate + " -o " + in("keyed"),
+        "key " + in("take_%04d.png") + plate + " -o " + in("out") + " --json " + in("plate.exr"),
+        "key " + in("take_%04d.png") + plate + " -o " + in("out") + " --json " + in("other.exr"),
+        "key " + in("take_%04d.png") + " --plate " + in("keyed/frame.000009.exr") + " -o " +
+            in("keyed"),
+        "key plate " + keyed + " -o " + in("keyed/frame.000001.exr")}) {
+    const Outcome refused = run(lossy);
+    EXPECT_EQ(refused.status, 1) << lossy;
+    EXPECT_THAT(refused.err, HasSubstr("would be lost")) << lossy;
+  }
+  EXPECT_EQ(content_of(in("plate.exr")), before);
+  EXPECT_EQ(content_of(in("keyed/frame.000001.exr")), frame);
+}
+
+TEST_F(KeyCommand, TellsOfLostFramesAndOfFramesThatWereThere) {
+  ASSERT_EQ(
+      run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
+  const std::string key = "key " + in("take_%04d.png") + " --colour sRGB --plate " +
+                          in("plate.exr") + " -o " + in("keyed") + " --json " + in("key.json");
+  ASSERT_EQ(run(key).err, "");
+  fs::remove(in("take_0001.png"));
+  fs::remove(in("empty_0001.png"));
+  const Outcome keyed = run(key);
+  EXPECT_EQ(keyed.status, 0);
+  EXPECT_THAT(keyed.err, HasSubstr("1 of 4 frames were lost"));
+  EXPECT_THAT(keyed.err, HasSubstr("had 4 frames already"));
+  const auto figures = nlohmann::json::parse(content_of(in("key.json")));
+  EXPECT_EQ(figures["lost"], 1);
+  EXPECT_EQ(figures["rows"].size(), 4U);
+  EXPECT_EQ(figures["rows"][1]["status"], "lost");
+  EXPECT_LE(figures["confidence_least"], figures["confidence_mean"]);
+  const Outcome plate =
+      run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr"));
+  EXPECT_THAT(plate.err, HasSubstr("1 of 4 frames were lost or damaged"));
+  EXPECT_THAT(plate.out, HasSubstr("mean of 3 frames"));
+}
+
+// A wall of two colours, half of it green: a ball crosses it.
+TEST_F(KeyCommand, FindsAnyStillBackgroundInFootageAlone) {
+  constexpr int width = 80, height = 48, frames = 12;
+  const auto is_ball = [](int x, int y, int i) { return std::hypot(x - 6 * i - 6, y - 24) < 6; };
+  for (int i = 0; i < frames; ++i) {
+    std::vector<std::uint8_t> codes;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const bool left = x < width / 2;
+        const auto grain = static_cast<std::uint8_t>((x * 7 + y * 3 + i) % 2);
+        for (const int code : left ? std::array{40, 200, 50} : std::array{120, 80, 40}) {
+          codes.push_back(is_ball(x, y, i) ? 230 : static_cast<std::uint8_t>(code + grain));
+        }
+      }
+    }
+    capture::write_png(dir_ / fmt::format("wall_{:04}.png", i), width, height, 3, codes);
+  }
+  const Outcome keyed =
+      run("key " + in("wall_%04d.png") + " --colour sRGB --method difference -o " + in("wall") +
+          " --json " + in("wall.json"));
+  ASSERT_EQ(keyed.status, 0) << keyed.err;
+  EXPECT_GT(nlohmann::json::parse(content_of(in("wall.json")))["plate_known"], 0.99);
+  const capture::Image middle = capture::read_exr(in("wall/frame.000006.exr"));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double off = std::hypot(x - 42, y - 24);
+      if (off < 4) {
+        ASSERT_GT(middle.at(y, x, 3), 0.99F) << x << " " << y;
+      }
+      if (off > 8) {
+        ASSERT_LT(middle.at(y, x, 3), 0.01F) << x << " " << y;
+      }
+    }
+  }
+}
+
+TEST_F(KeyCommand, SaysThatAGreyWallIsNoScreen) {
+  capture::write_png(dir_ / "grey.png", 40, 20, 3, std::vector<std::uint8_t>(2400, 130));
+  const Outcome plate =
+      run("key plate " + in("grey.png") + " -o " + in("plate.exr") + " --json " + in("plate.json"));
+  EXPECT_EQ(plate.status, 0);
+  EXPECT_THAT(plate.err, HasSubstr("no screen"));
+  EXPECT_THAT(plate.out, HasSubstr("no screen, noise not measured"));
+  const auto figures = nlohmann::json::parse(content_of(in("plate.json")));
+  EXPECT_EQ(figures["colour"], "no");
+  EXPECT_TRUE(figures["noise_floor"].is_null());
+}
+
+TEST_F(KeyCommand, TakesAPlateOfAScreenWithSomebodyBeforeIt) {
+  const Outcome plate =
+      run("key plate " + in("take_%04d.png") + " --colour sRGB --person -o " + in("plate.exr"));
+  EXPECT_EQ(plate.status, 0) << plate.err;
+  EXPECT_THAT(plate.out, HasSubstr("middle of 4 frames, a green screen, noise not measured"));
+}
+
+// The plate is of what is keyed, not of what comes before.
+TEST_F(KeyCommand, JudgesAClipByWhatItBeginsWith) {
+  for (int i = 0; i < 4; ++i) {
+    fs::rename(in("take_000" + std::to_string(i) + ".png"),
+               in("late_0" + std::to_string(500 + i) + ".png"));
+  }
+  capture::write_png(dir_ / "late_0000.png", 160, 90, 3, std::vector<std::uint8_t>(43200, 20));
+  for (int i = 1; i < 500; ++i) {
+    fs::create_hard_link(in("late_0000.png"), in(fmt::format("late_{:04}.png", i)));
+  }
+  const Outcome keyed =
+      run("key " + in("late_%04d.png") + " --colour sRGB --first 500 -o " + in("keyed"));
+  EXPECT_EQ(keyed.status, 0) << keyed.err;
+  EXPECT_THAT(keyed.out, HasSubstr("4 frames before a green screen"));
 }
 
 TEST_F(KeyCommand, KeepsToMasks) {
