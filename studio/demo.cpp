@@ -2,6 +2,8 @@
 #include "studio/demo.h"
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <numeric>
 #include <span>
 #include <stdexcept>
@@ -76,14 +78,33 @@ std::vector<render::LocalLight> lights_of_lamp(const render::MadeStudio& studio,
   return render::lights_of_made_lamp(placement_of(*studio.lamp), count);
 }
 
+// The set of a folder may have been worked on, and its footage be somebody else's.
+void require_no_other_set(const fs::path& set, const std::string& text) {
+  const fs::path plate = set.parent_path() / "plate.mkv";
+  if (!fs::exists(set)) {
+    // Beside its truth, it is left of a demo that was not finished.
+    if (!fs::exists(plate) || fs::exists(set.parent_path() / "truth")) return;
+    throw std::runtime_error(plate.string() + " is there already: name another folder");
+  }
+  std::ifstream file(set, std::ios::binary);
+  if (std::string{std::istreambuf_iterator<char>(file), {}} == text) return;
+  throw std::runtime_error(set.string() +
+                           " is there already, and is another set than the one to be made: name "
+                           "another folder, or move it away");
+}
+
 DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progress) {
-  const fs::path truth = settings.dir / "truth";
-  fs::create_directories(truth);
   DemoFigures figures;
   figures.frames = settings.studio.frames;
 
   progress(0, "the place");
   const render::MadeStudio studio = make_demo_studio(settings);
+  const bool court = settings.world == DemoWorld::court;
+  figures.set = settings.dir / (court ? "car.toml" : "park_car.toml");
+  const std::string set_text = court ? court_set(studio, "") : park_set(studio, "");
+  require_no_other_set(figures.set, set_text);
+  const fs::path truth = settings.dir / "truth";
+  fs::create_directories(truth);
   const render::Scene place(studio.place);
   const auto plate_directions = calibrate::make_direction_table(studio.plate.lens);
   const std::vector<render::LocalLight> lamp = lights_of_lamp(studio, lights_of_photographed_lamp);
@@ -109,7 +130,6 @@ DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progres
   write_demo_plate(settings.dir / "plate.mkv", studio, [&](int n) {
     return render::add_light(moves && n > 0 ? photograph(place, n) : first, strength_at(n));
   });
-  const bool court = settings.world == DemoWorld::court;
   if (court) write_demo_clap(settings.dir / "clap.mkv", studio, first_radiance);
 
   progress(0.5, "the probe");
@@ -130,8 +150,7 @@ DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progres
     write_demo_calibration(settings.dir / "calibration", studio,
                            {first_radiance, render::add_light(probe, strength_at(0))});
   }
-  figures.set = settings.dir / (court ? "car.toml" : "park_car.toml");
-  write_text(figures.set, court ? court_set(studio, "") : park_set(studio, ""));
+  write_text(figures.set, set_text);
   write_demo_truth(truth / "truth.json", settings, studio);
 
   progress(0.6, "the photograph");

@@ -75,7 +75,8 @@ std::vector<render::LocalLight> lights_of_lamp(const render::MadeStudio& studio,
 //   truth/photograph_0000.png     and as the camera would have coded it, with noise
 //   truth/coverage_0000.exr       which share of each pixel they cover
 //
-// The same settings write the same bytes. Throws std::runtime_error with path and reason.
+// The same settings write the same bytes. Throws std::runtime_error with path and reason; also
+// where the folder holds another set of that name, or a plate of somebody else's.
 DemoFigures write_demo(const DemoSettings& settings, const DemoProgress& progress);
 
 }  // namespace studio

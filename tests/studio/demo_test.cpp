@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -90,6 +91,28 @@ TEST(WriteDemo, WritesTheLightThatThePlateWasFilmedIn) {
   const capture::Image environment =
       capture::read_exr((settings.dir / "truth/environment.exr").string());
   EXPECT_EQ(environment.width, 2 * environment.height);
+  fs::remove_all(settings.dir);
+}
+
+TEST(WriteDemo, ReplacesNoOtherSetOrPlate) {
+  DemoSettings settings = tiny("other");
+  settings.studio.frames = 1;
+  settings.samples = 1;
+  fs::create_directories(settings.dir);
+  const auto expect_refused = [&](const char* name) {
+    const fs::path file = settings.dir / name;
+    std::ofstream(file) << "mine";
+    EXPECT_THROW(write_demo(settings, ignore), std::runtime_error) << name;
+    EXPECT_EQ(bytes_of(file), "mine");
+    fs::remove(file);
+  };
+  expect_refused("car.toml");
+  expect_refused("plate.mkv");
+  write_demo(settings, ignore);
+  const std::string set = bytes_of(settings.dir / "car.toml");
+  write_demo(settings, ignore);
+  EXPECT_EQ(bytes_of(settings.dir / "car.toml"), set);
+  expect_refused("car.toml");
   fs::remove_all(settings.dir);
 }
 
