@@ -54,8 +54,9 @@ MadeCameraRequest parse_made_camera(std::string_view uri) {
     const std::size_t equals = setting.find('=');
     const auto key = std::ranges::find(keys, setting.substr(0, equals), &Key::name);
     const bool packets = key >= keys.end() - 3;
+    const bool endless = request.gige && setting.starts_with("frames");
     if (key == keys.end() || equals == std::string_view::npos ||
-        packets != (packets && request.gige)) {
+        packets != (packets && request.gige) || endless) {
       refuse_made_camera(uri, "\"" + std::string(setting) + "\" is no setting");
     }
     const std::string_view value = setting.substr(equals + 1);

@@ -41,6 +41,7 @@ calibrate::Pose read_way(Section& table) {
   table.vector("position", position, metres);
   double roll_deg = 0;
   table.number("roll", roll_deg, angle_range);
+  table.of_use_only(table.has("look_at"), "roll", "look_at");
   calibrate::Pose cam_from_set;
   calibrate::Vec3 target;
   if (table.vector("look_at", target, metres)) {
@@ -62,6 +63,7 @@ void read_camera_pose(Section table, const fs::path& base, PoseSettings& pose) {
                 "track = \"poses.csv\"");
   }
   if (!table.has("track")) table.need("position", "where the camera stands, in metres");
+  table.of_use_only(!table.has("track"), "position", "look_at or rotation: a track has its own");
   pose.cam_from_set = read_way(table);
   if (table.file("track", base, pose.track)) {
     try {
@@ -119,6 +121,7 @@ void read_probe_pose(Section table, calibrate::Pose& probe_from_set) {
   }
   table.vector("position", position, metres);
   table.number("roll", roll_deg, angle_range);
+  table.of_use_only(table.has("axis"), "roll", "axis");
   if (table.vector("axis", axis, metres)) {
     try {
       probe_from_set = calibrate::pose_from_axis(position, axis, roll_deg * degree);
@@ -332,6 +335,7 @@ ProbeSettings read_probe_section(Section section, const SetContext& context) {
   if (double yaw_deg = 0; section.number("yaw", yaw_deg, angle_range)) {
     probe.yaw_rad = yaw_deg * degree;
   }
+  section.of_use_only(!probe.lens, "yaw", "a map: a lens has its pose");
 
   read_exposures(section, probe);
   if (!probe.exposures_s.empty() && !probe.shots.empty() &&

@@ -49,7 +49,9 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
 
   if (lens.model.starts_with("LENSMODEL_")) {
     table.need("parameters", "the list of numbers that mrcal's model takes");
-    table.numbers("parameters", lens.parameters, {}, {-1e9, 1e9});
+    if (table.numbers("parameters", lens.parameters, {}, {-1e9, 1e9}) && lens.parameters.empty()) {
+      table.fault("parameters", "is an empty list: every lens has parameters");
+    }
   } else {
     std::vector<double> centre{(lens.width - 1) / 2.0, (lens.height - 1) / 2.0};
     std::vector<double> terms;
@@ -63,7 +65,10 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
     }
     if (focal.empty()) return std::nullopt;
     lens.parameters = focal;
-    if (lens.model == "equisolid") lens.parameters.pop_back();
+    if (lens.model == "equisolid") {
+      if (focal.front() != focal.back()) table.fault("focal_px", "is one number of this lens");
+      lens.parameters.pop_back();
+    }
     lens.parameters.insert(lens.parameters.end(), centre.begin(), centre.end());
     lens.parameters.insert(lens.parameters.end(), decentring.begin(), decentring.end());
     lens.parameters.insert(lens.parameters.end(), terms.begin(), terms.end());

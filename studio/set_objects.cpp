@@ -41,6 +41,7 @@ void read_copies(Section& section, ObjectSettings& object) {
     }
     section.need("spacing", "metres between copies, along x and y");
   }
+  section.of_use_only(section.has("copies"), "spacing", "copies");
   std::vector<double> spacing;
   if (section.numbers("spacing", spacing, {2}, metres)) {
     object.spacing_m = {spacing[0], spacing[1]};
