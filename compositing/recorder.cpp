@@ -125,6 +125,7 @@ void check(const RecorderSettings& settings) {
   for (const std::string& file : {settings.file, settings.fill_file, settings.key_file}) {
     if (!file.empty()) require_writable(file);
   }
+  if (!settings.exr_dir.empty()) require_writable_folder(settings.exr_dir);
 }
 
 class Recorder::Take {

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -50,8 +52,22 @@ CLI::App* add_command(CLI::App& app, const Command& command) {
   return group->add_subcommand(name.substr(space + 1), std::string(command.summary));
 }
 
-bool is_first_word(const Command& command, std::string_view word) {
-  return command.name.substr(0, command.name.find(' ')) == word;
+bool begins_with(const Command& command, std::string_view words) {
+  const std::string_view name = command.name;
+  return name.starts_with(words) && (name.size() == words.size() || name[words.size()] == ' ');
+}
+
+// What of the command's name is given, and no command's: CLI11 would only say that one is missing.
+std::optional<std::string> unknown_command(int count, const char* const* words) {
+  std::string name;
+  for (int i = 1; i < count && words[i][0] != '-'; ++i) {
+    name += (i > 1 ? " " : "") + std::string(words[i]);
+    const auto is_it = [&](const Command& command) { return command.name == name; };
+    const auto may_be = [&](const Command& command) { return begins_with(command, name); };
+    if (std::ranges::any_of(commands(), is_it)) return std::nullopt;
+    if (std::ranges::none_of(commands(), may_be)) return name;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -102,12 +118,9 @@ int run_command_line(int count, const char* const* words) {
     declared.push_back({sub, std::move(run)});
   }
 
-  // CLI11 would only say that a command is missing.
-  if (count > 1 && words[1][0] != '-' &&
-      std::ranges::none_of(
-          commands(), [&](const Command& command) { return is_first_word(command, words[1]); })) {
+  if (const auto unknown = unknown_command(count, words)) {
     fmt::print(stderr, "platelight: there is no command \"{}\" (see platelight --help)\n",
-               words[1]);
+               *unknown);
     return 2;
   }
   try {
@@ -117,10 +130,13 @@ int run_command_line(int count, const char* const* words) {
   } catch (const CLI::ParseError& error) {
     return report_usage(app, error);
   }
+  // Not after an hour's work.
+  if (!figures_file.empty()) require_figures_file(figures_file);
   Console console(quiet, figures_file);
   const auto chosen =
       std::ranges::find_if(declared, [](const Declared& d) { return d.app->parsed(); });
   chosen->run(console);
+  if (console.lost_words()) throw std::runtime_error("standard output could not be written");
   return 0;
 }
 

@@ -6,24 +6,25 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <string>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "compositing/output_file.h"
 
 namespace studio {
 namespace {
 
-// A terminal may go while the command runs, which is no reason to end it.
-template <typename... Args>
-void print(bool terminal, std::FILE* file, fmt::format_string<Args...> format, Args&&... args) {
-  try {
-    fmt::print(file, format, std::forward<Args>(args)...);
-  } catch (const std::system_error&) {
-    if (!terminal) throw;
-  }
+// Whether all of it was written.
+bool print(std::FILE* file, const std::string& text) {
+  const bool whole = std::fwrite(text.data(), 1, text.size(), file) == text.size();
+  return std::fflush(file) == 0 && whole;
 }
 
 }  // namespace
@@ -38,7 +39,7 @@ Console::~Console() { clear_bar(); }
 
 void Console::clear_bar() {
   if (!bar_shown_) return;
-  print(terminal_, stderr, "\r\033[K");
+  print(stderr, "\r\033[K");
   bar_shown_ = false;
 }
 
@@ -46,14 +47,13 @@ void Console::say(std::string_view line) {
   const std::lock_guard lock(mutex_);
   if (quiet_) return;
   clear_bar();
-  print(says_to_terminal_, stdout, "{}\n", line);
-  std::fflush(stdout);
+  if (!print(stdout, fmt::format("{}\n", line)) && !says_to_terminal_) lost_words_ = true;
 }
 
 void Console::warn(std::string_view line) {
   const std::lock_guard lock(mutex_);
   clear_bar();
-  print(terminal_, stderr, "{}\n", line);
+  print(stderr, fmt::format("{}\n", line));
 }
 
 void Console::progress(double share, std::string_view what) {
@@ -65,13 +65,26 @@ void Console::progress(double share, std::string_view what) {
   bar_time_ = now;
   constexpr int width = 30;
   const int full = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * width));
-  print(terminal_, stderr, "\r[{:=<{}}{:<{}}] {}\033[K", "", full, "", width - full, what);
-  std::fflush(stderr);
+  print(stderr, fmt::format("\r[{:=<{}}{:<{}}] {}\033[K", "", full, "", width - full, what));
   bar_shown_ = true;
+}
+
+// What was there is replaced only if it was figures as well.
+void require_figures_file(const std::string& path) {
+  std::error_code none;
+  if (std::filesystem::is_regular_file(path, none) && std::filesystem::file_size(path, none) > 0) {
+    std::ifstream there(path, std::ios::binary);
+    if (!nlohmann::json::accept(there)) {
+      throw std::runtime_error(path + ": is there already, is no JSON, and would be lost: write " +
+                               "the figures to another file");
+    }
+  }
+  compositing::require_writable(path);
 }
 
 void Console::figures(std::string_view json) {
   if (figures_file_.empty()) return;
+  require_figures_file(figures_file_);
   std::ofstream file(figures_file_, std::ios::binary | std::ios::trunc);
   file << json << '\n';
   file.close();

@@ -1,6 +1,7 @@
 // What a command says: words, progress, figures.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <mutex>
 #include <string>
@@ -8,7 +9,12 @@
 
 namespace studio {
 
-// From any thread.
+// Throws std::runtime_error if figures could not be written to a file: what is there and is no JSON
+// stays.
+void require_figures_file(const std::string& path);
+
+// From any thread. Words that nobody can be told, since the terminal is gone or the log cannot be
+// written, end nothing; lost_words() tells of them.
 class Console {
  public:
   Console(bool quiet, std::string figures_file);
@@ -28,6 +34,8 @@ class Console {
   // Whether anybody wants figures: costly ones need not be made otherwise.
   bool wants_figures() const { return !figures_file_.empty(); }
   const std::string& figures_file() const { return figures_file_; }
+  // Whether standard output, unless it is a terminal, could not be written.
+  bool lost_words() const { return lost_words_; }
 
  private:
   void clear_bar();
@@ -37,6 +45,7 @@ class Console {
   bool terminal_;          // is what warnings and bars go to
   bool says_to_terminal_;  // where lines go
   bool bar_shown_ = false;
+  std::atomic<bool> lost_words_ = false;
   std::string figures_file_;
   std::chrono::steady_clock::time_point bar_time_{};
 };

@@ -257,7 +257,8 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     }
     prepared.plate = half_plate(*frame);
     prepared.plate_status = frame->status;
-    prepared.plate_exposure_s = frame->exposure_s;
+    prepared.plate_exposure_s =
+        frame->exposure_s > 0 ? frame->exposure_s : set_.camera.exposure_s.value_or(0);
     plate_->read_sound_to(time + capture::time_of_frame(1, rate_));
     prepared.sound = plate_->take_sound();
     videos = videos_->at(time);
@@ -272,7 +273,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   {
     const StageTimer timer(prepared, Stage::probe);
     light = light_->at({time, frame->image.get(), directions_.get(), job.cam_from_set,
-                        frame->exposure_s, set_.effort.light_samples});
+                        prepared.plate_exposure_s, set_.effort.light_samples});
   }
 
   {
@@ -478,9 +479,7 @@ void FrameMaker::finish_change() {
   if (!change_.valid()) return;
   try {
     take_over(change_.get());
-  } catch (const std::runtime_error& error) {
-    notes_.emplace_back(error.what());
-  } catch (const std::invalid_argument& error) {
+  } catch (const std::exception& error) {  // whatever it is, what is on air goes on
     notes_.emplace_back(error.what());
   }
 }

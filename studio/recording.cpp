@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "compositing/timecode.h"
+#include "studio/set_files.h"
 #include "studio/show.h"
 
 namespace studio {
@@ -50,8 +51,12 @@ void Recording::check(const RecordSettings& settings) const {
 void Recording::start(const RecordSettings& settings) {
   const compositing::RecorderSettings recorder = settings_of(settings);
   compositing::check(recorder);  // else the take that runs goes on
+  for (const std::string* written : {&settings.file, &settings.fill, &settings.key}) {
+    if (recorder_) spare_take(settings_, *written);
+  }
   stop();
   recorder_ = std::make_unique<compositing::Recorder>(recorder);
+  settings_ = settings;
 }
 
 void Recording::stop() {

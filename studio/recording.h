@@ -44,6 +44,7 @@ class Recording {
   compositing::RecorderSettings settings_of(const RecordSettings& settings) const;
 
   RecordingForm form_;
+  RecordSettings settings_;  // of the present or last recording
   std::unique_ptr<compositing::Recorder> recorder_;
   compositing::RecorderStatus last_status_;
 };

@@ -2,6 +2,7 @@
 #include "studio/set_watch.h"
 
 #include <chrono>
+#include <exception>
 #include <system_error>
 #include <utility>
 
@@ -31,6 +32,8 @@ void SetWatch::watch(const std::stop_token& stop) const {
       changed_(read_set(path_));
     } catch (const SetError& fault) {
       refused_(fault);
+    } catch (const std::exception& error) {  // of the machine: no memory, say
+      refused_(SetError({{path_, 0, 0, error.what()}}));
     }
   }
 }

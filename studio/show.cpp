@@ -1,6 +1,7 @@
 // The loop: inputs on one thread, pictures on another.
 #include "studio/show.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -15,6 +16,7 @@
 #include "compositing/exr_sequence.h"
 #include "render/kept_transport.h"
 #include "studio/handover.h"
+#include "studio/notes.h"
 #include "studio/recording.h"
 #include "studio/set_files.h"
 #include "studio/sharpening.h"
@@ -154,7 +156,8 @@ class Show::Stages {
   std::optional<std::int64_t> frames_of_plate() const {
     const capture::CameraInfo& plate = maker_.plate().info();
     if (plate.frames <= 0 || plate.rate.num <= 0 || maker_.is_endless()) return std::nullopt;
-    const double seconds = static_cast<double>(plate.frames) / plate.rate.value();
+    const std::int64_t left = plate.frames - maker_.set().camera.frame.value_or(0);
+    const double seconds = static_cast<double>(left) / plate.rate.value();
     return std::llround(seconds * maker_.rate().value());
   }
 
@@ -402,18 +405,21 @@ class Show::Stages {
   void noting(const Act& act) {
     try {
       act();
-    } catch (const std::runtime_error& error) {
-      note(error.what());
-    } catch (const std::invalid_argument& error) {
+    } catch (const std::exception& error) {
       note(error.what());
     }
   }
 
+  // Where they are too many, one of the same kind goes, so that what is told of every frame does
+  // not hide the rest.
   void note(std::string what) {
     const std::lock_guard lock(mutex_);
     notes_.push_back(std::move(what));
     ++noted_;
-    if (notes_.size() > most_notes) notes_.erase(notes_.begin());
+    if (notes_.size() <= most_notes) return;
+    const std::string kind = kind_of_note(notes_.back());
+    const auto same = std::ranges::find(notes_, kind, kind_of_note);
+    notes_.erase(same + 1 == notes_.end() ? notes_.begin() : same);
   }
 
   ShowOptions options_;  // live wherever the plate is

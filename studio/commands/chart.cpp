@@ -4,10 +4,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "compositing/output_file.h"
 #include "studio/chart_stages.h"
 #include "studio/charts/set.h"
 #include "studio/commands/commands.h"
@@ -23,6 +25,13 @@ struct ChartOptions {
   std::optional<std::int64_t> samples;
 };
 
+// Before hours of measuring. Throws std::runtime_error if it cannot be had.
+void require_chart_folder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  compositing::require_writable_folder(folder);
+}
+
 // "set SET.toml": beside the set file, where `run` looks for it, if nothing else is said.
 void chart_of_set(const ChartOptions& options, Console& console) {
   if (options.stages.size() != 2) throw UsageError("chart set needs one set file: set SET.toml");
@@ -30,13 +39,14 @@ void chart_of_set(const ChartOptions& options, Console& console) {
     throw UsageError("chart set measures the set that is named after it: --set is for photograph");
   }
   const std::string& set = options.stages[1];
+  const std::string beside = std::filesystem::path(effort_points_file(set)).parent_path().string();
+  const std::string out = !options.out.empty() ? options.out : beside.empty() ? "." : beside;
+  require_chart_folder(out);
   SetChartSettings settings;
   settings.quick = options.request.quick;
   if (options.samples) settings.samples = static_cast<int>(*options.samples);
   Chart measured = chart_set(set, settings, console);
   mark_front(measured);
-  const std::string beside = std::filesystem::path(effort_points_file(set)).parent_path().string();
-  const std::string out = !options.out.empty() ? options.out : beside.empty() ? "." : beside;
   write_chart(measured, out);
   console.figures(chart_json(measured));
   console.say(fmt::format("{0}/{1}.svg, .png, .csv, .json", out, measured.stage));
@@ -72,6 +82,7 @@ void chart(const ChartOptions& options, Console& console) {
     throw UsageError("--json takes the figures of one stage; --out has them all");
   }
   const std::string out = options.out.empty() ? "." : options.out;
+  require_chart_folder(out);
   ChartRequest request = options.request;
   request.out = out;
   for (const ChartStage* stage : wanted) {

@@ -1,6 +1,7 @@
 // platelight run: puts a set on air.
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -11,10 +12,12 @@
 #include <fmt/format.h>
 
 #include "capture/png.h"
+#include "compositing/output_file.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/interruptible.h"
 #include "studio/effort_points.h"
 #include "studio/figures.h"
+#include "studio/notes.h"
 #include "studio/picture_error.h"
 #include "studio/set_files.h"
 #include "studio/set_watch.h"
@@ -87,25 +90,32 @@ void report_progress(const ShowStatus& status,
 }
 
 // Tells what goes wrong, each thing once and as soon as the show tells it, and once more after
-// every edit; where notes are very many, the rest of them at the end.
+// every edit. Of those that differ in their numbers alone only the first few, and at the end how
+// many more there were.
 class Warnings {
  public:
   explicit Warnings(Console& console) : console_(console) {}
 
   void tell(const ShowStatus& status) {
-    constexpr std::size_t most = 20;
     const std::lock_guard lock(mutex_);
     if (!status.recorder.error.empty()) tell(status.recorder.error);
-    if (told_.size() < most) tell_notes(status);
-  }
-  void tell_rest(const ShowStatus& status) {
-    const std::lock_guard lock(mutex_);
     tell_notes(status);
+  }
+  // And of how many were not told.
+  void tell_rest(const ShowStatus& status) {
+    tell(status);
+    const std::lock_guard lock(mutex_);
+    for (const auto& [kind, count] : kinds_) {
+      if (count > most_of_kind) {
+        console_.warn(fmt::format("{} more like: {}", count - most_of_kind, kind));
+      }
+    }
   }
   // From any thread: what an edit leads to is told although one before led to it as well.
   void tell_again() {
     const std::lock_guard lock(mutex_);
     told_.clear();
+    kinds_.clear();
   }
 
  private:
@@ -118,14 +128,19 @@ class Warnings {
   }
   void tell(const std::string& what) {
     if (std::ranges::find(told_, what) != told_.end()) return;
-    console_.warn(what);
     told_.push_back(what);
+    if (told_.size() > most_told) told_.erase(told_.begin());
+    if (++kinds_[kind_of_note(what)] <= most_of_kind) console_.warn(what);
   }
+
+  static constexpr std::size_t most_told = 100;
+  static constexpr int most_of_kind = 5;
 
   Console& console_;
   std::mutex mutex_;
-  std::vector<std::string> told_;
-  std::int64_t seen_ = 0;  // notes that were looked at
+  std::vector<std::string> told_;     // the last of them
+  std::map<std::string, int> kinds_;  // how many of each
+  std::int64_t seen_ = 0;             // notes that were looked at
 };
 
 // Sections of a set whose changes a running show does not take over.
@@ -193,6 +208,7 @@ void run(const RunOptions& options, Console& console) {
   ShowOptions show_options;
   show_options.live = options.live;
   show_options.frames = options.frames;
+  if (!options.view_png.empty()) compositing::require_writable(options.view_png);
   for (const std::string& written : {options.view_png, console.figures_file()}) {
     spare_sources(set, written);
     spare_take(set.record, written);

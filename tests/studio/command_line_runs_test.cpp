@@ -11,6 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "calibrate/lens.h"
 #include "capture/camera.h"
 #include "capture/exr.h"
 #include "capture/png.h"
@@ -192,6 +193,9 @@ TEST_F(Runs, AreCheckedUpToTheirDisplayAndTake) {
   EXPECT_THAT(faults_of("[display]\ndisplay = \"none such\"\n"), HasSubstr("none such"));
   EXPECT_THAT(faults_of("[record]\nfile = \"no/folder/take.mkv\"\n"), HasSubstr("take.mkv"));
   EXPECT_FALSE(fs::exists(dir_ / "no"));
+  EXPECT_THAT(faults_of("[record]\nexr = \"cube.obj/take\"\n"), HasSubstr("cube.obj"));
+  EXPECT_EQ(faults_of("[record]\nexr = \"no/folder/yet\"\n"), "");
+  EXPECT_FALSE(fs::exists(dir_ / "no"));
   EXPECT_THAT(faults_of("[record]\nfile = \"t.mkv\"\ntimecode = \"hello\"\n"), HasSubstr("hello"));
   EXPECT_THAT(faults_of("[record]\nfile = \"t.mkv\"\ntimecode = \"25:00:00:00\"\n"),
               HasSubstr("25:00:00:00"));
@@ -219,6 +223,25 @@ TEST_F(Runs, AreNotRecordedOverWhatTheirSetIsMadeFrom) {
   expect_spared("run " + set + " --json " + set, set);
   expect_spared("still " + set + " -o " + set, set);
   expect_spared("check " + set + " --json " + set, set);
+  fs::create_hard_link(take, dir_ / "other.mkv");
+  expect_spared("run " + set + " --record " + (dir_ / "other.mkv").string(), take);
+  // What keys name, and what a frame of a take would replace.
+  fs::create_directories(dir_ / "light");
+  fs::copy_file(dir_ / "sky.exr", dir_ / "light" / "frame.000001.exr");
+  const std::string lens = (dir_ / "lens.toml").string();
+  calibrate::write_lens(lens, {"pinhole", 64, 48, {60, 60, 31.5, 23.5}});
+  std::string with_lens = content_of(set);
+  for (const auto& [of, by] : {std::pair<std::string, std::string>{
+                                   "model = \"pinhole\"\nfocal_px = 60", "lens = \"lens.toml\""},
+                               {"sky.exr", "light/frame.000001.exr"}}) {
+    with_lens.replace(with_lens.find(of), of.size(), by);
+  }
+  const std::string lensed = write("lensed.toml", with_lens);
+  expect_spared("still " + lensed + " -o " + lens, lens);
+  expect_spared("run " + lensed + " --exr " + (dir_ / "light").string(),
+                (dir_ / "light" / "frame.000001.exr").string());
+  const std::string broken = write("broken.toml", "[show]\nwidth = \"wide\"\n");
+  expect_spared("check " + broken + " --json " + broken, broken);
   write_set();
   expect_spared("still " + set + " -o " + (dir_ / "plate_1.png").string(),
                 (dir_ / "plate_1.png").string());

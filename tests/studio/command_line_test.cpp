@@ -82,6 +82,45 @@ TEST_F(CommandLine, ReturnsTwoAndOneLineForWrongUsage) {
 
 TEST_F(CommandLine, NamesACommandThatItDoesNotKnow) {
   EXPECT_THAT(run("chek a.toml").err, HasSubstr("chek"));
+  EXPECT_THAT(run("calibrate lenz -o a.toml").err, HasSubstr("\"calibrate lenz\""));
+}
+
+TEST_F(CommandLine, PutsNoFiguresInThePlaceOfWhatIsNone) {
+  const std::string lens = write("scene.toml", "model = \"pinhole\"\n");
+  const Outcome refused = run("devices --json " + lens);
+  EXPECT_EQ(refused.status, 1);
+  expect_one_line(refused.err);
+  EXPECT_THAT(refused.err, HasSubstr("is no JSON"));
+  EXPECT_EQ(content_of(lens), "model = \"pinhole\"\n");
+  const std::string figures = write("devices.json", "\n[1]");
+  EXPECT_EQ(run("devices --json " + figures).status, 0);
+  EXPECT_NE(content_of(figures), "\n[1]");
+  EXPECT_EQ(run("devices --json " + (dir_ / "no" / "a.json").string()).status, 1);
+}
+
+// A log on a full disk ends nothing by itself.
+TEST_F(CommandLine, SaysByItsStatusThatItsWordsWereLost) {
+  const char* binary = std::getenv("PLATELIGHT_BINARY");
+  ASSERT_NE(binary, nullptr);
+  const auto status_of = [&](const std::string& where) {
+    const std::string figures = (dir_ / "a.json").string();
+    const int status =
+        std::system((std::string(binary) + " devices --json " + figures + where).c_str());
+    EXPECT_FALSE(content_of(figures).empty()) << where;
+    fs::remove(figures);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  EXPECT_EQ(status_of(" >/dev/full 2>/dev/null"), 1);
+  EXPECT_EQ(status_of(" >/dev/full 2>/dev/full"), 1);
+  EXPECT_EQ(status_of(" >/dev/null 2>/dev/full"), 0);
+}
+
+TEST_F(CommandLine, MeasuresNoChartThatItCannotWrite) {
+  const std::string file = write("charts", "");
+  const Outcome refused = run("chart lights hdr --out " + file + "/charts");
+  EXPECT_EQ(refused.status, 1);
+  expect_one_line(refused.err);
+  EXPECT_THAT(refused.err, HasSubstr("charts"));
 }
 
 TEST_F(CommandLine, RefusesABenchmarkWithoutItsSubject) {

@@ -255,17 +255,56 @@ TEST_F(ShowTest, GoesOnRecordingWhereTheNextTakeCannotBe) {
   good.exr = (dir_ / "take").string();
   bad.exr = good.exr;
   bad.timecode = "99:00:00:00";
+  RecordSettings no_folder;
+  no_folder.exr = (dir_ / "cube.obj" / "take").string();
   show.post(StartRecording{good});
   show.run([&](const ShownFrame& shown) {
     if (shown.prepared.job.frame == 2) show.post(StartRecording{bad});
+    if (shown.prepared.job.frame == 3) show.post(StartRecording{no_folder});
   });
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("99:00:00:00")));
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("cube.obj")));
   EXPECT_EQ(show.status()->recorder.written, 12);
   // Another show says what is there.
   Show again(made_set("grey:1,25,0"), options);
   again.post(StartRecording{good});
   again.run();
   EXPECT_THAT(again.status()->notes, Contains(HasSubstr("has 12 frames already")));
+}
+
+TEST_F(ShowTest, RecordsNoTakeOverTheOneThatRuns) {
+  ShowOptions options;
+  options.frames = 8;
+  Show show(made_set("grey:1,25,0"), options);
+  RecordSettings take;
+  take.file = (dir_ / "take.mkv").string();
+  show.post(StartRecording{take});
+  show.run([&](const ShownFrame& shown) {
+    if (shown.prepared.job.frame == 4) show.post(StartRecording{take});
+  });
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("take.mkv is what is recorded to")));
+  EXPECT_EQ(show.status()->recorder.written, 8);
+}
+
+// What is told of every frame does not hide what is told once.
+TEST_F(ShowTest, KeepsNotesOfEveryKind) {
+  Show show(
+      made_set("grey:60,25,2",
+               "[[billboard]]\nsource = \"grey:3,25,0\"\nheight = 2\nposition = [0, 0, 0]\n"));
+  show.run();
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("has ended")));
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("the plate's frame")));
+}
+
+TEST_F(ShowTest, TakesThePlatesExposureFromItsSetWhereNoneIsTold) {
+  Set set = made_set("grey:2,25,0");
+  ASSERT_TRUE(set.probe);
+  set.probe->match.follow = true;
+  set.probe->match.exposure_s = 0.01;
+  set.camera.exposure_s = 0.02;
+  Show show(set);
+  show.run();
+  EXPECT_NEAR(show.status()->match.exposure, 2, 1e-6);
 }
 
 TEST_F(ShowTest, HidesPartsOfMadeThings) {
