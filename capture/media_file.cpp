@@ -150,6 +150,8 @@ libav::PacketHandle MediaFile::next_packet(Track track) {
 }
 
 bool MediaFile::rewind() {
+  // Those whose stamps may jump seek by decoding times, and land behind the first picture.
+  if ((context_->iformat->flags & AVFMT_TS_DISCONT) != 0) return false;
   return seek(video_->start_time == AV_NOPTS_VALUE ? 0 : video_->start_time);
 }
 

@@ -36,7 +36,7 @@ class MediaFile {
   bool has_packet(Track track) const { return !waiting_[index(track)].empty(); }
 
   // Back to the beginning, or to the last picture at or before `pts` (the video's time base) from
-  // which decoding can start. Returns whether the container can.
+  // which decoding can start. Returns whether the container can; MPEG's streams cannot rewind.
   bool rewind();
   bool seek(std::int64_t pts);
 

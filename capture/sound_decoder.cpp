@@ -64,6 +64,13 @@ void SoundDecoder::begin(std::int64_t first_pts, Time start) {
   at_end_ = false;
 }
 
+bool SoundDecoder::follow(SoundDecoder& before) {
+  if (before.channels_ != channels_ || before.rate_ != rate_) return false;
+  taken_ = before.taken_;
+  segments_ = std::move(before.segments_);
+  return true;
+}
+
 void SoundDecoder::skip_to(Time from) { taken_ = std::max(taken_, sample_at(from)); }
 
 void SoundDecoder::keep_up(Time until) {

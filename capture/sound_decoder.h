@@ -27,6 +27,10 @@ class SoundDecoder {
   // left out.
   void begin(std::int64_t first_pts, Time start);
 
+  // Goes on with what `before`, of the same track opened earlier, decoded and was taken of it.
+  // Returns false, and changes nothing, if channels or rate are others.
+  bool follow(SoundDecoder& before);
+
   // Sound before `from` will not be taken.
   void skip_to(Time from);
 

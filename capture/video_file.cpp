@@ -61,13 +61,15 @@ class VideoFile : public Camera {
   void describe(const AVFrame& first);
   void skip_to(std::int64_t frame);
   bool jump_before(std::int64_t frame);
-  bool start_again();
+  std::optional<DecodedPicture> start_again();
+  std::optional<DecodedPicture> first_again();
   Frame make_frame(const DecodedPicture& picture);
   void linearise(const DecodedPicture& picture, Frame& frame);
   Time end_of_pass() const { return pass_start_ + clock_->end(); }
 
   std::string path_;
   bool loop_;
+  bool rewinds_ = true;  // to the first picture, as far as is known
   CameraInfo info_;
   int source_width_ = 0;
   int source_height_ = 0;
@@ -159,10 +161,11 @@ VideoFile::VideoFile(const std::string& path,
 
 void VideoFile::open() {
   decoder_ = std::make_unique<VideoDecoder>(*file_);
-  sound_.reset();
+  const std::unique_ptr<SoundDecoder> before = std::move(sound_);
   if (file_->sound() != nullptr) {
     try {
       sound_ = std::make_unique<SoundDecoder>(*file_);
+      if (before && !sound_->follow(*before)) sound_.reset();
     } catch (const std::runtime_error& error) {
       sound_note_ = error.what();
     }
@@ -206,6 +209,7 @@ void VideoFile::skip_to(std::int64_t frame) {
     pass_frames_ = 0;
     clock_->restart();
     file_ = std::make_unique<MediaFile>(path_);
+    sound_.reset();
     open();
   }
   while (number_ < frame) {
@@ -277,28 +281,37 @@ void VideoFile::linearise(const DecodedPicture& picture, Frame& frame) {
   }
 }
 
-bool VideoFile::start_again() {
+// The first picture of another pass through the file; nothing if there is none.
+std::optional<DecodedPicture> VideoFile::start_again() {
   if (pass_frames_ == 0) {
-    return false;
+    return std::nullopt;
   }
   const Time end = end_of_pass();
   if (sound_) {
     sound_->finish(end);
   }
-  if (file_->rewind()) {
-    decoder_->restart();
-  } else {
-    try {
-      file_ = std::make_unique<MediaFile>(path_);
-      open();
-    } catch (const std::runtime_error&) {
-      return false;  // the file is gone: that is its end
-    }
-  }
+  std::optional<DecodedPicture> first = first_again();
   pass_start_ = end;
   pass_frames_ = 0;
   clock_->restart();
-  return true;
+  return first;
+}
+
+// Rewinds, or opens the file again if that does not lead to the picture that was the first.
+std::optional<DecodedPicture> VideoFile::first_again() {
+  if (rewinds_ && file_->rewind()) {
+    decoder_->restart();
+    std::optional<DecodedPicture> first = decoder_->next();
+    if (first && first->pts == clock_->first_stamp()) return first;
+  }
+  rewinds_ = false;
+  try {
+    file_ = std::make_unique<MediaFile>(path_);
+    open();
+  } catch (const std::runtime_error&) {
+    return std::nullopt;  // the file is gone: that is its end
+  }
+  return decoder_->next();
 }
 
 std::optional<Frame> VideoFile::next() {
@@ -311,9 +324,7 @@ std::optional<Frame> VideoFile::next() {
     ahead_.pop_front();
   } else {
     std::optional<DecodedPicture> picture = decoder_->next();
-    if (!picture && loop_ && start_again()) {
-      picture = decoder_->next();
-    }
+    if (!picture && loop_) picture = start_again();
     if (!picture) {
       ended_ = true;
       return std::nullopt;

@@ -181,7 +181,9 @@ TEST_F(VideoFile, RefusesACropOutsideThePicture) {
 TEST_F(VideoFile, LoopsWithTimeGoingOn) {
   for (const auto& [name, codec] :
        {std::pair{"a.mp4", "-c:v libx264 -bf 2"}, std::pair{"a.mkv", "-c:v ffv1"},
-        std::pair{"a.h264", "-c:v libx264"}}) {
+        std::pair{"a.h264", "-c:v libx264"}, std::pair{"a.ts", "-c:v libx264 -bf 2"},
+        std::pair{"b.ts", "-c:v mpeg2video -bf 2 -g 8"},
+        std::pair{"a.mpg", "-c:v mpeg2video -bf 2 -g 8"}}) {
     const std::string clip = make_clip(name, codec);
     CameraOptions options;
     options.loop = true;
