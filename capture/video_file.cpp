@@ -217,7 +217,11 @@ void VideoFile::skip_to(std::int64_t frame) {
     if (!picture) {
       return;  // the constructor finds no picture, and says so
     }
-    make_frame(DecodedPicture{nullptr, picture->pts, FrameStatus::good, {}});
+    const Frame skipped = make_frame({nullptr, picture->pts, FrameStatus::good, {}});
+    if (sound_) {
+      sound_->skip_to(skipped.time);
+      sound_->keep_up(skipped.time);
+    }
   }
 }
 

@@ -135,6 +135,36 @@ TEST_F(Clap, IsInTimeWhenTheFileIsStartedLater) {
   EXPECT_NEAR(heard.clap_s, heard.flash_s, 0.010);
 }
 
+// 3 s of so much sound that it does not all fit in memory, with a clap at 2.5 s.
+std::string make_loud_clip(const std::filesystem::path& directory, int rate, int channels) {
+  const std::string raw = (directory / "loud.raw").string();
+  const std::int64_t second = std::int64_t{rate} * channels * 2;
+  std::ofstream sound(raw, std::ios::binary);
+  sound.seekp(second * 5 / 2);
+  sound << std::string(static_cast<std::size_t>(second / 200), '\x40');
+  sound.close();
+  std::filesystem::resize_file(raw, static_cast<std::uintmax_t>(second * 3));
+  const std::string clip = (directory / "loud.mkv").string();
+  independent::ffmpeg("-f lavfi -i color=black:size=16x16:rate=25:duration=3 -f s16le -ar " +
+                      std::to_string(rate) + " -ac " + std::to_string(channels) + " -i '" + raw +
+                      "' -c:v ffv1 -c:a copy '" + clip + "'");
+  return clip;
+}
+
+TEST_F(Clap, IsInTimeBehindMoreSoundThanFitsInMemory) {
+  CameraOptions options;
+  options.frame = 60;
+  const auto camera = open_camera(make_loud_clip(directory_, 768000, 20), options);
+  const std::optional<Frame> first = camera->next();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->number, 60);
+  std::optional<Sound> sound = camera->take_sound();
+  ASSERT_TRUE(sound);
+  EXPECT_EQ(sound->time, first->time);
+  const Heard heard = play(*camera);
+  EXPECT_NEAR(heard.clap_s, 2.5, 0.001);
+}
+
 TEST_F(Clap, IsBoundedInMemoryWhenNobodyListens) {
   const std::string clip = (directory_ / "long.mkv").string();
   independent::ffmpeg(
