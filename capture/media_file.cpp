@@ -133,7 +133,9 @@ libav::PacketHandle MediaFile::next_packet(Track track) {
   const AVStream* wanted = track == Track::video ? video_ : sound_;
   const Track other_track = track == Track::video ? Track::sound : Track::video;
   const AVStream* other = track == Track::video ? sound_ : video_;
-  while (wanted != nullptr && waiting_bytes_ < max_waiting_bytes) {
+  // Sound that nobody reads does not end the video.
+  const bool drops = track == Track::video;
+  while (wanted != nullptr && (drops || waiting_bytes_ < max_waiting_bytes)) {
     libav::PacketHandle packet = read();
     if (!packet) {
       return nullptr;
@@ -142,11 +144,26 @@ libav::PacketHandle MediaFile::next_packet(Track track) {
       return packet;
     }
     if (other != nullptr && packet->stream_index == other->index) {
+      std::deque<libav::PacketHandle>& others = waiting_[index(other_track)];
       waiting_bytes_ += packet->size;
-      waiting_[index(other_track)].push_back(std::move(packet));
+      others.push_back(std::move(packet));
+      while (drops && waiting_bytes_ > max_waiting_bytes) {
+        waiting_bytes_ -= others.front()->size;
+        others.pop_front();
+      }
     }
   }
   return nullptr;
+}
+
+void MediaFile::leave_sound_out() {
+  if (sound_ == nullptr) return;
+  sound_->discard = AVDISCARD_ALL;
+  sound_ = nullptr;
+  for (const libav::PacketHandle& packet : waiting_[index(Track::sound)]) {
+    waiting_bytes_ -= packet->size;
+  }
+  waiting_[index(Track::sound)].clear();
 }
 
 bool MediaFile::rewind() {

@@ -30,10 +30,14 @@ class MediaFile {
   AVStream* sound() const { return sound_; }  // null if silent
 
   // The next packet of a track; null at the end. Packets of the other track that lie before it wait
-  // in memory, up to a bound, beyond which this returns null although the file goes on.
+  // in memory, up to a bound: beyond it the oldest of the sound are dropped, but none of the video,
+  // and this returns null for the sound although the file goes on.
   libav::PacketHandle next_packet(Track track);
   // Whether packets of the track lie in memory already.
   bool has_packet(Track track) const { return !waiting_[index(track)].empty(); }
+
+  // From now on it is silent.
+  void leave_sound_out();
 
   // Back to the beginning, or to the last picture at or before `pts` (the video's time base) from
   // which decoding can start. Returns whether the container can; MPEG's streams cannot rewind.

@@ -165,9 +165,11 @@ void VideoFile::open() {
   if (file_->sound() != nullptr) {
     try {
       sound_ = std::make_unique<SoundDecoder>(*file_);
-      if (before && !sound_->follow(*before)) sound_.reset();
+      if (before && !sound_->follow(*before)) throw std::runtime_error("it changed");
     } catch (const std::runtime_error& error) {
+      sound_.reset();
       sound_note_ = error.what();
+      file_->leave_sound_out();
     }
   }
 }

@@ -202,6 +202,14 @@ TEST_F(Clap, IsLeftOutIfItsRateIsNoRecorders) {
   }
 }
 
+TEST_F(Clap, DoesNotEndTheVideoIfItIsRefused) {
+  const auto camera = open_camera(make_loud_clip(directory_, 768001, 20));
+  EXPECT_THAT(camera->info().description, testing::HasSubstr("sound left out"));
+  int frames = 0;
+  while (camera->next()) ++frames;
+  EXPECT_EQ(frames, 75);
+}
+
 TEST_F(Clap, OfASilentFileIsNothing) {
   const std::string clip = (directory_ / "silent.mkv").string();
   independent::ffmpeg("-f lavfi -i color=black:size=16x16:rate=5:duration=1 -c:v ffv1 '" + clip +
