@@ -179,9 +179,9 @@ void VideoFile::describe(const AVFrame& first) {
   info_.height = crop_.height;
   info_.whole_width = source_width_;
   info_.whole_height = source_height_;
-  const AVRational told = first.sample_aspect_ratio.num > 0
-                              ? first.sample_aspect_ratio
-                              : file_->video().codecpar->sample_aspect_ratio;
+  // The container's, if it tells one. Not changed, but not const.
+  const AVRational told = av_guess_sample_aspect_ratio(&file_->context(), &file_->video(),
+                                                       const_cast<AVFrame*>(&first));
   constexpr double most = 16;
   if (told.num > 0 && told.den > 0 && av_q2d(told) <= most && av_q2d(told) >= 1 / most) {
     info_.pixel_aspect = {told.num, told.den};

@@ -72,6 +72,19 @@ TEST_F(VideoFile, CountsAndTimesEveryFrameInEveryContainer) {
   }
 }
 
+TEST_F(VideoFile, TellsTheShapeOfPixelsWhicheverOfItsPartsDoes) {
+  const std::string square = make_clip("square.mp4", "-c:v libx264");
+  const std::string told = (directory_ / "told.mp4").string();
+  independent::ffmpeg("-i '" + square + "' -c copy -aspect 16:9 '" + told + "'");
+  const std::string shape = "-vf setsar=4/3 -c:v ";
+  for (const std::string& clip :
+       {told, make_clip("a.mov", shape + "prores_ks"), make_clip("a.mkv", shape + "ffv1"),
+        make_clip("a.ts", shape + "mpeg2video"), make_clip("a.mp4", shape + "libx264")}) {
+    EXPECT_EQ(open_camera(clip)->info().pixel_aspect, (Rational{4, 3})) << clip;
+  }
+  EXPECT_EQ(open_camera(square)->info().pixel_aspect, (Rational{1, 1}));
+}
+
 TEST_F(VideoFile, KeepsTheDepthOfAMosaic) {
   constexpr std::uint16_t code = 1000;
   const std::string raw = (directory_ / "codes.raw").string();
