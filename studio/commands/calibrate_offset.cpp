@@ -20,6 +20,7 @@
 #include "studio/commands/board_options.h"
 #include "studio/commands/board_places.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/watched_camera.h"
 #include "studio/json_text.h"
 
 namespace studio {
@@ -29,8 +30,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr double default_length_s = 20;
 constexpr double aimed_at_s = 1e-3;
-// Of a board, as small pictures: half a gigabyte.
-constexpr std::size_t most_watched_pictures = 1500;
 constexpr std::size_t fewest_places = 40;
 
 struct OffsetOptions {
@@ -42,55 +41,6 @@ struct OffsetOptions {
   std::optional<double> exposure_b_s;
   BoardOptions board;
 };
-
-// Of about ten thousand pixels; what is not finite has no light.
-double brightness_of(const capture::Image& image) {
-  constexpr std::size_t looked_at = 10'000;
-  const auto channels = static_cast<std::size_t>(image.channels);
-  const std::size_t pixels = image.pixels.size() / channels;
-  // Odd, so that it does not fall in step with even widths.
-  const std::size_t step = std::max<std::size_t>(1, pixels / looked_at) | 1U;
-  double sum = 0;
-  double count = 0;
-  for (std::size_t i = 0; i < pixels; i += step) {
-    for (std::size_t c = 0; c < channels; ++c) {
-      const auto value = static_cast<double>(image.pixels[i * channels + c]);
-      if (std::isfinite(value)) sum += value;
-      count += 1;
-    }
-  }
-  return sum / count;
-}
-
-// What one camera saw: the light of all frames, or pictures to look for a board in.
-struct Watched {
-  std::vector<calibrate::SignalSample> brightness;
-  std::vector<TimedPicture> pictures;
-};
-
-// `exposure_s` is that of frames which do not tell theirs.
-Watched watch(capture::Camera& camera, double length_s, double exposure_s, bool for_board) {
-  using Seconds = std::chrono::duration<double>;
-  Watched watched;
-  std::optional<double> first_s;
-  double last_s = 0;
-  while (const std::optional<capture::Frame> frame = camera.next()) {
-    if (frame->status == capture::FrameStatus::lost || frame->image == nullptr) continue;
-    const double time_s = Seconds(frame->time).count();
-    if (first_s && time_s <= last_s) continue;
-    if (!first_s) first_s = time_s;
-    last_s = time_s;
-    if (for_board) {
-      watched.pictures.push_back({time_s, small_picture(*frame->image)});
-      if (watched.pictures.size() == most_watched_pictures) break;
-    } else {
-      watched.brightness.push_back({time_s, brightness_of(*frame->image),
-                                    frame->exposure_s > 0 ? frame->exposure_s : exposure_s});
-    }
-    if (time_s - *first_s >= length_s) break;
-  }
-  return watched;
-}
 
 std::array<Watched, 2> watch_both(const OffsetOptions& options, bool for_board, Console& console) {
   const double length_s = options.length_s.value_or(default_length_s);
@@ -109,9 +59,11 @@ std::array<Watched, 2> watch_both(const OffsetOptions& options, bool for_board, 
   }
   // Both at a time: live cameras would wait for each other.
   auto watching = std::async(std::launch::async, [&] {
-    return watch(*camera_b, length_s, options.exposure_b_s.value_or(0), for_board);
+    return watch(*camera_b, options.camera_b, length_s, options.exposure_b_s.value_or(0),
+                 for_board);
   });
-  Watched a = watch(*camera_a, length_s, options.exposure_a_s.value_or(0), for_board);
+  Watched a =
+      watch(*camera_a, options.camera_a, length_s, options.exposure_a_s.value_or(0), for_board);
   return {std::move(a), watching.get()};
 }
 

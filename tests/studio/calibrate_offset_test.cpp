@@ -19,6 +19,7 @@
 #include "capture/exr.h"
 #include "capture/parallel_loop.h"
 #include "capture/png.h"
+#include "studio/commands/watched_camera.h"
 #include "tests/calibrate/made_motion.h"
 #include "tests/studio/command_line.h"
 
@@ -159,6 +160,48 @@ TEST_F(CalibrateOffset, ComesFromAMovingBoardAtTwoRates) {
   expect_one_line(other.err);
   EXPECT_THAT(other.err, HasSubstr("found in 0 of 26 frames"));
   EXPECT_EQ(run(both + " --square 0.04").status, 2);
+}
+
+// Live, and goes away after so many frames: from then on it loses them for ever.
+class LeavingCamera : public capture::Camera {
+ public:
+  explicit LeavingCamera(int good) : good_(good) {}
+  const capture::CameraInfo& info() const override { return info_; }
+  capture::CameraStatistics statistics() const override { return {}; }
+  std::optional<capture::Frame> next() override {
+    capture::Frame frame;
+    frame.number = number_++;
+    frame.time = std::chrono::milliseconds(40 * frame.number);
+    frame.image = image_;
+    if (frame.number >= good_) {
+      frame.status = capture::FrameStatus::lost;
+      frame.note = "away";
+    }
+    EXPECT_LT(number_, 10'000) << "for ever";
+    return number_ < 10'000 ? std::optional(frame) : std::nullopt;
+  }
+
+ private:
+  int good_;
+  capture::CameraInfo info_;
+  std::int64_t number_ = 0;
+  std::shared_ptr<const capture::Image> image_ =
+      std::make_shared<capture::Image>(capture::make_image(2, 2));
+};
+
+TEST(Watch, EndsInTimeThoughTheCameraGoesAway) {
+  LeavingCamera some(100);
+  const Watched seen = watch(some, "cam", 20, 0.01, false);
+  EXPECT_EQ(seen.brightness.size(), 100U);
+  EXPECT_EQ(seen.brightness.back().exposure_s, 0.01);
+  LeavingCamera few(5);
+  try {
+    watch(few, "v4l2:/dev/video7", 20, 0, false);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("v4l2:/dev/video7 lost 496 of 501 frames"));
+    EXPECT_THAT(error.what(), HasSubstr("away"));
+  }
 }
 
 }  // namespace
