@@ -335,6 +335,9 @@ double AravisStream::write_exposure(double exposure_s) {
   error.check(asked);
   const double now_us = arv_camera_get_exposure_time(camera_.get(), &error);
   error.check(asked);
+  if (!(now_us > 0) || !std::isfinite(now_us)) {
+    throw std::runtime_error(asked + "; the camera tells " + std::to_string(now_us) + " us then");
+  }
   return now_us * 1e-6;
 }
 

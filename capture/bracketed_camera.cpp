@@ -2,6 +2,7 @@
 #include "capture/bracketed_camera.h"
 
 #include <algorithm>
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -27,6 +28,13 @@ constexpr double unknown_period_s = 1.0 / 30;
 LabelSettings of_thumbnails(LabelSettings settings, const CameraInfo& picture) {
   settings.noise = noise_of_thumbnail(settings.noise, picture.width, picture.height);
   return settings;
+}
+
+double ask_for(Camera& camera, const std::string& name, double asked_s) {
+  const double taken_s = camera.set_exposure(asked_s);
+  if (taken_s > 0 && std::isfinite(taken_s)) return taken_s;
+  throw std::runtime_error(name + ": an exposure of " + seconds(asked_s) +
+                           " was asked for; the camera tells " + seconds(taken_s) + " then");
 }
 
 }  // namespace
@@ -61,7 +69,7 @@ BracketedCamera::BracketedCamera(std::unique_ptr<Camera> camera,
 // Asks for each exposure once.
 void BracketedCamera::try_all() {
   for (Member& member : members_) {
-    member.taken_s = camera_->set_exposure(member.asked_s);
+    member.taken_s = ask_for(*camera_, name_, member.asked_s);
     labeller_.requested(-1, member.taken_s);
     for (const Member& other : members_) {
       if (&other == &member) break;
@@ -165,7 +173,7 @@ void BracketedCamera::request(std::int64_t after_frame) {
   Member& member = members_[turn_];
   turn_ = (turn_ + 1) % members_.size();
   try {
-    const double taken_s = camera_->set_exposure(member.asked_s);
+    const double taken_s = ask_for(*camera_, name_, member.asked_s);
     labeller_.requested(after_frame, taken_s);
     if (taken_s != member.taken_s) {
       member.taken_s = taken_s;

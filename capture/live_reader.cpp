@@ -1,9 +1,10 @@
 // Live cameras read ahead.
 #include "capture/live_reader.h"
 
+#include <algorithm>
 #include <chrono>
+#include <exception>
 #include <iterator>
-#include <new>
 #include <stdexcept>
 #include <utility>
 
@@ -28,13 +29,23 @@ LiveReader::~LiveReader() {
 }
 
 void LiveReader::read_all() {
+  Frame last;
+  last.number = -1;
   while (true) {
     std::optional<Frame> frame;
+    bool fails = false;
     try {
       frame = camera_->next();
-    } catch (const std::bad_alloc&) {
+    } catch (const std::exception& error) {
       // Ends like a camera that has no more frames: the show goes on without it.
+      fails = true;
+      frame = last;
+      ++frame->number;
+      frame->time = std::max(monotonic_now(), last.time + Time{1});
+      frame->status = FrameStatus::lost;
+      frame->note = error.what();
     }
+    if (frame) last = *frame;
     const Time now = monotonic_now();
     const std::lock_guard lock(mutex_);
     statistics_ = camera_->statistics();
@@ -48,7 +59,9 @@ void LiveReader::read_all() {
       waiting_.pop_front();
       ++passed_over_;
     }
+    ended_ = fails;
     came_.notify_all();
+    if (fails) return;
   }
 }
 

@@ -23,6 +23,7 @@ struct Arrival {
   Time arrived{};
 };
 
+// A camera that throws has ended: its last frame is a lost one that says why.
 class LiveReader {
  public:
   // Keeps the newest `most_waiting` frames for whoever takes them, at least 1.

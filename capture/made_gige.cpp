@@ -107,6 +107,7 @@ struct MadeGigeCamera::Device {
   std::thread thread;
   std::atomic<bool> stopping{false};
   std::atomic<bool> ignores_exposures{false};
+  std::atomic<bool> hides_exposures{false};
 
   // Of the control thread alone, while it runs.
   std::optional<gige::MadeRegisters> registers;
@@ -198,6 +199,9 @@ Bytes MadeGigeCamera::Device::obey(const gige::Command& command, gige::Endpoint 
       if (data.size() < 8) break;
       told.assign(data.begin(), data.begin() + 4);
       status = registers->read(gige::get32(data.data()), gige::get16(data.data() + 6), told);
+      if (hides_exposures && gige::get32(data.data()) == gige::feature::exposure_us) {
+        std::fill(told.begin() + 4, told.end(), std::uint8_t{0});
+      }
       break;
     case gige::CommandCode::write_register: {
       std::uint16_t done = 0;
@@ -281,6 +285,8 @@ void MadeGigeCamera::plug_in() { device_->start(); }
 void MadeGigeCamera::drop_next(int frames) { device_->stream.drop_next(frames); }
 
 void MadeGigeCamera::ignore_exposures(bool ignored) { device_->ignores_exposures = ignored; }
+
+void MadeGigeCamera::hide_exposures(bool hidden) { device_->hides_exposures = hidden; }
 
 void MadeGigeCamera::set_packet_loss(double share) { device_->stream.set_packet_loss(share); }
 

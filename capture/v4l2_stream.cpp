@@ -198,8 +198,13 @@ double V4l2Stream::set_exposure(double exposure_s) {
   }
   const auto units = std::max<std::int64_t>(std::llround(exposure_s / v4l2_exposure_unit_s), 1);
   exposure_s_ = 0;
-  return v4l2_exposure_unit_s *
-         static_cast<double>(set_control(name_of_control(V4L2_CID_EXPOSURE_ABSOLUTE), units));
+  const std::int64_t taken = set_control(name_of_control(V4L2_CID_EXPOSURE_ABSOLUTE), units);
+  if (taken < 1) {
+    throw std::runtime_error("an exposure of " + std::to_string(exposure_s) +
+                             " s was asked for; the device sets " + std::to_string(taken) +
+                             " units of 0.1 ms");
+  }
+  return v4l2_exposure_unit_s * static_cast<double>(taken);
 }
 
 void V4l2Stream::start() {

@@ -195,6 +195,15 @@ TEST_F(AravisCameraTest, FollowsExposuresAfterTheCamerasLag) {
   }
 }
 
+TEST_F(AravisCameraTest, RefusesAnExposureThatIsReadBackAsNone) {
+  make(small());
+  const auto camera = open("?format=Mono12&exposure=0.001");
+  made_->hide_exposures(true);
+  EXPECT_THROW(camera->set_exposure(0.002), std::runtime_error);
+  made_->hide_exposures(false);
+  EXPECT_NEAR(camera->set_exposure(0.003), 0.003, 1e-12);
+}
+
 TEST_F(AravisCameraTest, TellsTheExposureOfEachFrameThatTheCameraTells) {
   MadeGigeSettings settings = small();
   settings.has_chunks = true;

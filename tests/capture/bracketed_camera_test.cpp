@@ -27,6 +27,7 @@ using made::StreamFaults;
 struct Script {
   std::vector<double> made_s;  // what made the frames, by number; 0 = lost or mixed
   bool refuses = false;
+  std::optional<double> told_s = std::nullopt;  // of exposures that were set
   bool settable = true;
 };
 
@@ -53,7 +54,7 @@ class MadeCamera final : public Camera {
     if (script_->refuses) throw std::runtime_error("made: camera: busy");
     const double taken_s = unit_s * std::round(exposure_s / unit_s);
     stream_.request(taken_s);
-    return taken_s;
+    return script_->told_s.value_or(taken_s);
   }
   std::optional<Frame> next() override {
     if (!waiting_) waiting_ = stream_.next();
@@ -146,6 +147,20 @@ TEST(BracketedCamera, GoesOnWhereTheCameraRefuses) {
   }
   EXPECT_EQ(camera.bracket_statistics().refused, 10);
   EXPECT_EQ(camera.bracket_statistics().refusal, "made: camera: busy");
+}
+
+TEST(BracketedCamera, GoesOnWhereTheCameraTellsNoExposure) {
+  for (const double none_s : {0.0, -1.0, std::nan("")}) {
+    const auto script = std::make_shared<Script>();
+    BracketedCamera camera = bracketed(no_faults, 1, script);
+    for (int i = 0; i < 20; ++i) camera.next();
+    script->told_s = none_s;
+    EXPECT_TRUE(camera.next());
+    script->told_s.reset();
+    EXPECT_TRUE(camera.next());
+    EXPECT_EQ(camera.bracket_statistics().refused, 1);
+    EXPECT_THAT(camera.bracket_statistics().refusal, testing::HasSubstr("the camera tells"));
+  }
 }
 
 TEST(BracketedCamera, ChangesOneExposureWhileItRuns) {

@@ -36,6 +36,7 @@ struct FakeControl {
   std::string name;
   int low, high, value;
   std::uint32_t flags = 0;
+  int step = 1;  // values are rounded down to it
 };
 
 // What happens at the next wait for a picture.
@@ -279,7 +280,7 @@ class FakeV4l2 final : public capture::V4l2Io {
     its.type = V4L2_CTRL_TYPE_INTEGER;
     its.minimum = found->low;
     its.maximum = found->high;
-    its.step = 1;
+    its.step = found->step;
     its.flags = found->flags;
     std::memcpy(its.name, found->name.c_str(), found->name.size() + 1);
     return 0;
@@ -292,7 +293,7 @@ class FakeV4l2 final : public capture::V4l2Io {
       value.value = found->value;
       return 0;
     }
-    found->value = value.value;
+    found->value = value.value / found->step * found->step;
     if (value.id == V4L2_CID_EXPOSURE_AUTO) {
       for (FakeControl& other : device.controls) {
         if (other.id != V4L2_CID_EXPOSURE_ABSOLUTE) continue;

@@ -79,6 +79,42 @@ TEST(LiveReader, EndsWithItsCameraOnceAllFramesAreTaken) {
   EXPECT_TRUE(reader.take(monotonic_now() + long_time).empty()) << "and does not wait any more";
 }
 
+class FailingCamera final : public Camera {
+ public:
+  FailingCamera() { info_.live = true; }
+  const CameraInfo& info() const override { return info_; }
+  std::optional<Frame> next() override {
+    if (given_ == 2) throw std::invalid_argument("no such exposure");
+    Frame frame;
+    frame.number = given_++;
+    frame.image = image_;
+    frame.time = monotonic_now();
+    return frame;
+  }
+  CameraStatistics statistics() const override { return {}; }
+  const std::shared_ptr<const Image> image_ = std::make_shared<Image>(make_image(2, 2));
+
+ private:
+  int given_ = 0;
+  CameraInfo info_;
+};
+
+TEST(LiveReader, EndsWithANoteWhateverItsCameraThrows) {
+  auto camera = std::make_unique<FailingCamera>();
+  const auto image = camera->image_;
+  LiveReader reader(std::move(camera), 8);
+  std::vector<Frame> frames;
+  while (!reader.ended()) {
+    for (Arrival& came : reader.take(monotonic_now() + long_time)) frames.push_back(came.frame);
+  }
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[2].status, FrameStatus::lost);
+  EXPECT_EQ(frames[2].note, "no such exposure");
+  EXPECT_EQ(frames[2].number, 2);
+  EXPECT_GT(frames[2].time, frames[1].time);
+  EXPECT_EQ(frames[2].image, image);
+}
+
 TEST(LiveReader, RefusesToKeepNothing) {
   std::atomic<int> allowed = 0;
   EXPECT_THROW(LiveReader(std::make_unique<SteppedCamera>(allowed, 0), 0), std::invalid_argument);

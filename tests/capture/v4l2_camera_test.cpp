@@ -102,6 +102,13 @@ TEST_F(V4l2CameraTest, RefusesExposuresThatItHasNot) {
   EXPECT_THROW(camera->set_exposure(0.01), std::runtime_error);
 }
 
+TEST_F(V4l2CameraTest, RefusesAnExposureThatIsNoneOnceItIsSet) {
+  device().controls[2].step = 10;
+  const auto camera = open("/dev/video0?format=YUYV");
+  EXPECT_DOUBLE_EQ(camera->set_exposure(0.0012), 0.001);
+  EXPECT_THROW(camera->set_exposure(3e-4), std::runtime_error);
+}
+
 TEST_F(V4l2CameraTest, ReturnsWithTheExposureThatWasAskedForLast) {
   const auto camera = open("/dev/video0?format=YUYV&auto_exposure=1&exposure_time_absolute=50");
   camera->next();
