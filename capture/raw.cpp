@@ -53,12 +53,29 @@ void fill_margin(Mosaic& mosaic) {
   }
 }
 
-float limited(float light) { return std::clamp(light, 0.0F, 1.0F); }
+// That of the darkest site, but not above 0: noise at black has either sign.
+float darkest(const Mosaic& mosaic) {
+  constexpr int lanes = 8;
+  std::array<float, lanes> least{};
+  for (int y = 0; y < mosaic.height; ++y) {
+    const float* const row = mosaic.row(y);
+    int x = 0;
+    for (; x + lanes <= mosaic.width; x += lanes) {
+      for (int i = 0; i < lanes; ++i) {
+        float& its = least[static_cast<std::size_t>(i)];
+        its = std::min(its, row[x + i]);
+      }
+    }
+    for (; x < mosaic.width; ++x) least[0] = std::min(least[0], row[x]);
+  }
+  return *std::ranges::min_element(least);
+}
 
 // Sums of a site's neighbours, and itself.
 struct Neighbours {
-  Neighbours(const float* site, std::ptrdiff_t down)
-      : own(site[0]),
+  Neighbours(const float* site, std::ptrdiff_t down, float darkest)
+      : least(darkest),
+        own(site[0]),
         beside(site[-1] + site[1]),
         above(site[-down] + site[down]),
         diagonal(site[-down - 1] + site[-down + 1] + site[down - 1] + site[down + 1]),
@@ -80,7 +97,9 @@ struct Neighbours {
     return limited((6 * own + 2 * diagonal - 1.5F * (far_beside + far_above)) / 8);
   }
 
-  float own, beside, above, diagonal, far_beside, far_above;
+  float limited(float light) const { return std::clamp(light, least, 1.0F); }
+
+  float least, own, beside, above, diagonal, far_beside, far_above;
 };
 
 }  // namespace
@@ -169,6 +188,7 @@ void demosaic(Mosaic& mosaic, BayerPattern pattern, const Crop& crop, Image& ima
   image.pixels.resize(static_cast<std::size_t>(crop.height) * static_cast<std::size_t>(crop.width) *
                       3);
   const std::ptrdiff_t down = mosaic.stride();
+  const float least = darkest(mosaic);
   for (int y = crop.y; y < crop.y + crop.height; ++y) {
     // What a row has beside green.
     const bool red_row = y % 2 == red.y;
@@ -177,7 +197,7 @@ void demosaic(Mosaic& mosaic, BayerPattern pattern, const Crop& crop, Image& ima
     const float* const sites = mosaic.row(y);
     float* to = image.pixels.data() + image.index(y - crop.y, 0);
     for (int x = crop.x; x < crop.x + crop.width; ++x, to += 3) {
-      const Neighbours near(sites + x, down);
+      const Neighbours near(sites + x, down, least);
       if (x % 2 == own_column) {
         to[own] = near.own;
         to[1] = near.green();

@@ -57,7 +57,8 @@ struct Mosaic {
 int colour_of_site(BayerPattern pattern, int y, int x);
 
 // Colour of a part of a mosaic, into `image`: (crop.height, crop.width, 3). A site's own colour
-// stays as it is; the others are clamped to 0..1, so that nothing is brighter than what saturates.
+// stays as it is; the others are clamped, so that nothing is brighter than what saturates, 1, or
+// darker than black, 0, or the darkest site: noise at black has no colour.
 // Fills the margin by reflection about the outer sites, which keeps the pattern. Exact, inside, for
 // colours that change linearly across the picture.
 //

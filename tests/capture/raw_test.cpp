@@ -220,6 +220,35 @@ TEST(Demosaic, MakesNothingBrighterThanWhatSaturates) {
   }
 }
 
+// Black with the noise of its sites, of either sign.
+TEST(Demosaic, GivesNoiseAtBlackNoColour) {
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0, 0.002F);
+  Mosaic mosaic;
+  mosaic.resize(256, 256);
+  float darkest = 0;
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 256; ++x) {
+      mosaic.row(y)[x] = noise(random);
+      darkest = std::min(darkest, mosaic.row(y)[x]);
+    }
+  }
+  // A bright edge makes nothing darker than noise does.
+  for (int y = 0; y < 256; ++y) mosaic.row(y)[255] = 1;
+  Image image;
+  demosaic(mosaic, BayerPattern::rggb, {0, 0, 256, 256}, image);
+  for (const float value : image.pixels) ASSERT_GE(value, darkest);
+  std::array<double, 3> mean{};
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 252; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        mean[static_cast<std::size_t>(c)] += static_cast<double>(image.at(y, x, c)) / (256 * 252);
+      }
+    }
+  }
+  for (const double value : mean) EXPECT_NEAR(value, 0, 5e-5);
+}
+
 TEST(Demosaic, RefusesGreySensorsAndPartsBeyondThem) {
   Mosaic mosaic;
   mosaic.resize(8, 8);
