@@ -55,7 +55,11 @@ std::optional<int> take_number(std::string_view& text, std::string_view key) {
   return value;
 }
 
-int count_spline_parameters(std::string_view model) {
+struct Spline {
+  int order, columns, rows, fov_deg;
+};
+
+Spline spline_of(std::string_view model) {
   std::string_view rest = model.substr(splined.size());
   const auto order = take_number(rest, "_order=");
   const auto columns = take_number(rest, "_Nx=");
@@ -69,7 +73,12 @@ int count_spline_parameters(std::string_view model) {
     refuse(model, "Nx and Ny must be from 5 to 1000");
   }
   if (*fov_deg < 1 || *fov_deg >= 360) refuse(model, "fov_x_deg must be from 1 to 359");
-  return 4 + 2 * *columns * *rows;
+  return {*order, *columns, *rows, *fov_deg};
+}
+
+int count_spline_parameters(std::string_view model) {
+  const Spline spline = spline_of(model);
+  return 4 + 2 * spline.columns * spline.rows;
 }
 
 mrcal_lensmodel_t parsed(const std::string& model) {
@@ -146,6 +155,32 @@ class RadialFold {
   std::optional<double> first_;
 };
 
+// Where a spline has all the knots that it is made of: libmrcal goes on beyond with the last
+// piece's polynomial, which soon turns back into the picture. Everywhere for other models.
+class KnotDomain {
+ public:
+  // As libmrcal lays them out: intervals of one size, from edge to edge of fov_x_deg, of which
+  // cubic splines need a whole one more at either side and quadratic ones half of one.
+  explicit KnotDomain(const Lens& lens) {
+    if (!lens.model.starts_with(splined)) return;
+    const Spline spline = spline_of(lens.model);
+    most_x_ = 2 * std::tan(spline.fov_deg * std::numbers::pi / 720);
+    const int more = spline.order - 1;
+    most_y_ = most_x_ * (spline.rows - 1 - more) / (spline.columns - 1 - more);
+  }
+
+  // Of a unit vector, by stereographic projection.
+  bool holds(Vec3 v) const {
+    if (most_x_ == 0) return true;
+    const double scale = 2 / (1 + v.z);
+    return std::abs(v.x) * scale <= most_x_ && std::abs(v.y) * scale <= most_y_;
+  }
+
+ private:
+  double most_x_ = 0;
+  double most_y_ = 0;
+};
+
 // A direction's pixel and its change with the direction.
 struct Projection {
   Vec2 q;
@@ -159,6 +194,7 @@ class Projector {
         parameters_(lens.parameters.data()),
         max_angle_rad_(lens.max_angle_rad),
         behind_(mrcal_lensmodel_metadata(&model_).can_project_behind_camera),
+        knots_(lens),
         fold_(lens) {}
 
   // Nothing where the lens sees nothing. Past the angle where distortion turns back, the picture is
@@ -169,7 +205,7 @@ class Projector {
     const Vec3 v = direction / l;
     if (!behind_ && v.z <= 0) return std::nullopt;
     if (std::atan2(hypotenuse(v.x, v.y), v.z) > max_angle_rad_) return std::nullopt;
-    if (fold_.lies_before(v)) return std::nullopt;
+    if (!knots_.holds(v) || fold_.lies_before(v)) return std::nullopt;
     const mrcal_point3_t p{{v.x, v.y, v.z}};
     mrcal_point2_t q{};
     std::array<mrcal_point3_t, 2> gradient{};
@@ -207,6 +243,7 @@ class Projector {
   const double* parameters_;
   double max_angle_rad_;
   bool behind_;
+  KnotDomain knots_;
   mutable RadialFold fold_;
 };
 

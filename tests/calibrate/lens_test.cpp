@@ -159,6 +159,37 @@ TEST(Project, SeesNothingWhereTheDistortionTurnsBack) {
   EXPECT_FALSE(unproject(opencv, {319.5 + 300 * .8, 319.5}));
 }
 
+// Fields of 120 degrees; rows reach as far as columns of the same size would.
+TEST(Project, SeesNothingBeyondTheKnotsOfASpline) {
+  for (const auto& [order, rows_reach] : {std::pair{2, 0.5}, std::pair{3, 0.4}}) {
+    Lens lens{"LENSMODEL_SPLINED_STEREOGRAPHIC_order=" + std::to_string(order) +
+                  "_Nx=8_Ny=5_fov_x_deg=120",
+              1000,
+              800,
+              {300, 300, 499.5, 399.5}};
+    lens.parameters.resize(4 + 2 * 8 * 5);
+    // Beyond the last knots a bend of the edge grows without bounds, and folds the picture.
+    std::mt19937 random(4);
+    std::uniform_real_distribution<double> bend(-0.05, 0.05);
+    for (std::size_t i = 4; i < lens.parameters.size(); ++i) lens.parameters[i] = bend(random);
+    const double across = 60 * degree;
+    const double down = 2 * std::atan(rows_reach * std::tan(across / 2));
+    EXPECT_TRUE(project(lens, {std::sin(across - 0.01), 0, std::cos(across - 0.01)})) << order;
+    EXPECT_FALSE(project(lens, {std::sin(across + 0.01), 0, std::cos(across + 0.01)})) << order;
+    EXPECT_TRUE(project(lens, {0, std::sin(down - 0.01), std::cos(down - 0.01)})) << order;
+    EXPECT_FALSE(project(lens, {0, std::sin(down + 0.01), std::cos(down + 0.01)})) << order;
+    EXPECT_FALSE(project(lens, {0, 0, -1})) << order;
+    for (int i = 0; i < 3000; ++i) {
+      const Vec3 v = at_angle(i * 0.001, i);
+      const auto q = project(lens, v);
+      if (!q || q->x < -0.5 || q->y < -0.5 || q->x > 999.5 || q->y > 799.5) continue;
+      const auto back = unproject(lens, *q);
+      ASSERT_TRUE(back);
+      EXPECT_LT(length(*back - v), 1e-5) << "seen twice";
+    }
+  }
+}
+
 TEST(Unproject, GivesNothingWhereMrcalGivesNotANumber) {
   const Lens lens{"LENSMODEL_OPENCV8",
                   4000,
