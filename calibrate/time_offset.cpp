@@ -19,8 +19,6 @@ namespace {
 
 constexpr std::size_t fewest_frames = 20;
 constexpr double least_correlation = 0.4;
-// What sigma is larger by if exposures are guessed: measured, a lamp at 25 frames a second.
-constexpr double guessed_exposures = 2;
 // Correlation elsewhere, in parts of the best, at which the signals repeat themselves.
 constexpr double repeats_itself = 0.9;
 // Of motions: what both see in common is the same but for noise.
@@ -170,6 +168,40 @@ bool tells_exposures(std::span<const SignalSample> signal) {
   return std::ranges::any_of(signal, [](const SignalSample& s) { return s.exposure_s > 0; });
 }
 
+std::vector<SignalSample> exposed(std::span<const SignalSample> signal, double exposure_s) {
+  std::vector<SignalSample> result(signal.begin(), signal.end());
+  for (SignalSample& sample : result) {
+    if (!(sample.exposure_s > 0)) sample.exposure_s = exposure_s;
+  }
+  return result;
+}
+
+// What exposures that are not told do to the offset: those of half the time between frames, which
+// are guessed, may be as short or as long as they can be.
+void doubt_guess(std::span<const SignalSample> a,
+                 std::span<const SignalSample> b,
+                 double gain_b,
+                 TimeOffset& result) {
+  constexpr double shortest_s = 1e-9;
+  const auto cases = [](std::span<const SignalSample> signal) {
+    std::vector<double> exposures_s{shortest_s};
+    if (!tells_exposures(signal)) exposures_s.push_back(frame_interval_s(signal));
+    return exposures_s;
+  };
+  double farthest_s = 0;
+  for (const double exposure_a_s : cases(a)) {
+    for (const double exposure_b_s : cases(b)) {
+      const SignalLikelihood signals(exposed(a, exposure_a_s), exposed(b, exposure_b_s),
+                                     result.offset_s, gain_b);
+      TimeOffset other = result;
+      refine(signals, signals.interval_s() / 2, other);
+      farthest_s = std::max(farthest_s, std::abs(other.offset_s - result.offset_s));
+      result.sigma_s = std::max(result.sigma_s, other.sigma_s);
+    }
+  }
+  result.sigma_s = std::hypot(result.sigma_s, farthest_s);
+}
+
 // A lamp's switching tells more than its covariance.
 void refine_by_edges(std::span<const SignalSample> a,
                      std::span<const SignalSample> b,
@@ -177,10 +209,7 @@ void refine_by_edges(std::span<const SignalSample> a,
                      TimeOffset& result) {
   // Without exposures, frames tell of a jump only which two it lies between; at equal rates their
   // limits then all lie in step, and promise more than they hold.
-  if (!tells_exposures(a) || !tells_exposures(b)) {
-    result.sigma_s *= guessed_exposures;
-    return;
-  }
+  if (!tells_exposures(a) || !tells_exposures(b)) return;
   const double reach_s = 0.75 * interval_s;
   const auto found = offset_of_edges(find_edges(a), find_edges(b), result.offset_s, reach_s);
   // Exposures other than told, or other changes, would show.
@@ -222,6 +251,9 @@ TimeOffset find_time_offset(std::span<const SignalSample> a,
   refine(signals, signals.interval_s(), result);
   refine(signals, signals.interval_s() / 4, result);
   refine_by_edges(one, other, signals.interval_s(), result);
+  if (!tells_exposures(one) || !tells_exposures(other)) {
+    doubt_guess(one, other, coarse.gain_b, result);
+  }
   if (!(result.sigma_s < signals.interval_s())) {
     refuse(only_to("change", result.sigma_s) +
            ": switch one lamp before both, often and at random, so that nothing else changes as "

@@ -40,10 +40,12 @@ struct TimeOffset {
 // 5/2) and time scale are those of the greatest likelihood, and so is the offset: Rasmussen and
 // Williams, "Gaussian Processes for Machine Learning", 2006, sections 4.2 and 5.4. So neither a
 // lamp that jumps between frames nor a smooth motion biases it, as interpolation would. sigma_s is
-// the likelihood's width, or what stretches of the signals differ by, if that is more, and twice as
-// much where a camera does not tell its exposures. Where both
-// saw a lamp switched, the moments of its switching take over (signal_edges.h). Correlation of the
-// signals, interpolated, finds the way there.
+// the likelihood's width, or what stretches of the signals differ by, if that is more. Where a
+// camera does not tell its exposures, the offset is sought also with none and with whole frames'
+// time instead of half of it: sigma_s is the largest of these, and, in quadrature, by how far the
+// offset moves. Where both saw a lamp switched, and told their exposures, the moments of its
+// switching take over (signal_edges.h). Correlation of the signals, interpolated, finds the way
+// there.
 //
 // Times rise strictly. Throws std::invalid_argument for values that are not finite, or times that
 // do not rise; std::runtime_error, saying what to do, if there are fewer than 20 frames in common,

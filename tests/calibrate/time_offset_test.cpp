@@ -160,6 +160,22 @@ TEST(FindTimeOffset, NeedsNoExposureToBeTold) {
   EXPECT_GT(chi_square, 0.2);
 }
 
+// Where frames do not lie in step, a wrong guess of the exposures makes the likelihood too sure.
+TEST(FindTimeOffset, DoubtsItsGuessOfExposuresAtTwoRates) {
+  const Errors errors = errors_of(5, [](made::Random& random) {
+    const auto lamp = random_lamp(0.3, random);
+    const double offset_s = random.uniform(-0.3, 0.3);
+    auto a = record(lamp, {random.uniform(0, 0.04), 0, 0.04, 0.001}, 12, 0.002, random);
+    auto b = record(lamp, {random.uniform(0, 0.03), offset_s, 1 / 30.0, 0.001}, 12, 0.002, random);
+    for (SignalSample& sample : a) sample.exposure_s = 0;
+    for (SignalSample& sample : b) sample.exposure_s = 0;
+    return std::pair(find_time_offset(a, b), offset_s);
+  });
+  EXPECT_LT(errors.rms_s, 0.015);
+  EXPECT_LT(errors.chi_square, 1.7);  // a deviation of 1.3
+  EXPECT_GT(errors.chi_square, 0.1);
+}
+
 TEST(FindTimeOffset, DoesNotMindLostFrames) {
   made::Random random(4);
   const auto lamp = random_lamp(0.3, random);
