@@ -155,30 +155,81 @@ class RadialFold {
   std::optional<double> first_;
 };
 
-// Where a spline has all the knots that it is made of: libmrcal goes on beyond with the last
-// piece's polynomial, which soon turns back into the picture. Everywhere for other models.
-class KnotDomain {
+// Where a spline shows what is there: inside the knots that it is made of, for libmrcal goes on
+// beyond with the last piece's polynomial, which soon turns back into the picture, and before the
+// first fold on the way out from the axis. Everywhere for other models.
+class SplineSight {
  public:
   // As libmrcal lays them out: intervals of one size, from edge to edge of fov_x_deg, of which
   // cubic splines need a whole one more at either side and quadratic ones half of one.
-  explicit KnotDomain(const Lens& lens) {
+  SplineSight(const Lens& lens, const mrcal_lensmodel_t& model)
+      : model_(model), parameters_(lens.parameters.data()) {
     if (!lens.model.starts_with(splined)) return;
     const Spline spline = spline_of(lens.model);
     most_x_ = 2 * std::tan(spline.fov_deg * std::numbers::pi / 720);
     const int more = spline.order - 1;
-    most_y_ = most_x_ * (spline.rows - 1 - more) / (spline.columns - 1 - more);
+    const int intervals = spline.columns - 1 - more;
+    most_y_ = most_x_ * (spline.rows - 1 - more) / intervals;
+    step_ = most_x_ / (2 * intervals);
   }
 
-  // Of a unit vector, by stereographic projection.
-  bool holds(Vec3 v) const {
+  // Whether a unit vector is seen.
+  bool holds(Vec3 v) {
     if (most_x_ == 0) return true;
     const double scale = 2 / (1 + v.z);
-    return std::abs(v.x) * scale <= most_x_ && std::abs(v.y) * scale <= most_y_;
+    const Vec2 u{v.x * scale, v.y * scale};
+    if (!(std::abs(u.x) <= most_x_ && std::abs(u.y) <= most_y_)) return false;
+    // A way is walked sooner than all of them, unless there are many to walk.
+    constexpr int many = 64;
+    if (clear_.empty() && ++walked_ > many) find_clear();
+    const double radius = hypotenuse(u.x, u.y);
+    if (!clear_.empty() && radius <= clear_around(std::atan2(u.y, u.x))) return true;
+    return !(first_fold(u.x / radius, u.y / radius, radius) < radius);
   }
 
  private:
+  // Of the picture on the way from the axis, in stereographic radii, up to a step behind `radius`;
+  // infinite = none.
+  double first_fold(double x, double y, double radius) const {
+    for (double r = 0.5 * step_; r < radius; r += step_) {
+      const double angle = 2 * std::atan(r / 2);
+      const Vec3 v{x * std::sin(angle), y * std::sin(angle), std::cos(angle)};
+      const mrcal_point3_t p{{v.x, v.y, v.z}};
+      mrcal_point2_t q{};
+      std::array<mrcal_point3_t, 2> gradient{};
+      if (!mrcal_project(&q, gradient.data(), nullptr, &p, 1, &model_, parameters_) ||
+          !(dot(v, cross(from_mrcal(gradient[0]), from_mrcal(gradient[1]))) > 0)) {
+        return r;
+      }
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  // The radii up to which ways all around meet no fold.
+  void find_clear() {
+    clear_.resize(ways);
+    for (int i = 0; i < ways; ++i) {
+      const double x = std::cos(2 * std::numbers::pi * i / ways);
+      const double y = std::sin(2 * std::numbers::pi * i / ways);
+      const double edge = std::min(most_x_ / std::abs(x), most_y_ / std::abs(y));
+      clear_[static_cast<std::size_t>(i)] = first_fold(x, y, edge + step_) - 2 * step_;
+    }
+  }
+
+  double clear_around(double angle_rad) const {
+    const int way = static_cast<int>(std::floor(angle_rad / (2 * std::numbers::pi) * ways));
+    const auto at = [&](int i) { return clear_[static_cast<std::size_t>((i + ways) % ways)]; };
+    return std::min(at(way), at(way + 1));
+  }
+
+  static constexpr int ways = 180;
+  mrcal_lensmodel_t model_;
+  const double* parameters_;
   double most_x_ = 0;
   double most_y_ = 0;
+  double step_ = 0;  // a quarter of an interval
+  int walked_ = 0;
+  std::vector<double> clear_;  // of each way
 };
 
 // A direction's pixel and its change with the direction.
@@ -194,7 +245,7 @@ class Projector {
         parameters_(lens.parameters.data()),
         max_angle_rad_(lens.max_angle_rad),
         behind_(mrcal_lensmodel_metadata(&model_).can_project_behind_camera),
-        knots_(lens),
+        sight_(lens, model_),
         fold_(lens) {}
 
   // Nothing where the lens sees nothing. Past the angle where distortion turns back, the picture is
@@ -205,7 +256,7 @@ class Projector {
     const Vec3 v = direction / l;
     if (!behind_ && v.z <= 0) return std::nullopt;
     if (std::atan2(hypotenuse(v.x, v.y), v.z) > max_angle_rad_) return std::nullopt;
-    if (!knots_.holds(v) || fold_.lies_before(v)) return std::nullopt;
+    if (!sight_.holds(v) || fold_.lies_before(v)) return std::nullopt;
     const mrcal_point3_t p{{v.x, v.y, v.z}};
     mrcal_point2_t q{};
     std::array<mrcal_point3_t, 2> gradient{};
@@ -243,7 +294,7 @@ class Projector {
   const double* parameters_;
   double max_angle_rad_;
   bool behind_;
-  KnotDomain knots_;
+  mutable SplineSight sight_;
   mutable RadialFold fold_;
 };
 

@@ -19,8 +19,7 @@ bool is_mrcal_model(std::string_view model);
 int count_mrcal_parameters(std::string_view model);
 
 // `lens` passes check(). One result per input, in order; nothing where the model has none, where
-// its distortion has folded back over itself, or beyond the knots of a spline. Folds between knots
-// are refused only where the picture is mirrored.
+// its distortion has folded back over itself, or beyond the knots of a spline.
 std::vector<std::optional<Vec2>> project_by_mrcal(const Lens& lens, std::span<const Vec3> v_cam);
 std::vector<std::optional<Vec3>> unproject_by_mrcal(const Lens& lens, std::span<const Vec2> q);
 

@@ -190,6 +190,30 @@ TEST(Project, SeesNothingBeyondTheKnotsOfASpline) {
   }
 }
 
+TEST(Project, SeesNothingBeyondTheFirstFoldOfASpline) {
+  constexpr std::size_t knots = 8;
+  Lens lens{"LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=8_Ny=8_fov_x_deg=120",
+            1000,
+            800,
+            {300, 300, 499.5, 399.5}};
+  lens.parameters.resize(4 + 2 * knots * knots);
+  // Bends one column of knots outward, so that the picture turns back behind it and then forth.
+  for (std::size_t y = 0; y < knots; ++y) lens.parameters[4 + 2 * (y * knots + 4)] = 1;
+  for (const bool many : {false, true}) {
+    std::vector<Vec3> out;
+    for (int i = 0; i < 200; ++i) {
+      const double angle = 60 * degree * i / 200;
+      out.push_back({std::sin(angle), 0.01 * std::sin(angle), std::cos(angle)});
+    }
+    std::vector<std::optional<Vec2>> seen = many ? project_all(lens, out) : decltype(seen)();
+    for (std::size_t i = 0; !many && i < out.size(); ++i) seen.push_back(project(lens, out[i]));
+    EXPECT_TRUE(seen[10]);
+    const auto lost = std::find(seen.begin(), seen.end(), std::nullopt);
+    EXPECT_LT(lost - seen.begin(), 150);
+    EXPECT_EQ(std::count(lost, seen.end(), std::nullopt), seen.end() - lost) << many;
+  }
+}
+
 TEST(Unproject, GivesNothingWhereMrcalGivesNotANumber) {
   const Lens lens{"LENSMODEL_OPENCV8",
                   4000,
