@@ -61,10 +61,11 @@ std::optional<calibrate::Vec3f> floor_of_plate(const capture::Image* plate,
 
 // The probe that `before` has open, or the set's own.
 std::shared_ptr<ProbeSource> open_probe(const Set& set,
-                                        const std::shared_ptr<ProbeSource>& before) {
+                                        const std::shared_ptr<ProbeSource>& before,
+                                        std::optional<capture::Time> from) {
   if (before && before->serves(set)) return before;
   try {
-    return std::make_shared<ProbeSource>(set);
+    return std::make_shared<ProbeSource>(set, from);
   } catch (const SetError& error) {
     if (!before || !before->holds_camera_of(set)) throw;
     fail(set,
@@ -76,12 +77,14 @@ std::shared_ptr<ProbeSource> open_probe(const Set& set,
 
 }  // namespace
 
-LightFeed::LightFeed(const Set& set, const LightFeed* before) : settings_(set.probe) {
+LightFeed::LightFeed(const Set& set, const LightFeed* before, std::optional<capture::Time> from)
+    : settings_(set.probe) {
   if (!settings_) {
     environment_ = darkness();
     return;
   }
-  source_ = open_probe(set, before ? before->source_ : nullptr);
+  source_ = open_probe(set, before ? before->source_ : nullptr, from);
+  goes_on_ = before && source_ == before->source_;
   if (settings_->match.method == MatchSettings::Method::given) {
     match_ = given_match(1);
     exposure_ = ExposureFollower(settings_->match.exposure_s);
@@ -224,6 +227,14 @@ void LightFeed::update_environment(const LightRequest& request) {
   if (new_gain) build_environment(request);
   if (!fresh && !new_gain) return;
   table_count_ = 0;
+}
+
+std::shared_ptr<const render::Environment> LightFeed::begin(const LightRequest& request) {
+  if (goes_on_) return nullptr;
+  Light light = at(request);
+  // That plate may be gone, and another one be in its place.
+  matched_plate_ = nullptr;
+  return std::move(light.environment);
 }
 
 Light LightFeed::at(const LightRequest& request) {

@@ -45,11 +45,18 @@ struct LightRequest {
 class LightFeed {
  public:
   // Opens the probe of a set; a set without one is lit by nothing. A camera that `before` has open
-  // runs on: `before` may do so until the first at(), and is of no more use then. Throws SetError.
-  explicit LightFeed(const Set& set, const LightFeed* before = nullptr);
+  // runs on: `before` may do so until the first at(), and is of no more use then. `from` as of
+  // ProbeSource. Throws SetError.
+  explicit LightFeed(const Set& set,
+                     const LightFeed* before = nullptr,
+                     std::optional<capture::Time> from = std::nullopt);
 
   // Whether another set is lit by the same camera in the same way, so that this one may go on.
   bool serves(const Set& set) const;
+
+  // Makes ready what the first at() would take long for, of a time that is not after it; while
+  // `before` still runs. Its environment; null, and nothing done, where both have the same camera.
+  std::shared_ptr<const render::Environment> begin(const LightRequest& request);
 
   Light at(const LightRequest& request);
 
@@ -66,6 +73,7 @@ class LightFeed {
   capture::Image evened_;                  // the present plate without its lens's vignetting
   const capture::Image* plate_ = nullptr;  // as a lens without vignetting would take it
   std::shared_ptr<ProbeSource> source_;
+  bool goes_on_ = false;                         // with the source of another one
   std::unique_ptr<render::ProbeMapper> mapper_;  // null = latitude-longitude
   render::LightFollower follower_;
   std::shared_ptr<const capture::Image> radiance_;  // that the environment was made from

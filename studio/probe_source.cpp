@@ -13,6 +13,7 @@
 #include "capture/camera_response.h"
 #include "capture/make_hdr.h"
 #include "capture/picture_camera.h"
+#include "studio/recording_place.h"
 
 namespace studio {
 namespace {
@@ -109,9 +110,9 @@ Bracketed bracket(std::unique_ptr<capture::Camera> camera,
 
 }  // namespace
 
-ProbeSource::ProbeSource(const Set& set)
+ProbeSource::ProbeSource(const Set& set, std::optional<capture::Time> from)
     : settings_(*set.probe), loop_(set.camera.loop), times_(file_times({settings_.response})) {
-  open(set);
+  open(set, from);
   height_ = newest_.image->height;
   width_ = newest_.image->width;
 }
@@ -134,14 +135,14 @@ bool ProbeSource::holds_camera_of(const Set& set) const {
   return camera_ && camera_->is_live() && set.probe && set.probe->source == settings_.source;
 }
 
-void ProbeSource::open(const Set& set) {
+void ProbeSource::open(const Set& set, std::optional<capture::Time> from) {
   const ProbeSettings& probe = *set.probe;
   exposures_s_ = probe.exposures_s;
   offset_ =
       std::chrono::duration_cast<capture::Time>(std::chrono::duration<double>(probe.offset_s));
   try {
     if (probe.shots.empty()) {
-      open_camera(set, probe);
+      open_camera(set, probe, from);
       return;
     }
     capture::HdrOptions options;
@@ -156,7 +157,9 @@ void ProbeSource::open(const Set& set) {
   }
 }
 
-void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
+void ProbeSource::open_camera(const Set& set,
+                              const ProbeSettings& probe,
+                              std::optional<capture::Time> from) {
   capture::CameraOptions options;
   options.colour.transfer = probe.colour;
   options.response = probe.response;
@@ -165,6 +168,16 @@ void ProbeSource::open_camera(const Set& set, const ProbeSettings& probe) {
   if (set.show.fps) options.picture_rate = *set.show.fps;
   merging_.noise = noise_of(probe);
   std::unique_ptr<capture::Camera> camera = capture::open_camera(probe.source, options);
+  // One that loops tells no length.
+  const bool may_have_place = options.loop || camera->info().frames > 1;
+  if (from && !camera->info().live && may_have_place) {
+    camera.reset();
+    const RecordingPlace place = find_place(probe.source, options, *from + offset_);
+    const std::int64_t first = place.frame - static_cast<std::int64_t>(longest_cycle);
+    if (first > 0) options.frame = first;  // so that the first bracket is whole
+    passed_ = place.passed;
+    camera = capture::open_camera(probe.source, options);
+  }
   std::size_t cycle = 0;
   if (camera->info().live) {
     auto bracketed = bracket(std::move(camera), probe, merging_.noise);
@@ -304,12 +317,12 @@ void ProbeSource::take(const std::vector<capture::Frame>& frames) {
 
 ProbeSource::Radiance ProbeSource::at(capture::Time time) {
   if (camera_) {
-    const capture::Time on_its_clock = time + offset_;
+    const capture::Time on_its_clock = time + offset_ - passed_;
     take(camera_->advance(on_its_clock));
     if (camera_->has_ended(on_its_clock)) status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;
   }
-  return newest_;
+  return {newest_.image, newest_.time + passed_};
 }
 
 }  // namespace studio

@@ -40,8 +40,9 @@ struct ProbeStatus {
 // One thread uses it.
 class ProbeSource {
  public:
-  // Opens or merges what the set names. Throws SetError.
-  explicit ProbeSource(const Set& set);
+  // Opens or merges what the set names. A recording is in step with the plate: where it is first
+  // asked for at `from` of the show's time, it begins there. Throws SetError.
+  explicit ProbeSource(const Set& set, std::optional<capture::Time> from = std::nullopt);
 
   // Whether it may go on for another set: it is a camera, and that set has the same one, asked in
   // the same way. The set's light may differ.
@@ -64,8 +65,8 @@ class ProbeSource {
   const ProbeStatus& status() const { return status_; }
 
  private:
-  void open(const Set& set);
-  void open_camera(const Set& set, const ProbeSettings& probe);
+  void open(const Set& set, std::optional<capture::Time> from);
+  void open_camera(const Set& set, const ProbeSettings& probe, std::optional<capture::Time> from);
   void prime();
   void prime_live(std::size_t cycle);
   void note_camera();
@@ -80,7 +81,8 @@ class ProbeSource {
   FileTimes times_;  // of the response, when it was read
   int height_ = 0, width_ = 0;
   std::vector<double> exposures_s_;
-  capture::Time offset_{};                // its clock less the show's
+  capture::Time offset_{};  // its clock less the show's
+  capture::Time passed_{};  // of a recording that loops: by passes before it was opened
   capture::WindowMergeSettings merging_;  // with the camera's noise, if calibration has told it
   std::unique_ptr<Source> camera_;        // null = the radiance stays
   std::unique_ptr<RollingBracket> bracket_;
