@@ -7,6 +7,7 @@
 #include <iterator>
 #include <stdexcept>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -22,6 +23,8 @@ using Clock = std::chrono::steady_clock;
 constexpr capture::Rational rate_of_stills{25, 1};
 // Frames by which a live plate's own count may differ from its clock.
 constexpr double most_parted = 1.5;
+// How long an edit waits for devices that are being closed.
+constexpr std::chrono::seconds patience_for_leaving{10};
 
 // Measures a stage from its making to its end.
 class StageTimer {
@@ -274,6 +277,8 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     const StageTimer timer(prepared, Stage::probe);
     light = light_->at({time, frame->image.get(), directions_.get(), job.cam_from_set,
                         prepared.plate_exposure_s, set_.effort.light_samples});
+    const std::lock_guard lock(moment_mutex_);
+    moment_ = {time, frame->image, job.cam_from_set, prepared.plate_exposure_s};
   }
 
   {
@@ -286,7 +291,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     } else if (deformed) {
       renew_scene(scene_->pictures());
     }
-    job.scene_version = scene_version_;
+    job.scene_version = scene_->description().version;
     job.effort = set_.effort;
     job.textures = {{0, frame->time}, {1, light.time}};
     job.lights = std::move(light.table);
@@ -370,8 +375,49 @@ void FrameMaker::renew_scene(render::Scene::Pictures pictures) {
   scene_ = std::make_shared<render::Scene>(set_scene_.description, *scene_, std::move(pictures));
 }
 
-void FrameMaker::move_object(const std::string& name, const PlacementSettings& pose) {
-  finish_change();
+// At once; while an edit is on its way, what cannot be done may be possible with that.
+void FrameMaker::command(Command command) {
+  if (!change_.valid()) return apply(command);
+  try {
+    apply(command);
+  } catch (const std::runtime_error& error) {
+    command.why_not = error.what();
+  } catch (const std::invalid_argument& error) {
+    command.why_not = error.what();
+  }
+  keep(std::move(command));
+}
+
+// In the place of one that asked the same thing of the same edits.
+void FrameMaker::keep(Command command) {
+  const auto asks_the_same = [&](const Command& other) {
+    if (other.what.index() != command.what.index()) return false;
+    if (const auto* move = std::get_if<Move>(&other.what)) {
+      return move->name == std::get<Move>(command.what).name;
+    }
+    const auto* video = std::get_if<VideoChange>(&other.what);
+    return video == nullptr || video->name == std::get<VideoChange>(command.what).name;
+  };
+  const auto since = commands_.begin() + static_cast<std::ptrdiff_t>(of_next_change_);
+  commands_.erase(std::remove_if(since, commands_.end(), asks_the_same), commands_.end());
+  commands_.push_back(std::move(command));
+}
+
+void FrameMaker::apply(const Command& command, const VideoFeed* videos_before) {
+  if (const auto* effort = std::get_if<render::Effort>(&command.what)) {
+    set_.effort = *effort;
+  } else if (const auto* move = std::get_if<Move>(&command.what)) {
+    apply(*move);
+  } else {
+    const auto& [name, uri] = std::get<VideoChange>(command.what);
+    leaving_.let_go(videos_->change_source(name, uri, videos_before));
+    const auto video = std::ranges::find(set_.videos, name, &VideoSettings::name);
+    if (video != set_.videos.end()) video->source = uri;
+  }
+}
+
+void FrameMaker::apply(const Move& move) {
+  const auto& [name, pose] = move;
   const auto index_of = [&](std::string_view wanted) {
     const auto found = std::ranges::find(set_.objects, wanted, &ObjectSettings::name);
     return static_cast<std::size_t>(found - set_.objects.begin());
@@ -390,31 +436,90 @@ void FrameMaker::move_object(const std::string& name, const PlacementSettings& p
   renew_scene(scene_->pictures());
 }
 
-void FrameMaker::change_video(const std::string& name, const std::string& uri) {
-  finish_change();
-  videos_->change_source(name, uri);
-  const auto video = std::ranges::find(set_.videos, name, &VideoSettings::name);
-  if (video != set_.videos.end()) video->source = uri;
+// For the edit that is on air now, which they came after.
+void FrameMaker::repeat_commands(const VideoFeed& videos_before) {
+  for (Command& command : commands_) {
+    command.why_not.clear();
+    try {
+      apply(command, &videos_before);
+    } catch (const std::runtime_error& error) {
+      command.why_not = error.what();
+    } catch (const std::invalid_argument& error) {
+      command.why_not = error.what();
+    }
+  }
 }
 
-FrameMaker::Change FrameMaker::prepare(Set set, std::uint64_t scene_version) const {
+// Those of the edit that was on its way. What the next one may make possible is no fault yet.
+void FrameMaker::forget_commands() {
+  const auto end = next_change_ ? commands_.begin() + static_cast<std::ptrdiff_t>(of_next_change_)
+                                : commands_.end();
+  for (auto command = commands_.begin(); command != end; ++command) {
+    if (!command->why_not.empty()) notes_.push_back(std::move(command->why_not));
+  }
+  commands_.erase(commands_.begin(), end);
+  of_next_change_ = 0;
+}
+
+// A device may be held still by what edits before let go of.
+template <class Open>
+void FrameMaker::open_once_left(const Open& open) const {
+  try {
+    return open();
+  } catch (const std::runtime_error&) {
+    if (!leaving_.wait(patience_for_leaving)) throw;
+  }
+  open();
+}
+
+FrameMaker::Change FrameMaker::prepare(Set set,
+                                       std::uint64_t scene_version,
+                                       const VideoFeed& videos) const {
   const bool live = plate_->is_live();
   Change change;
-  change.persons = std::make_unique<PersonFeed>(set, std::nullopt, live, persons_.get());
-  change.videos = std::make_unique<VideoFeed>(set, std::nullopt, live, videos_.get());
-  if (!light_->serves(set)) change.light = std::make_unique<LightFeed>(set, light_.get());
+  open_once_left([&] {
+    change.persons = std::make_unique<PersonFeed>(set, std::nullopt, live, persons_.get());
+    change.videos = std::make_unique<VideoFeed>(set, std::nullopt, live, &videos);
+  });
   change.track = track_of(set);
   change.directions = directions_of(set);
   change.lens = std::make_shared<calibrate::Lens>(lens_of(set));
-  change.set_scene = describe_scene(set);
+  change.set_scene = describe_scene(set, &given_up_);
   change.scene = compile(set, *change.persons, change.set_scene, scene_version);
   try {
     change.videos->place(set, change.set_scene);
   } catch (const std::invalid_argument& error) {
     fail(set, {}, error.what());
   }
+  // Last, since the frames of a recording go on.
+  if (!light_->serves(set)) {
+    const std::optional<Moment> now = moment();
+    open_once_left([&] {
+      change.light = std::make_unique<LightFeed>(set, light_.get(),
+                                                 now ? std::optional(now->time) : std::nullopt);
+    });
+  }
   change.set = std::move(set);
   return change;
+}
+
+// So far that the next frame has no more to do for it than those after.
+void FrameMaker::begin_light(Change& change) const {
+  if (!change.light) return;
+  constexpr int steps = 3;  // each over what the one before took
+  for (int i = 0; i < steps; ++i) {
+    const std::optional<Moment> now = moment();
+    if (!now) return;
+    const PoseSettings& pose = change.set.camera.pose;
+    change.light->begin({now->time, now->plate.get(), change.directions.get(),
+                         pose.track.empty() ? pose.cam_from_set : now->cam_from_set,
+                         now->exposure_s, change.set.effort.light_samples});
+  }
+}
+
+std::optional<FrameMaker::Moment> FrameMaker::moment() const {
+  const std::lock_guard lock(moment_mutex_);
+  return moment_;
 }
 
 void FrameMaker::check_change(const Set& set) const {
@@ -433,45 +538,56 @@ void FrameMaker::take_over(Change change) {
   // first shape is shown.
   auto shapes = std::make_unique<ShapeFeed>(change.set, change.set_scene, rate_, std::nullopt,
                                             live_, shapes_.get());
-  shapes_.swap(shapes);
-  set_ = std::move(change.set);
-  videos_ = std::move(change.videos);
   change.persons->take_over();
-  persons_ = std::move(change.persons);
+  shapes_.swap(shapes);
+  videos_.swap(change.videos);
+  persons_.swap(change.persons);
+  if (change.light) light_.swap(change.light);
+  set_ = std::move(change.set);
   set_scene_ = std::move(change.set_scene);
   scene_ = std::move(change.scene);
   lamps_ = describe_lamps(set_);
-  if (change.light) light_ = std::move(change.light);
   track_ = std::move(change.track);
   directions_ = std::move(change.directions);
   lens_ = std::move(change.lens);
-  let_go(std::move(shapes));
-}
-
-// Beside the frames: it waits for the file that is being read, which no frame is to wait for.
-void FrameMaker::let_go(std::unique_ptr<ShapeFeed> shapes) {
-  std::erase_if(leaving_, [](const std::future<void>& one) {
-    return one.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-  });
-  try {
-    leaving_.push_back(
-        std::async(std::launch::async, [before = std::move(shapes)]() mutable { before.reset(); }));
-  } catch (const std::system_error&) {
-    // No thread can be had: then this frame waits.
-  }
+  repeat_commands(*change.videos);
+  // No frame waits for a camera that stalls or a file that is being read.
+  leaving_.let_go(std::make_tuple(std::move(shapes), std::move(change.videos),
+                                  std::move(change.persons), std::move(change.light)));
 }
 
 void FrameMaker::change_set(Set set) {
   check_change(set);
+  next_change_.reset();
   finish_change();
-  take_over(prepare(std::move(set), ++scene_version_));
+  take_over(prepare(std::move(set), ++scene_version_, *videos_));
 }
 
 void FrameMaker::change_set_beside(Set set) {
   check_change(set);
-  finish_change();
-  change_ =
-      std::async(std::launch::async, &FrameMaker::prepare, this, std::move(set), ++scene_version_);
+  if (change_.valid()) {
+    next_change_ = std::move(set);
+    of_next_change_ = commands_.size();
+  } else {
+    begin_change(std::move(set));
+  }
+}
+
+void FrameMaker::begin_change(Set set) {
+  const auto make = [this](Set& changed, std::uint64_t version, VideoFeed& videos) {
+    const VideoFeed on_air = std::move(videos);  // what only it holds by the end is closed here
+    Change change = prepare(std::move(changed), version, on_air);
+    begin_light(change);
+    return change;
+  };
+  try {
+    // A copy of the feed, for its videos may be changed by then.
+    change_ = std::async(std::launch::async,
+                         [make, set = std::move(set), version = ++scene_version_,
+                          videos = *videos_]() mutable { return make(set, version, videos); });
+  } catch (const std::system_error& error) {
+    notes_.emplace_back(error.what());  // no thread can be had
+  }
 }
 
 // Waits for the change that is on its way.
@@ -482,6 +598,8 @@ void FrameMaker::finish_change() {
   } catch (const std::exception& error) {  // whatever it is, what is on air goes on
     notes_.emplace_back(error.what());
   }
+  forget_commands();
+  if (next_change_) begin_change(*std::exchange(next_change_, std::nullopt));
 }
 
 }  // namespace studio

@@ -2,12 +2,15 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "calibrate/lens.h"
@@ -15,6 +18,7 @@
 #include "capture/image.h"
 #include "render/bounced_light.h"
 #include "render/renderer.h"
+#include "studio/leaving.h"
 #include "studio/light_feed.h"
 #include "studio/person_feed.h"
 #include "studio/set.h"
@@ -74,6 +78,11 @@ class FrameMaker {
                       std::optional<capture::Rational> rate = std::nullopt,
                       bool live = false);
 
+  // Gives up an edit that is on its way, as soon as the model that is being read is there.
+  ~FrameMaker() { given_up_ = true; }
+  FrameMaker(const FrameMaker&) = delete;
+  FrameMaker& operator=(const FrameMaker&) = delete;
+
   const Set& set() const { return set_; }
   capture::Rational rate() const { return rate_; }
   const Source& plate() const { return *plate_; }
@@ -98,23 +107,29 @@ class FrameMaker {
   // As make(), with a time of its own.
   std::optional<PreparedFrame> make_at(const Due& due);
 
-  void set_effort(const render::Effort& effort) {
-    finish_change();
-    set_.effort = effort;
-  }
+  // Commands hold from the next frame on, and none waits for an edit that is on its way: they count
+  // for that one as well, since they came after it. What cannot be done then, nor by now, is a note
+  // of the frame by which the edit is on air.
+  void set_effort(const render::Effort& effort) { command({effort}); }
   // Throws std::invalid_argument if no object has that name.
-  void move_object(const std::string& name, const PlacementSettings& pose);
+  void move_object(const std::string& name, const PlacementSettings& pose) {
+    command({Move{name, pose}});
+  }
   // Another source for one of the set's videos. Throws std::invalid_argument if none has that name,
   // std::runtime_error if the source cannot be opened.
-  void change_video(const std::string& name, const std::string& uri);
+  void change_video(const std::string& name, const std::string& uri) {
+    command({VideoChange{name, uri}});
+  }
   // Takes over another set file's content. Sources that stay the same run on. Throws SetError and
   // changes nothing if it cannot be used, std::invalid_argument if the picture's size or rate
   // differ.
   void change_set(Set set);
   // The same, but what takes long, the reading of models above all, is done beside the frames that
-  // follow, and taken over when it is there, or at the next change of anything. What goes wrong by
-  // then is a note of the next frame.
+  // follow, and taken over when it is there. While one is on its way, only the newest of those that
+  // come is kept, and begun then. What goes wrong by then is a note of the next frame.
   void change_set_beside(Set set);
+  // Whether an edit is on its way.
+  bool is_changing() const { return change_.valid(); }
 
  private:
   // A set that is ready to be taken over.
@@ -129,15 +144,44 @@ class FrameMaker {
     std::shared_ptr<const calibrate::DirectionTable> directions;
     std::shared_ptr<const calibrate::Lens> lens;
   };
-  // Beside the frames: of what they use it only reads what does not change.
-  Change prepare(Set set, std::uint64_t scene_version) const;
+  struct Move {
+    std::string name;
+    PlacementSettings pose;
+  };
+  struct VideoChange {
+    std::string name, uri;
+  };
+  // What the light of an edit begins with: of the last frame.
+  struct Moment {
+    capture::Time time{};
+    std::shared_ptr<const capture::Image> plate;
+    calibrate::Pose cam_from_set;
+    double exposure_s = 0;
+  };
+  // What is asked for while an edit is on its way.
+  struct Command {
+    std::variant<render::Effort, Move, VideoChange> what;
+    std::string why_not{};  // it could not be done so far; "" = it was
+  };
+  void command(Command command);
+  void apply(const Command& command, const VideoFeed* videos_before = nullptr);
+  void apply(const Move& move);
+  void keep(Command command);
+  void repeat_commands(const VideoFeed& videos_before);
+  void forget_commands();
+  void begin_change(Set set);
+  // Beside the frames: of what they use it only reads what does not change. `videos`: those on air.
+  Change prepare(Set set, std::uint64_t scene_version, const VideoFeed& videos) const;
+  void begin_light(Change& change) const;
+  std::optional<Moment> moment() const;
   bool deform_objects(capture::Time time, PreparedFrame& frame);
   render::Scene::Pictures stand_persons(capture::Time time, PreparedFrame& frame);
   void renew_scene(render::Scene::Pictures pictures);
   void check_change(const Set& set) const;
   void take_over(Change change);
+  template <class Open>
+  void open_once_left(const Open& open) const;
   void finish_change();
-  void let_go(std::unique_ptr<ShapeFeed> shapes);
   void note_plate(const capture::Frame& frame);
   calibrate::Pose pose_at(const capture::Frame& frame);
   double place_of(capture::Time time) const;
@@ -160,9 +204,15 @@ class FrameMaker {
   std::vector<render::LocalLight> lamps_;
   render::BounceFollower bounces_;
   std::uint64_t scene_version_ = 0;
-  std::future<Change> change_;              // on its way
-  std::vector<std::future<void>> leaving_;  // shapes of sets before
-  std::vector<std::string> notes_;          // for the next frame
+  mutable std::mutex moment_mutex_;
+  std::optional<Moment> moment_;  // nothing = there was no frame yet
+  std::atomic<bool> given_up_ = false;
+  Leaving leaving_;                 // of sets before
+  std::future<Change> change_;      // on its way
+  std::optional<Set> next_change_;  // after that
+  std::vector<Command> commands_;   // since change_ came
+  std::size_t of_next_change_ = 0;  // from which of them on they came after next_change_ as well
+  std::vector<std::string> notes_;  // for the next frame
   bool plate_is_lost_ = false, is_off_track_ = false;
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;

@@ -303,14 +303,18 @@ std::string name_of(const ObjectSettings& object, std::size_t number) {
   return object.name.empty() ? fmt::format("object {}", number) : object.name;
 }
 
-SetScene describe_scene(const Set& set) {
+SetScene describe_scene(const Set& set, const std::atomic<bool>* given_up) {
   SetScene result;
   SceneDescription& scene = result.description;
   scene.background = "plate";
   Faults faults(set.path);
   // A model that several objects show is held once, by the first of them.
   std::map<std::size_t, std::vector<Instance>> loaded;
+  const auto stop_if_given_up = [&] {
+    if (given_up != nullptr && *given_up) throw std::runtime_error("the scene is given up");
+  };
   for (std::size_t i = 0; i < set.objects.size(); ++i) {
+    stop_if_given_up();
     const ObjectSettings& object = set.objects[i];
     const std::string name = name_of(object, i + 1);
     try {
@@ -328,12 +332,14 @@ SetScene describe_scene(const Set& set) {
     }
   }
   for (std::size_t i = 0; i < set.stand_ins.size(); ++i) {
+    stop_if_given_up();
     try {
       add_stand_in(scene, set.stand_ins[i], i + 1, result.notes);
     } catch (const std::runtime_error& error) {
       faults.add(set.stand_ins[i].place, error.what());
     }
   }
+  stop_if_given_up();
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
   show_videos(set, result, faults);
   add_persons(set, result, faults);

@@ -121,7 +121,9 @@ std::vector<render::LocalLight> VideoFeed::lamps(const std::vector<VideoFrame>& 
   return all;
 }
 
-void VideoFeed::change_source(const std::string& name, const std::string& uri) {
+std::shared_ptr<void> VideoFeed::change_source(const std::string& name,
+                                               const std::string& uri,
+                                               const VideoFeed* before) {
   const auto channel =
       std::ranges::find(channels_, name, [](const Channel& c) { return c.settings.name; });
   if (channel == channels_.end()) {
@@ -129,8 +131,9 @@ void VideoFeed::change_source(const std::string& name, const std::string& uri) {
   }
   VideoSettings settings = channel->settings;
   settings.source = uri;
-  channel->player = open(settings, nullptr);
+  std::shared_ptr<Player> player = open(settings, before);
   channel->settings = std::move(settings);
+  return std::exchange(channel->player, std::move(player));
 }
 
 std::vector<std::string> VideoFeed::take_notes() { return std::exchange(notes_, {}); }

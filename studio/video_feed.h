@@ -40,9 +40,12 @@ class VideoFeed {
   // Of these frames.
   std::vector<render::LocalLight> lamps(const std::vector<VideoFrame>& frames) const;
 
-  // Another source for the video of that name, from the next frame on. Throws
-  // std::invalid_argument if there is no such video, std::runtime_error if it cannot be opened.
-  void change_source(const std::string& name, const std::string& uri);
+  // Another source for the video of that name, from the next frame on; what `before` has open runs
+  // on. Returns the source that it had, to be let go. Throws std::invalid_argument if there is no
+  // such video, std::runtime_error if it cannot be opened.
+  std::shared_ptr<void> change_source(const std::string& name,
+                                      const std::string& uri,
+                                      const VideoFeed* before = nullptr);
 
   // What went wrong since the last call, in words.
   std::vector<std::string> take_notes();

@@ -5,9 +5,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <fstream>
+#include <functional>
+#include <mutex>
 #include <stdexcept>
+#include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -25,8 +31,37 @@ using testing::IsEmpty;
 // Of "sole:", which can be opened only once at a time, as devices can.
 std::atomic<int> open_now = 0, opened = 0;
 
+// What sources wait for, but not for ever.
+class Gate {
+ public:
+  void shut() {
+    const std::lock_guard lock(mutex_);
+    open_ = overdue_ = false;
+  }
+  void open() {
+    const std::lock_guard lock(mutex_);
+    open_ = true;
+    changed_.notify_all();
+  }
+  void pass() {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait_for(lock, std::chrono::seconds(5), [&] { return open_; })) overdue_ = true;
+  }
+  // Whether somebody waited in vain: whoever was to open it waited for that.
+  bool overdue() const {
+    const std::lock_guard lock(mutex_);
+    return overdue_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  bool open_ = true, overdue_ = false;
+};
+Gate opening, closing;  // of "held:" and "late:"
+
 // Frame n is grey by .1 + (n % 50) / 100; 64x32. Of no frames, it is endless.
-class SoleCamera final : public capture::Camera {
+class SoleCamera : public capture::Camera {
  public:
   SoleCamera(std::int64_t frames, bool live, const capture::CameraOptions& options)
       : frames_(frames),
@@ -64,7 +99,49 @@ class SoleCamera final : public capture::Camera {
   capture::Time begin_;
 };
 
-// Opens "sole:FRAMES" and "live_sole:FRAMES".
+// The same, which opens and closes when it may.
+class HeldCamera final : public SoleCamera {
+ public:
+  HeldCamera(std::int64_t frames, const capture::CameraOptions& options)
+      : SoleCamera(frames, false, options) {
+    opening.pass();
+  }
+  ~HeldCamera() override { closing.pass(); }
+};
+
+std::atomic<int> recorded_frames_read = 0;
+
+// A recording of grey frames of 64x32, 25 a second: frame n of them is grey by (n + 1) / 1000.
+class RecordedCamera final : public capture::Camera {
+ public:
+  RecordedCamera(std::int64_t frames, const capture::CameraOptions& options)
+      : frames_(frames), number_(options.frame.value_or(0)), loop_(options.loop) {
+    info_.width = 64;
+    info_.height = 32;
+    info_.rate = {25, 1};
+    info_.frames = loop_ ? 0 : frames;
+  }
+  const capture::CameraInfo& info() const override { return info_; }
+  capture::CameraStatistics statistics() const override { return {}; }
+  std::optional<capture::Frame> next() override {
+    if (!loop_ && number_ >= frames_) return std::nullopt;
+    ++recorded_frames_read;
+    capture::Frame frame;
+    frame.number = number_;
+    frame.time = capture::time_of_frame(number_, info_.rate);
+    auto image = std::make_shared<capture::Image>(capture::make_image(32, 64));
+    std::ranges::fill(image->pixels, static_cast<float>(number_++ % frames_ + 1) / 1000);
+    frame.image = std::move(image);
+    return frame;
+  }
+
+ private:
+  capture::CameraInfo info_;
+  std::int64_t frames_, number_;
+  bool loop_;
+};
+
+// Opens "sole:FRAMES", "live_sole:FRAMES", "held:FRAMES", "late:FRAMES" and "recorded:FRAMES".
 void register_sole_camera() {
   for (const bool live : {false, true}) {
     capture::register_camera(live ? "live_sole" : "sole", [live](std::string_view rest,
@@ -72,6 +149,17 @@ void register_sole_camera() {
       return std::make_unique<SoleCamera>(std::stol(std::string(rest)), live, o);
     });
   }
+  capture::register_camera("held", [](std::string_view rest, const capture::CameraOptions& o) {
+    return std::make_unique<HeldCamera>(std::stol(std::string(rest)), o);
+  });
+  capture::register_camera("late", [](std::string_view rest, const capture::CameraOptions&) {
+    opening.pass();
+    const std::int64_t frames = std::stol(std::string(rest));
+    return std::make_unique<GreyCamera>(frames, capture::Rational{25, 1}, 0);
+  });
+  capture::register_camera("recorded", [](std::string_view rest, const capture::CameraOptions& o) {
+    return std::make_unique<RecordedCamera>(std::stol(std::string(rest)), o);
+  });
 }
 
 class SetChangeTest : public MadeShowTest {
@@ -241,6 +329,162 @@ TEST_F(SetChangeTest, TheProbesCameraRunsOn) {
     EXPECT_THAT(error.what(), HasSubstr("busy"));
   }
   EXPECT_GT(maker.make(23).value().probe.frames, after.probe.frames);
+}
+
+// Makes frames until one is as it is to be, each beside the edit that is on its way; their notes.
+std::vector<std::string> make_until(FrameMaker& maker,
+                                    std::int64_t& number,
+                                    const std::function<bool(const PreparedFrame&)>& done) {
+  std::vector<std::string> notes;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (std::chrono::steady_clock::now() < end) {
+    const PreparedFrame frame = maker.make(number++).value();
+    notes.insert(notes.end(), frame.notes.begin(), frame.notes.end());
+    if (done(frame)) return notes;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  ADD_FAILURE() << "it never is";
+  return notes;
+}
+
+const std::string placed = "height = 2\nposition = [0, 0, 0]\n";
+
+// While the camera of an edit is still being opened, whatever comes meanwhile.
+TEST_F(SetChangeTest, NoFrameOrCommandWaitsForAnEditAndTheNewestIsNext) {
+  FrameMaker maker(made_set("grey:1,25,0"));
+  std::int64_t n = 0;
+  const auto cube_x = [&] {
+    return maker.make(n++).value().scene->description().instances[0].set_from_object[3];
+  };
+  const auto effort_of = [](Set set, int aa_samples) {
+    set.effort.aa_samples = aa_samples;
+    return set.effort;
+  };
+  const Set first = person_set("held:0");
+  const Set passed_over = person_set("nowhere:");
+  const Set last = person_set("held:0", placed, "[[object]]\nname = \"more\"\nmade = \"desk\"\n");
+  ASSERT_EQ(cube_x(), 0);
+  opening.shut();
+  maker.change_set_beside(first);
+  maker.change_set_beside(passed_over);
+  maker.set_effort(effort_of(first, 7));
+  maker.move_object("cube", {{1, 0, 0}, 0, 0, 1});
+  EXPECT_EQ(cube_x(), 1) << "at once";
+  EXPECT_EQ(maker.make(n++).value().job.effort.aa_samples, 7);
+  maker.change_set_beside(last);
+  maker.move_object("cube", {{3, 0, 0}, 0, 0, 1});
+  maker.move_object("cube", {{2, 0, 0}, 0, 0, 1});
+  maker.move_object("more", {{0, 5, 0}, 0, 0, 1});  // which only that one has
+  maker.move_object("nobody", {});
+  EXPECT_EQ(cube_x(), 2);
+  EXPECT_FALSE(opening.overdue());
+  opening.open();
+  auto notes = make_until(maker, n, [](const auto& frame) { return !frame.persons.empty(); });
+  EXPECT_THAT(notes, IsEmpty()) << "the last edit may make it possible";
+  EXPECT_EQ(maker.set().effort.aa_samples, 7) << "it came after the first edit";
+  EXPECT_EQ(maker.set().objects[0].pose.position.x, 2);
+  notes = make_until(maker, n, [&](const auto&) { return maker.set().objects.size() == 2; });
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("nobody")));
+  EXPECT_EQ(maker.set().effort.aa_samples, 4) << "the last edit came after it";
+  for (const ObjectSettings& object : maker.set().objects) {
+    const calibrate::Vec3& at = object.pose.position;
+    EXPECT_EQ(object.name == "cube" ? at.x : at.y, object.name == "cube" ? 2 : 5);
+  }
+  EXPECT_FALSE(maker.is_changing());
+  EXPECT_EQ(opened, 1);
+}
+
+TEST_F(SetChangeTest, AVideoThatIsSwitchedWhileAnEditIsReadStaysOpen) {
+  const std::string tv =
+      "[[object]]\nname = \"set\"\nmade = \"tv\"\n"
+      "[[video]]\nname = \"news\"\nsource = \"grey:1,25,0\"\nobject = \"set/tv\"\n";
+  FrameMaker maker(made_set("grey:1,25,0", tv));
+  std::int64_t n = 0;
+  ASSERT_TRUE(maker.make(n++));
+  opening.shut();
+  maker.change_set_beside(
+      made_set("grey:1,25,0", tv + "[[billboard]]\nsource = \"late:9\"\n" + placed));
+  maker.change_video("news", "sole:0");
+  EXPECT_EQ(maker.set().videos.at(0).source, "sole:0") << "at once";
+  ASSERT_TRUE(maker.make(n++));
+  EXPECT_FALSE(opening.overdue());
+  opening.open();
+  const auto notes = make_until(maker, n, [](const auto& frame) { return !frame.persons.empty(); });
+  EXPECT_THAT(notes, testing::Each(testing::Not(HasSubstr("busy"))));
+  EXPECT_EQ(maker.set().videos.at(0).source, "sole:0");
+  EXPECT_EQ(open_now, 1);
+  EXPECT_EQ(opened, 1);
+}
+
+// A device that stalls: it is closed beside the frames, and opened again once it is.
+TEST_F(SetChangeTest, NoFrameWaitsForWhatGoesAndWhatComesBackDoes) {
+  const std::string tv = "[[object]]\nname = \"set\"\nmade = \"tv\"\n";
+  const std::string video = "[[video]]\nsource = \"held:0\"\nobject = \"set/tv\"\n";
+  const std::string light = "match = [1, 1, 1]\nlens = \"latlong\"\n";
+  for (const auto& [with, without] :
+       {std::pair(person_set("held:0"), made_set("grey:1,25,0")),
+        std::pair(made_set("grey:1,25,0", tv + video), made_set("grey:1,25,0", tv)),
+        std::pair(probe_set("held:0", light), probe_set("recorded:900", light))}) {
+    opened = 0;
+    FrameMaker maker(with);
+    std::int64_t n = 0;
+    ASSERT_TRUE(maker.make(n++));
+    closing.shut();
+    maker.change_set_beside(without);
+    make_until(maker, n, [&](const auto&) { return !maker.is_changing(); });
+    EXPECT_EQ(open_now, 1) << "it is being closed";
+    maker.change_set_beside(with);
+    for (int i = 0; i < 3; ++i) EXPECT_TRUE(maker.make(n++));
+    EXPECT_TRUE(maker.is_changing()) << "it waits for that";
+    EXPECT_FALSE(closing.overdue());
+    closing.open();
+    const auto notes = make_until(maker, n, [&](const auto&) { return !maker.is_changing(); });
+    EXPECT_THAT(notes, testing::Each(testing::Not(HasSubstr("busy"))));
+    EXPECT_EQ(opened, 2);
+    EXPECT_EQ(open_now, 1);
+  }
+  EXPECT_EQ(open_now, 0) << "the end waits for all";
+}
+
+// However long the show has run.
+TEST_F(SetChangeTest, ARecordedProbeThatIsOpenedAnewStaysInStepWithThePlate) {
+  const std::string given = "match = [1, 1, 1]\nlens = \"latlong\"\n";
+  for (const bool loop : {false, true}) {
+    const auto set = [&](const std::string& probe) {
+      Set made = probe_set(loop ? "recorded:300" : "recorded:900", given + probe);
+      made.camera.loop = loop;
+      return made;
+    };
+    FrameMaker maker(set("")), edited(set(""));
+    const auto shown = [](FrameMaker& one, std::int64_t n) {
+      const PreparedFrame frame = one.make(n).value();
+      return std::lround(frame.environment->radiance.pixels.front() * 1000);
+    };
+    EXPECT_EQ(shown(maker, 700), loop ? 101 : 701);
+    EXPECT_EQ(shown(edited, 700), loop ? 101 : 701);
+    recorded_frames_read = 0;
+    edited.change_set(set("colour = \"sRGB\"\n"));
+    EXPECT_LT(recorded_frames_read, 100);
+    for (const std::int64_t n : {701, 702, 750, 899, 903}) {
+      EXPECT_EQ(shown(edited, n), shown(maker, n)) << n;
+    }
+    // Beside the frames it is the same.
+    std::int64_t n = 904;
+    edited.change_set_beside(set(""));
+    make_until(edited, n, [&](const auto&) { return !edited.is_changing(); });
+    EXPECT_EQ(shown(edited, n), shown(maker, n));
+  }
+}
+
+TEST_F(SetChangeTest, TheFirstLightIsMadeBesideTheFrames) {
+  const Set set = made_set("grey:1,25,0");
+  const capture::Image plate = capture::make_image(48, 64);
+  LightFeed light(set);
+  LightRequest request;
+  request.plate = &plate;
+  const auto begun = light.begin(request);
+  ASSERT_NE(begun, nullptr);
+  EXPECT_EQ(light.at(request).environment, begun);
 }
 
 // Who would never be seen.
