@@ -126,6 +126,7 @@ class Show::Stages {
     }
     recording_.stop();
     inputs.wait();
+    changing_ = maker_.is_changing();
     publish(true);
     inputs.get();
   }
@@ -246,7 +247,9 @@ class Show::Stages {
         if (std::holds_alternative<Quit>(command)) return false;
         apply(command, work);
       }
+      changing_ = maker_.is_changing();
       if (!paused_) return true;
+      publish_pause();
     }
   }
 
@@ -385,11 +388,27 @@ class Show::Stages {
   }
 
   void publish(bool finished) {
+    const std::lock_guard publishing(publishing_);
     ShowStatus& status = tally_.status();
     status.finished = finished;
-    status.paused = paused_;
     status.recording = recording_.running();
     status.recorder = recording_.status();
+    publish(status);
+  }
+
+  // On either thread.
+
+  // Of a show that stands still: no frame comes that would tell it.
+  void publish_pause() {
+    const std::lock_guard publishing(publishing_);
+    ShowStatus status = *status_.load();
+    publish(status);
+  }
+
+  // While publishing_ is held.
+  void publish(ShowStatus& status) {
+    status.paused = paused_;
+    status.changing = changing_;
     {
       const std::lock_guard lock(mutex_);
       status.notes = notes_;
@@ -397,8 +416,6 @@ class Show::Stages {
     }
     status_.store(std::make_shared<const ShowStatus>(status));
   }
-
-  // On either thread.
 
   // What a command cannot do is noted, and the show goes on.
   template <class Act>
@@ -450,7 +467,9 @@ class Show::Stages {
   std::vector<ShowCommand> commands_;
   std::vector<std::string> notes_;
   std::int64_t noted_ = 0;
+  std::mutex publishing_;  // before mutex_
   std::atomic<bool> paused_ = false;
+  std::atomic<bool> changing_ = false;
   std::atomic<Clock::rep> rendering_ = 0;  // how long the last frame took from hand to hand
   Handover<Work> work_;
   std::atomic<std::shared_ptr<const ShowStatus>> status_;

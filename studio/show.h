@@ -60,7 +60,7 @@ using ShowCommand = std::variant<SetEffort,
                                  ChangeSet,
                                  Quit>;
 
-// How the show stands after a frame.
+// How the show stands after a frame, or after commands of one that is paused.
 struct ShowStatus {
   std::int64_t frames = 0;                    // shown so far
   std::int64_t dropped = 0;                   // left out because the show was late
@@ -91,6 +91,7 @@ struct ShowStatus {
   // What pixels took, by view, in the last frame that had one.
   std::optional<std::array<render::RayViewFigures, render::ray_views>> pixel_figures;
   bool paused = false;
+  bool changing = false;  // an edit is on its way, and not on air yet
   bool recording = false;
   compositing::RecorderStatus recorder;  // of the present or last recording
   bool finished = false;

@@ -201,6 +201,33 @@ TEST_F(ShowTest, EndsWhereItsUserThrowsWhileItIsPaused) {
   EXPECT_THROW(run(), std::runtime_error);
 }
 
+// No frame comes that would tell it.
+TEST_F(ShowTest, TellsThatItIsPausedAndWhatACommandCannotDoThen) {
+  ShowOptions options;
+  options.frames = 100'000;
+  Show show(made_set("grey:1,25,0"), options);
+  bool told = false;
+  std::jthread operating([&] {
+    const auto wait_until = [&](const auto& is_so) {
+      const auto end = std::chrono::steady_clock::now() + 5s;
+      while (!is_so(*show.status()) && std::chrono::steady_clock::now() < end) {
+        std::this_thread::sleep_for(1ms);
+      }
+      return is_so(*show.status());
+    };
+    wait_until([](const ShowStatus& s) { return s.frames > 0; });
+    show.post(SetPaused{true});
+    told = wait_until([](const ShowStatus& s) { return s.paused; });
+    std::this_thread::sleep_for(100ms);  // the last frame is shown by then
+    show.post(MoveObject{"nobody", {}});
+    told = told && wait_until([](const ShowStatus& s) { return !s.notes.empty(); });
+    show.post(Quit{});
+  });
+  show.run();
+  operating.join();
+  EXPECT_TRUE(told);
+}
+
 // Frames that are rendered later see what they were made with.
 TEST_F(ShowTest, ChangesNoLightThatWasHandedOut) {
   FrameMaker maker(made_set("grey:1,25,0"));
