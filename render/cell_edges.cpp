@@ -40,6 +40,11 @@ Vec3f counted(Vec3f v) {
 // ones: so that there are four such batches, or what can be.
 constexpr int batch_of(int aa_samples) { return aa_samples >= 16 ? 4 : aa_samples >= 8 ? 2 : 1; }
 
+// Whether the table has a direction there: of the picture's pixels, and of one more around them.
+bool has_direction(const calibrate::DirectionTable& table, int x, int y) {
+  return x >= -1 && y >= -1 && x <= table.width && y <= table.height;
+}
+
 // By how much the light of two pixels differs, as eyes see it.
 float step_between(Vec3f a, Vec3f b) {
   a = clipped(a), b = clipped(b);
@@ -73,7 +78,7 @@ void CellBaker::trace_ring() {
   const auto& table = *frame_->inputs.directions;
   for (int i = 0; i < around; ++i) {
     const auto [x, y] = pixel_around(i);
-    const bool in = x0_ + x >= 0 && y0_ + y >= 0 && x0_ + x < table.width && y0_ + y < table.height;
+    const bool in = has_direction(table, x0_ + x, y0_ + y);
     const std::size_t t = in ? table.index(y0_ + y, x0_ + x) : 0;
     set_camera_ray(i, in ? Vec3f{table.x[t], table.y[t], table.z[t]} : Vec3f{});
   }
@@ -157,10 +162,9 @@ void CellBaker::find_edges() {
     }
   };
   const auto compare = [&](int x, int y, int dx, int dy) {
-    const auto in = [&](int px, int py) {
-      return px >= 0 && py >= 0 && px < table.width && py < table.height;
-    };
-    if (!in(x0_ + x, y0_ + y) || !in(x0_ + x + dx, y0_ + y + dy)) return;
+    if (!has_direction(table, x0_ + x, y0_ + y) ||
+        !has_direction(table, x0_ + x + dx, y0_ + y + dy))
+      return;
     const Met& a = met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)];
     const Met& b = met_[static_cast<std::size_t>((y + 1 + dy) * ring_size + x + 1 + dx)];
     if (continuous(a, b, frame_->pixel_angle, frame_->camera)) return;
