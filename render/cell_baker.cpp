@@ -196,7 +196,7 @@ void CellBaker::trace_centres() {
 void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::uint32_t slot) {
   const auto i = static_cast<std::size_t>(index);
   const RayStream& s = stream_;
-  p.incoming = {s.dx[i], s.dy[i], s.dz[i]};
+  p.incoming = s.mask[i] != 0 ? Vec3f{s.dx[i], s.dy[i], s.dz[i]} : Vec3f{};
   if (s.geom[i] != RTC_INVALID_GEOMETRY_ID) {
     frame_->inputs.scene->read_hit(s.geom[i], s.prim[i], s.inst[i], s.u[i], s.v[i], p.incoming,
                                    p.hit);
@@ -300,6 +300,10 @@ void CellBaker::run_background(std::span<ShadePoint* const> leaving) {
   }
   frame_->inputs.scene->background().shade(context, leaving);
   for (ShadePoint* p : leaving) {
+    if (p->incoming == Vec3f{}) {  // where the lens sees nothing, what is there stays
+      clear_answer(*p);
+      p->plate_share = {1, 1, 1};
+    }
     light_of_point_[static_cast<std::size_t>(p - points_.data())] = {};
     collect(*p);
     base_[target_of(*p)].seen += mean(p->throughput);

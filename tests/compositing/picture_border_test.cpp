@@ -1,4 +1,4 @@
-// Pixels at the picture's border.
+// Pixels at the picture's border, and those where the lens sees nothing.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -8,6 +8,7 @@
 #include "../render/sun_and_sky.h"
 #include "compositing/stand_in.h"
 #include "render/kernel.h"
+#include "render/reference.h"
 #include "render/standard.h"
 
 namespace compositing::picture_border_test {
@@ -73,6 +74,42 @@ TEST(PictureBorder, IsCoveredAsFarAsThingsReachOverItsPixels) {
       EXPECT_EQ(whole.rgba.pixels, tiles.rgba.pixels) << edge << ", " << quarters;
     }
   }
+}
+
+TEST(PictureBorder, ShowsThePlateWhereTheLensSeesNothing) {
+  register_shaders();
+  render::SceneDescription description = render::make_scene(render::make_sphere(0.3F, 24), {});
+  description.background = "environment";
+  const render::Scene scene(description);
+  render::Environment environment = render::make_even_environment(1, 16);
+  render::smooth_for_reflections(environment);
+  calibrate::Lens lens{"equisolid", side, side, {20, middle, middle}};
+  lens.max_angle_rad = 0.5;
+  const auto directions = calibrate::make_direction_table(lens);
+  capture::Image plate = capture::make_image(side, side);
+  std::ranges::fill(plate.pixels, 0.25F);
+  render::FrameJob job;
+  job.cam_from_set = calibrate::look_at({0, -2, 0}, {0, 0, 0}, 0);
+  job.lights = render::make_light_table(environment, {.count = 4});
+  const render::FrameInputs inputs{&scene, &directions, &environment};
+  render::FrameResult frame;
+  render_frame(inputs, job, capture::to_half(plate), frame);
+  const capture::Image reference = render_reference(inputs, job, plate, {.samples = 16});
+  int blind = 0;
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const std::size_t t = directions.index(y, x);
+      const bool sees = directions.x[t] != 0 || directions.y[t] != 0 || directions.z[t] != 0;
+      const float shown = value_at(frame, x, y, 0);
+      if (sees) continue;
+      ++blind;
+      EXPECT_EQ(shown, 0.25F) << x << ", " << y;
+      EXPECT_EQ(reference.at(y, x, 0), 0.25F) << x << ", " << y;
+      EXPECT_EQ(value_at(frame, x, y, 3), 0) << x << ", " << y;
+    }
+  }
+  EXPECT_GT(blind, side * side / 4);
+  EXPECT_NEAR(value_at(frame, 24, 16, 0), 1, 1e-3F) << "the environment";
 }
 
 }  // namespace
