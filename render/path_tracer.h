@@ -23,7 +23,7 @@ struct PathRules {
   unsigned diffuse_blockers = mask_virtual | mask_real_blocker;  // of the environment and lamps
   unsigned lobe_blockers = mask_virtual;                         // of the environment in the lobes
   bool caustics = false;  // clear bodies bend what dull surfaces get, too: none goes straight on
-  int max_depth = 128;
+  int max_depth = 4096;
 };
 
 // A camera path's end: what it gathered, and what it sees straight on.

@@ -186,6 +186,39 @@ TEST(RenderReference, KeepsAFurnaceWhiteInSolidGlassThatDispersesAndDarkensItWhe
   }
 }
 
+// In two boxes that cross, what is mirrored at their faces finds out only after many times.
+TEST(RenderReference, KeepsAFurnaceWhiteInCrossedBoxesOfGlassThatHoldLightForLong) {
+  const Environment even = make_even_environment(1, 32);
+  const auto directions = make_pinhole_directions(8, 8, 16);
+  FrameJob job;
+  job.cam_from_set = calibrate::look_at({0, -2.6, 0.8}, {0.1, 0, 0.1}, 0);
+  SceneDescription description =
+      make_scene(make_box({-0.5F, -0.5F, -0.5F}, {0.5F, 0.5F, 0.5F}), {});
+  description.background = "environment";
+  description.materials[0] = make_glass_material("glass", {.index = 2.4F});
+  description.instances.push_back(description.instances[0]);
+  // Turned by 40 degrees about an axis that is none of the box's, and moved.
+  const float c = std::cos(0.7F), s = std::sin(0.7F), e = 0.6F, g = 0.8F;
+  description.instances[1].set_from_object = {c + e * e * (1 - c),
+                                              e * g * (1 - c),
+                                              g * s,
+                                              0.2F,
+                                              e * g * (1 - c),
+                                              c + g * g * (1 - c),
+                                              -e * s,
+                                              0.1F,
+                                              -g * s,
+                                              e * s,
+                                              c,
+                                              0.3F};
+  const Scene scene(description);
+  const capture::Image picture = render_reference({&scene, &directions, &even}, job,
+                                                  capture::make_image(8, 8), {.samples = 512});
+  double sum = 0;
+  for (std::size_t at = 0; at < picture.pixels.size(); at += 4) sum += picture.pixels[at] / 64;
+  EXPECT_NEAR(sum, 1, 1e-3);
+}
+
 // The radiance of a map between its texels, in double: bilinear, around the sphere.
 class Bilinear {
  public:
