@@ -1,7 +1,9 @@
 // Video files as cameras.
 #include "capture/video_file.h"
 
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <deque>
 #include <stdexcept>
 #include <utility>
@@ -10,11 +12,13 @@
 #include "capture/pool.h"
 #include "capture/sound_decoder.h"
 #include "capture/stamp_clock.h"
+#include "capture/turn.h"
 #include "capture/video_decoder.h"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libavutil/frame.h>
 }
 
 namespace capture {
@@ -47,6 +51,22 @@ Rational rate_of(const AVStream& stream) {
   return rational(counted.num > 0 ? counted : average);
 }
 
+// As the frame or else its stream says.
+std::optional<Turn> turn_of(const AVFrame& frame, const AVStream& stream) {
+  const std::uint8_t* bytes = nullptr;
+  std::size_t size = 0;
+  if (const AVFrameSideData* its = av_frame_get_side_data(&frame, AV_FRAME_DATA_DISPLAYMATRIX)) {
+    bytes = its->data;
+    size = its->size;
+  } else {
+    bytes = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &size);
+  }
+  std::array<std::int32_t, 9> matrix{};
+  if (bytes == nullptr || size < sizeof matrix) return Turn{};
+  std::memcpy(matrix.data(), bytes, sizeof matrix);
+  return turn_of_matrix(matrix);
+}
+
 class VideoFile : public Camera {
  public:
   VideoFile(const std::string& path, const CameraOptions& options, const LightCurves& curves);
@@ -73,13 +93,15 @@ class VideoFile : public Camera {
   CameraInfo info_;
   int source_width_ = 0;
   int source_height_ = 0;
-  Crop crop_;
+  std::optional<Turn> turn_;  // nothing = one that is not made
+  Crop crop_;                 // of the source's picture, before it is turned
   std::unique_ptr<MediaFile> file_;
   std::unique_ptr<VideoDecoder> decoder_;
   std::unique_ptr<SoundDecoder> sound_;
   std::string sound_note_;
   Lineariser lineariser_;
   Pool<Image> pool_;
+  Image lying_;  // before it is turned
   std::optional<StampClock> clock_;
 
   std::deque<Frame> ahead_;  // made while opening
@@ -142,7 +164,11 @@ VideoFile::VideoFile(const std::string& path,
         libav::check_size(first.width, first.height);
         source_width_ = first.width;
         source_height_ = first.height;
-        crop_ = crop_within(options.crop, source_width_, source_height_);
+        turn_ = turn_of(first, file_->video());
+        const Turn turn = turn_.value_or(Turn{});
+        const auto [width, height] = turned_size(turn, source_width_, source_height_);
+        crop_ = crop_before(turn, crop_within(options.crop, width, height), source_width_,
+                            source_height_);
         Image probe;
         lineariser_.linearise(first, crop_, probe);
       } catch (const std::runtime_error& error) {
@@ -175,21 +201,30 @@ void VideoFile::open() {
 }
 
 void VideoFile::describe(const AVFrame& first) {
-  info_.width = crop_.width;
-  info_.height = crop_.height;
-  info_.whole_width = source_width_;
-  info_.whole_height = source_height_;
+  const Turn turn = turn_.value_or(Turn{});
+  const auto [width, height] = turned_size(turn, crop_.width, crop_.height);
+  const auto [whole_width, whole_height] = turned_size(turn, source_width_, source_height_);
+  info_.width = width;
+  info_.height = height;
+  info_.whole_width = whole_width;
+  info_.whole_height = whole_height;
   // The container's, if it tells one. Not changed, but not const.
   const AVRational told = av_guess_sample_aspect_ratio(&file_->context(), &file_->video(),
                                                        const_cast<AVFrame*>(&first));
   constexpr double most = 16;
   if (told.num > 0 && told.den > 0 && av_q2d(told) <= most && av_q2d(told) >= 1 / most) {
-    info_.pixel_aspect = {told.num, told.den};
+    info_.pixel_aspect =
+        turn.transposed ? Rational{told.den, told.num} : Rational{told.num, told.den};
   }
   info_.description =
       std::string(avcodec_get_name(codec_of(*file_))) + ", " + lineariser_.description();
   if (first.interlaced_frame != 0) {
     info_.description += ", interlaced (taken as it is)";
+  }
+  if (turn.any()) {
+    info_.description += ", " + capture::describe(turn);
+  } else if (!turn_) {
+    info_.description += ", to be turned by no multiple of 90 degrees (taken as it is)";
   }
   if (sound_) {
     info_.sound_channels = sound_->channels();
@@ -278,7 +313,12 @@ void VideoFile::linearise(const DecodedPicture& picture, Frame& frame) {
                                " x " + std::to_string(decoded.height));
     }
     std::shared_ptr<Image> image = pool_.lend();
-    lineariser_.linearise(decoded, crop_, *image);
+    if (turn_ && turn_->any()) {
+      lineariser_.linearise(decoded, crop_, lying_);
+      turn_image(*turn_, lying_, *image);
+    } else {
+      lineariser_.linearise(decoded, crop_, *image);
+    }
     last_image_ = std::move(image);
   } catch (const std::runtime_error& error) {
     // The stream turned into something else: the show goes on with what there was.
