@@ -29,15 +29,15 @@ std::string absolute(std::string_view path, const CameraOptions& options) {
 
 LightCurves curves_of(const CameraOptions& options) {
   if (options.response.empty()) {
-    return {options.colour, std::nullopt, options.mark_saturated};
+    return {options.colour, std::nullopt, options.mark_saturated, options.alpha};
   }
   const auto response =
       std::make_shared<const CameraResponse>(read_response(absolute(options.response, options)));
   const auto curve_of = [&](int channel) -> Curve {
     return [response, channel](double value) { return response->light(channel, value); };
   };
-  return {options.colour, std::array{curve_of(0), curve_of(1), curve_of(2)},
-          options.mark_saturated};
+  return {options.colour, std::array{curve_of(0), curve_of(1), curve_of(2)}, options.mark_saturated,
+          options.alpha};
 }
 
 std::unique_ptr<Camera> open_file(std::string_view rest, const CameraOptions& options) {

@@ -62,6 +62,9 @@ struct CameraOptions {
   // Bayer pictures: colours that were interpolated near saturated sites, and so are darker than the
   // light was, are no values (NaN). For brackets.
   bool mark_saturated = false;
+  // Pictures of files that have alpha come with four channels: scene-linear, premultiplied, alpha 0
+  // to 1; else without it.
+  bool alpha = false;
   bool keep_coded = false;  // live cameras' frames keep the bytes that came
 };
 

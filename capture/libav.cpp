@@ -65,12 +65,16 @@ std::string Complaints::take() {
   return std::exchange(last_, {});
 }
 
-CodecContext make_decoder(int codec_id, int threads, Complaints* complaints) {
+CodecContext make_decoder(int codec_id,
+                          int threads,
+                          Complaints* complaints,
+                          const char* preferred) {
   gather_log();
   if (codec_id == AV_CODEC_ID_NONE) {
     throw std::runtime_error("what is in it is of no known kind; is the file whole?");
   }
-  const AVCodec* codec = avcodec_find_decoder(static_cast<AVCodecID>(codec_id));
+  const AVCodec* codec = preferred == nullptr ? nullptr : avcodec_find_decoder_by_name(preferred);
+  if (codec == nullptr) codec = avcodec_find_decoder(static_cast<AVCodecID>(codec_id));
   if (codec == nullptr) {
     throw std::runtime_error(std::string("this libavcodec has no decoder for ") +
                              avcodec_get_name(static_cast<AVCodecID>(codec_id)) +

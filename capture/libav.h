@@ -56,9 +56,13 @@ class Complaints {
 };
 
 // A decoder that is not yet open: `threads` of them at most, sizes bounded. Its complaints go to
-// `complaints`, if any, which must outlive it. Throws std::runtime_error, without a file name, if
+// `complaints`, if any, which must outlive it. `preferred`: the name of the one to take if libav
+// has it, null = its first. Throws std::runtime_error, without a file name, if
 // libav has none for it.
-CodecContext make_decoder(int codec_id, int threads, Complaints* complaints);
+CodecContext make_decoder(int codec_id,
+                          int threads,
+                          Complaints* complaints,
+                          const char* preferred = nullptr);
 
 // From now on libav writes nothing to stderr; its complaints in each thread are kept for
 // `reason`. Cheap to call again.

@@ -33,9 +33,16 @@ bool is_radiance(const std::string& path) {
   return ending == ".hdr" || ending == ".pic";
 }
 
-// Grey is repeated, alpha left out.
-Image as_colour(Image image) {
+// Grey is repeated; alpha is limited to 0..1, no number being 0, or left out.
+Image as_colour(Image image, bool alpha) {
   if (image.channels == 3) {
+    return image;
+  }
+  if (alpha && image.channels == 4) {
+    for (std::size_t i = 3; i < image.pixels.size(); i += 4) {
+      float& its = image.pixels[i];
+      its = its > 0 ? std::min(its, 1.0F) : 0.0F;
+    }
     return image;
   }
   Image colour = make_image(image.height, image.width);
@@ -61,11 +68,13 @@ void cut(Image& image, const Crop& crop) {
   image = std::move(part);
 }
 
-// Reads any picture file as three channels of light: OpenEXR and Radiance pictures, by their
-// endings (.exr, .hdr, .pic), are light already; other stills and recorded pictures become it.
+// Reads any picture file as three channels of light, or four where alpha is asked for: OpenEXR and
+// Radiance pictures, by their endings (.exr, .hdr, .pic), are light already; other stills and
+// recorded pictures become it.
 class PictureReader {
  public:
-  explicit PictureReader(const LightCurves& curves) : stills_(curves), coded_(curves) {}
+  explicit PictureReader(const LightCurves& curves)
+      : stills_(curves), coded_(curves), alpha_(curves.alpha) {}
 
   // Into `image` as it is if it has the size. Returns the description. Throws std::runtime_error
   // with path, reason and what to do.
@@ -73,13 +82,15 @@ class PictureReader {
     if (is_coded_file(path)) return coded_.read(path, image);
     if (!is_exr(path) && !is_radiance(path)) return read_still(path, stills_, image);
     check_is_file(path);
-    image = as_colour(is_exr(path) ? read_exr(path) : read_rgbe(path));
-    return is_exr(path) ? "OpenEXR, linear" : "Radiance, linear";
+    image = as_colour(is_exr(path) ? read_exr(path) : read_rgbe(path), alpha_);
+    const std::string words = is_exr(path) ? "OpenEXR, linear" : "Radiance, linear";
+    return image.channels == 4 ? words + ", alpha" : words;
   }
 
  private:
   Lineariser stills_;
   CodedFileReader coded_;
+  bool alpha_;
 };
 
 class PictureCamera : public Camera {

@@ -32,7 +32,7 @@ Still8 decode_still8(std::span<const std::byte> file_bytes, const std::string& n
 
 // A still as light.
 struct Still {
-  Image image;              // scene-linear, (height, width, 3)
+  Image image;              // scene-linear, (height, width, 3), or 4 with alpha: see LightCurves
   std::string description;  // for people: format, colour tags and how they were read
 };
 
@@ -40,8 +40,8 @@ struct Still {
 // TGA by its name. A single file of Motion JPEG by its name is none.
 bool is_still(const std::string& path);
 
-// Reads a still file; its codes become light by `curves`, as colour.md defines it. Alpha is not
-// read. Throws std::runtime_error with path, reason and what to do.
+// Reads a still file; its codes become light by `curves`, as colour.md defines it. Throws
+// std::runtime_error with path, reason and what to do.
 Still read_still(const std::string& path, const LightCurves& curves);
 // The same for many, which keeps tables between them: into `image`, used again if it has the size.
 // Returns the description.

@@ -2,6 +2,7 @@
 #include "capture/video_decoder.h"
 
 #include <stdexcept>
+#include <string_view>
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -19,15 +20,25 @@ constexpr std::size_t max_awaited = 48;
 // A decoder that reports so many errors without taking a packet will not go on.
 constexpr int max_stalled = 16;
 
+// Matroska has the alpha of VP8 and VP9 as a second stream beside each packet, which libav's own
+// decoders pass over.
+const char* decoder_with_alpha(const AVStream& stream) {
+  const AVDictionaryEntry* mode = av_dict_get(stream.metadata, "alpha_mode", nullptr, 0);
+  if (mode == nullptr || std::string_view(mode->value) != "1") return nullptr;
+  if (stream.codecpar->codec_id == AV_CODEC_ID_VP8) return "libvpx";
+  return stream.codecpar->codec_id == AV_CODEC_ID_VP9 ? "libvpx-vp9" : nullptr;
+}
+
 }  // namespace
 
-VideoDecoder::VideoDecoder(MediaFile& file) : file_(file), frame_(libav::make_frame()) {
+VideoDecoder::VideoDecoder(MediaFile& file, bool alpha) : file_(file), frame_(libav::make_frame()) {
   const AVStream& stream = file.video();
   const auto fail = [&](const std::string& why) {
     throw std::runtime_error("cannot open " + file.path() + ": " + why);
   };
   try {
-    context_ = libav::make_decoder(stream.codecpar->codec_id, decoder_threads, &complaints_);
+    context_ = libav::make_decoder(stream.codecpar->codec_id, decoder_threads, &complaints_,
+                                   alpha ? decoder_with_alpha(stream) : nullptr);
     if (stream.codecpar->width > 0 && stream.codecpar->height > 0) {
       libav::check_size(stream.codecpar->width, stream.codecpar->height);
     }

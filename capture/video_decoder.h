@@ -24,8 +24,9 @@ struct DecodedPicture {
 // Decodes the video track of `file`, which must outlive it. At most two threads.
 class VideoDecoder {
  public:
-  // Throws std::runtime_error with path and reason.
-  explicit VideoDecoder(MediaFile& file);
+  // `alpha`: with that of VP8 and VP9, which only some decoders read. Throws std::runtime_error
+  // with path and reason.
+  VideoDecoder(MediaFile& file, bool alpha);
 
   // The next picture in the order of showing; nothing at the end. A packet that the decoder refuses
   // becomes a lost picture in its place; pictures with concealed errors are damaged.

@@ -90,6 +90,7 @@ class VideoFile : public Camera {
   std::string path_;
   bool loop_;
   bool rewinds_ = true;  // to the first picture, as far as is known
+  bool alpha_;
   CameraInfo info_;
   int source_width_ = 0;
   int source_height_ = 0;
@@ -137,6 +138,7 @@ VideoFile::VideoFile(const std::string& path,
                      const LightCurves& curves)
     : path_(path),
       loop_(options.loop),
+      alpha_(options.alpha),
       file_(std::make_unique<MediaFile>(path)),
       lineariser_(curves) {
   open();
@@ -186,7 +188,7 @@ VideoFile::VideoFile(const std::string& path,
 }
 
 void VideoFile::open() {
-  decoder_ = std::make_unique<VideoDecoder>(*file_);
+  decoder_ = std::make_unique<VideoDecoder>(*file_, alpha_);
   const std::unique_ptr<SoundDecoder> before = std::move(sound_);
   if (file_->sound() != nullptr) {
     try {

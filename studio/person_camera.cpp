@@ -75,7 +75,7 @@ compositing::Window window_about(const std::array<float, 4>& outline,
 }
 
 VideoSource video_of(const PersonCamera& s, const std::string& base_dir) {
-  return {s.source, base_dir, s.loop, s.first, s.colour};
+  return {s.source, base_dir, s.loop, s.first, s.colour, !s.key};
 }
 
 FileTimes times_of(const std::optional<KeyChoice>& key) {
@@ -107,6 +107,7 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
   const PersonCamera& s = settings_;
   const VideoSource source = video_of(s, options.base_dir);
   try {
+    opened_ = before ? before->opened_ : source;
     source_ = before ? before->source_
                      : std::make_shared<TimedSource>(source, options.start, options.live);
     const capture::CameraInfo& info = source_->info();
@@ -154,7 +155,12 @@ bool PersonCameraFeed::serves(const PersonCamera& settings, const Options& optio
 }
 
 bool PersonCameraFeed::has_source_of(const PersonCamera& settings) const {
-  return video_of(settings, options_.base_dir) == video_of(settings_, options_.base_dir);
+  VideoSource asked = video_of(settings, options_.base_dir);
+  // Of what has no alpha, devices as well, it does not matter whether it was asked for.
+  const auto& first = source_->first().image;
+  const bool has_none = opened_.alpha && first && first->channels != 4;
+  if (has_none || source_->info().live) asked.alpha = opened_.alpha;
+  return asked == opened_;
 }
 
 void PersonCameraFeed::advance(capture::Time time) {
@@ -179,6 +185,7 @@ void PersonCameraFeed::key_frame() {
   if (!keyer_) {
     texture->take(image);
     if (image.channels == 4) return show_keyed(texture);
+    feet_ = {}, has_matte_ = false, outline_.reset();
     picture_ = std::make_shared<compositing::KeyedPicture>(texture, options_.bounded);
     return;
   }
@@ -200,8 +207,10 @@ void PersonCameraFeed::key_frame() {
 }
 
 void PersonCameraFeed::show_keyed(std::shared_ptr<const compositing::KeyedTexture> texture) {
-  look_for_person(texture->frame());
-  window_ = settings_.lens ? compositing::Window() : window_about(outline(), whole());
+  // A video's own alpha is no noise: all of it is shown.
+  const bool cut = keyer_ && !settings_.lens;
+  if (cut || settings_.lens) look_for_person(texture->frame());
+  window_ = cut ? window_about(outline(), whole()) : compositing::Window();
   picture_ = see_through(
       window_, std::make_shared<compositing::KeyedPicture>(std::move(texture), options_.bounded));
 }

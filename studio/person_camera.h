@@ -89,6 +89,7 @@ class PersonCameraFeed {
   Options options_;
   FileTimes times_;  // of plate and masks, when they were read
   bool by_texel_ = false;
+  VideoSource opened_;  // as source_ was
   std::shared_ptr<TimedSource> source_;
   std::optional<compositing::Keyer> keyer_;
   float aspect_ = 1;

@@ -21,6 +21,7 @@ std::unique_ptr<capture::Camera> open_video(const VideoSource& source) {
   options.colour.transfer = source.colour;
   options.loop = source.loop;
   options.base_dir = source.base_dir;
+  options.alpha = source.alpha;
   if (source.first > 0) options.frame = source.first;
   return capture::open_camera(source.uri, options);
 }

@@ -17,6 +17,7 @@ struct VideoSource {
   bool loop = false;
   std::int64_t first = 0;  // frame that it begins with
   capture::Transfer colour = capture::Transfer::rec1886;
+  bool alpha = false;  // as capture::CameraOptions
   friend bool operator==(const VideoSource&, const VideoSource&) = default;
 };
 

@@ -243,6 +243,8 @@ TEST_F(SetChangeTest, AnEndedVideoKeepsItsLastPicture) {
   EXPECT_EQ(shown_number(maker.make(10).value()), 2);
   maker.change_set(edits.back());  // keyed now: nothing of it is green
   EXPECT_EQ(shown_number(maker.make(11).value()), 2);
+  maker.change_set(edits.front());
+  EXPECT_EQ(shown_number(maker.make(12).value()), 2);
   EXPECT_EQ(opened, 1);
 }
 
