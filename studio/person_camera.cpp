@@ -122,7 +122,7 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
           "the video has no alpha: a person who is found by its feet, or shown as a hull, needs a "
           "key");
     }
-    aspect_ = static_cast<float>(info.width) / static_cast<float>(info.height);
+    aspect_ = static_cast<float>(info.width * info.pixel_aspect.value() / info.height);
     period_ = capture::time_of_frame(1, info.rate.num > 0 ? info.rate : rate_of_unknown);
   } catch (const std::exception& error) {
     faults.add(s.place, error.what());

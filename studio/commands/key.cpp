@@ -166,6 +166,7 @@ void key_clip(const KeyOptions& options, Console& console) {
   compositing::ExrSequenceSettings take;
   take.dir = options.out;
   take.rate = camera->info().rate.num > 0 ? camera->info().rate : capture::Rational{25, 1};
+  take.pixel_aspect = camera->info().pixel_aspect;
   const std::int64_t before = compositing::ExrSequence::frames_in(options.out);
   const compositing::ExrSequence sequence(take);
   compositing::KeyedFrame frame_keyed;

@@ -342,6 +342,13 @@ TEST_F(VideoFile, RefusesCurvesOfHighDynamicRange) {
   expect_refusal(clip, "smpte2084");
 }
 
+TEST_F(VideoFile, TellsThePixelAspectAsTheContainerDoes) {
+  for (const auto& [name, codec] : {std::pair{"a.mkv", "-c:v ffv1"}, {"a.mp4", "-c:v libx264"}}) {
+    const auto camera = open_camera(make_clip(name, std::string("-vf setsar=2 ") + codec));
+    EXPECT_EQ(camera->info().pixel_aspect, (Rational{2, 1})) << name;
+  }
+}
+
 TEST_F(VideoFile, TakesLinearVideoAsLinear) {
   const std::string clip = make_clip("linear.mkv", "-c:v ffv1 -pix_fmt gbrp -color_trc linear");
   const auto raw = independent::raw_planes(clip, "gbrp", directory_);

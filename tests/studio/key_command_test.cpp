@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "capture/png.h"
 #include "compositing/made_clip.h"
 #include "studio/clean_plates.h"
+#include "tests/independent_plate.h"
 #include "tests/studio/command_line.h"
 
 namespace studio::key_command_test {
@@ -219,6 +221,23 @@ TEST_F(KeyCommand, JudgesAClipByWhatItBeginsWith) {
       run("key " + in("late_%04d.png") + " --colour sRGB --first 500 -o " + in("keyed"));
   EXPECT_EQ(keyed.status, 0) << keyed.err;
   EXPECT_THAT(keyed.out, HasSubstr("4 frames before a green screen"));
+}
+
+TEST_F(KeyCommand, WritesTheClipsPixelAspect) {
+  run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr"));
+  independent::ffmpeg("-i '" + in("take_%04d.png") + "' -vf setsar=2 -c:v ffv1 '" + in("wide.mkv") +
+                      "'");
+  const Outcome keyed = run("key " + in("wide.mkv") + " --colour sRGB --frames 1 --plate " +
+                            in("plate.exr") + " -o " + in("keyed"));
+  ASSERT_EQ(keyed.status, 0) << keyed.err;
+  const std::string file = content_of(dir_ / "keyed" / "frame.000000.exr");
+  using namespace std::string_literals;
+  const std::string attribute = "pixelAspectRatio\0float\0\4\0\0\0"s;
+  const std::size_t at = file.find(attribute);
+  ASSERT_NE(at, std::string::npos);
+  float aspect = 0;
+  std::memcpy(&aspect, &file[at + attribute.size()], sizeof aspect);
+  EXPECT_EQ(aspect, 2);
 }
 
 TEST_F(KeyCommand, KeepsToMasks) {

@@ -1,4 +1,4 @@
-// Persons whose videos have alpha of their own.
+// Persons whose videos have alpha of their own, and videos whose pixels are not square.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -65,6 +65,14 @@ class CutOut final : public capture::Camera {
   std::int64_t number_ = 0;
 };
 
+// White frames whose pixels are as wide as the number says.
+class WideCamera final : public GreyCamera {
+ public:
+  explicit WideCamera(capture::Rational aspect) : GreyCamera(100, {25, 1}, 0) {
+    info_.pixel_aspect = aspect;
+  }
+};
+
 class PersonAlpha : public MadeShowTest {
  protected:
   static void SetUpTestSuite() {
@@ -73,6 +81,9 @@ class PersonAlpha : public MadeShowTest {
                              [](std::string_view, const capture::CameraOptions& options) {
                                return std::make_unique<CutOut>(options.alpha);
                              });
+    capture::register_camera("wide", [](std::string_view rest, const capture::CameraOptions&) {
+      return std::make_unique<WideCamera>(capture::Rational{std::stol(std::string(rest)), 1});
+    });
   }
   // The show's first picture of one frame.
   capture::Image picture_with(const std::string& section) const {
@@ -154,6 +165,26 @@ TEST_F(PersonAlpha, TellsTheFeetWithoutAKey) {
   } catch (const SetError& error) {
     EXPECT_THAT(error.what(), HasSubstr("the video has no alpha"));
   }
+}
+
+TEST_F(PersonAlpha, IsAsWideAsItsVideosPixelsSay) {
+  const capture::Image without = picture_with("");
+  const auto columns_of = [&](const std::string& aspect) {
+    const capture::Image picture = picture_with(
+        "[[billboard]]\nposition = [0, -4, 2.2]\nheight = 0.6\ngain = 20\nturn = 0\n"
+        "source = \"wide:" +
+        aspect + "\"\n");
+    int most = 0;
+    for (int y = 0; y < 48; ++y) {
+      int columns = 0;
+      for (int x = 0; x < 64; ++x) columns += picture.at(y, x, 0) > without.at(y, x, 0) + 1;
+      most = std::max(most, columns);
+    }
+    return most;
+  };
+  const int square = columns_of("1"), wide = columns_of("2");
+  EXPECT_GE(square, 8);
+  EXPECT_NEAR(wide, 2 * square, 2);
 }
 
 }  // namespace
