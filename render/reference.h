@@ -9,7 +9,7 @@
 namespace render {
 
 struct ReferenceSettings {
-  int samples = 1024;   // paths per pixel in the mean: noisy pixels get more, from 32 on
+  int samples = 1024;  // paths per pixel in the mean: noisy pixels get more, from 32 on
   // Then Russian roulette has long ended paths, but for those that clear bodies mirror inside: two
   // crossed boxes of index 2.4 hold one in a hundred for more than 128 crossings.
   int max_depth = 4096;
