@@ -57,6 +57,7 @@ class CellBaker final : public RaySink {
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;
+    Vec3f sees;            // where it looks for the environment: elsewhere in rough lobes
     Spread spread, steps;  // across the sample's cone: of directions, of where it begins
     float roughness;
     std::uint32_t pixel, slot;

@@ -42,7 +42,7 @@ void CellBaker::meet_surroundings(const QueuedRay& ray, std::size_t i) {
       scene.shader_of(material).lets_light_through(scene.description().materials[material]);
   const std::size_t target = target_of(ray);
   if (open || !(transport_->receiving[ray.pixel / 64] >> (ray.pixel % 64) & 1)) {
-    add_environment(ray.slot, target, ray.direction, ray.roughness, ray.spread, ray.one_of_many,
+    add_environment(ray.slot, target, ray.sees, ray.roughness, ray.spread, ray.one_of_many,
                     ray.throughput);
     return;
   }
@@ -84,7 +84,7 @@ void CellBaker::bounce() {
         if (q.kind == RayKind::bent) {
           leave_bent(q.slot, q.pixel, q.direction, q.spread, q.throughput);
         } else if (q.kind == RayKind::reflection) {
-          add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
+          add_environment(q.slot, target, q.sees, q.roughness, q.spread, q.one_of_many,
                           q.throughput);
         }
         continue;
@@ -96,7 +96,7 @@ void CellBaker::bounce() {
       if (hit && q.beyond_cut && q.kind == RayKind::bent) {
         leave_bent(q.slot, q.pixel, q.direction, q.spread, -q.throughput);
       } else if (hit && (q.kind == RayKind::difference || q.beyond_cut)) {
-        add_environment(q.slot, target, q.direction, q.roughness, q.spread, q.one_of_many,
+        add_environment(q.slot, target, q.sees, q.roughness, q.spread, q.one_of_many,
                         -q.throughput);
       }
       ShadePoint& p =

@@ -34,6 +34,23 @@ constexpr float least_asked = 0.25F;
 // nobody to ask whether they are in sight.
 constexpr float unseen_compact = 1.0F / 64;
 
+// Lobes of a roughness up to the first look along the mirrored direction, from the second on along
+// that of their mean.
+constexpr float leaning_from = 0.2F, leaning_fully = 0.4F;
+
+// Where a lobe about `normal` (unit), which has `middle` as its mirrored direction and sends light
+// to the unit direction `view`, gets its light from in the mean: the more towards the normal the
+// rougher it is and the lower the view, for none of it comes from below the surface. `middle`
+// itself, bit for bit, if it is smooth. To be looked up as a lobe of the same roughness seen
+// head-on. The power is fitted to the means of samples (light.md).
+Vec3f mean_of_lobe(Vec3f middle, Vec3f normal, Vec3f view, float roughness) {
+  if (!(roughness > leaning_from)) return middle;
+  const float cosine = std::clamp(dot(normal, view), 0.0F, 1.0F);
+  const float x = std::min((roughness - leaning_from) / (leaning_fully - leaning_from), 1.0F);
+  const float share = x * x * (3 - 2 * x) * std::pow(roughness, 1.04F + 2.6F * cosine);
+  return normalize(middle + (normal - middle) * share);
+}
+
 // Which of a path's surfaces' rays were followed, as a number.
 std::uint32_t next_path(std::uint32_t path, std::uint32_t number) {
   return (path ^ (number + 1)) * 0x9E3779B1U + (path >> 15);
@@ -144,12 +161,15 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const float least = (1 - effort_.accuracy) * (later ? inside_glass : 1);
   // What little a ray adds is not worth many steps along its cone.
   const bool dim = weight < least;
-  const Spread cone = straight || !dim ? ray.spread : rounded(ray.spread, ray.direction);
+  const Vec3f sees = straight || one_of_many || ray.normal == Vec3f{}
+                         ? ray.direction
+                         : mean_of_lobe(ray.direction, ray.normal, -from.incoming, ray.roughness);
+  const Spread cone = straight || !dim ? ray.spread : rounded(ray.spread, sees);
   const auto chance = [&]() -> float {
     if (deep || many) return 0;
     if (!dim) return 1;
     if (straight) return 0;
-    const Vec3f radiance = planned_radiance(look_up(ray.direction, ray.roughness, cone, false));
+    const Vec3f radiance = planned_radiance(look_up(sees, ray.roughness, cone, false));
     const float brightest = std::max(largest(radiance), frame_->brightest_video);
     if (!effort_.chance_cuts) return weight * brightest < least ? 0.0F : 1.0F;
     return std::min(weight * std::max(brightest, 1.0F) / (surely_followed * least), 1.0F);
@@ -168,7 +188,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     } else if (ray.kind == RayKind::bent) {
       leave_bent(from.slot, from.pixel, ray.direction, cone, ray.throughput);
     } else if (ray.kind == RayKind::reflection) {
-      add_environment(from.slot, target_of(from), ray.direction, ray.roughness, cone, one_of_many,
+      add_environment(from.slot, target_of(from), sees, ray.roughness, cone, one_of_many,
                       ray.throughput);
     }
     if (!(followed > 0) || !(chance_of(from, next_path(from.path, pushed_)) < followed)) return;
@@ -177,7 +197,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     ray.spread = cone;
   }
   ++sent_[from.pixel];
-  queue_.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, from.steps,
+  queue_.push_back({ray.origin, ray.direction, ray.throughput, sees, ray.spread, from.steps,
                     ray.roughness, from.pixel, from.slot, ray.kind,
                     static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps,
                     followed > 0 && followed < 1, false, next_path(from.path, pushed_), media,
