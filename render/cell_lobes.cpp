@@ -108,8 +108,11 @@ bool CellBaker::turn_within_lobe(const ShadePoint& from, std::uint32_t number, N
   if (!(density > 0)) return false;
   const float own_rad = 0.5F * (length(ray.spread.a) + length(ray.spread.b));
   const float share_rad = 2 / std::sqrt(pi_f * density * static_cast<float>(samples_each_));
-  const float width_rad = std::min(calibrate::hypotenuse(own_rad, share_rad), widest_rad);
   const float into = dot(direction, from.hit.geometric_normal);
+  // Not below the surface, from where no light comes.
+  const float above_rad = std::max(2 * std::abs(into), own_rad);
+  const float width_rad =
+      std::min({calibrate::hypotenuse(own_rad, share_rad), above_rad, widest_rad});
   if (into < 0) direction -= from.hit.geometric_normal * (2 * into);
   const Across across(direction);
   ray.direction = direction;

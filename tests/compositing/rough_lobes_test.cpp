@@ -12,7 +12,7 @@ namespace {
 
 // Of a white metal plane under a sky of 1 over a black ground, seen from that elevation: 1 if lobes
 // lost nothing.
-double shown(float roughness, double elevation_deg) {
+double shown(float roughness, double elevation_deg, float glint_contrast = 0.09F) {
   register_shaders();
   render::StandardParameters metal;
   metal.metallic = 1;
@@ -20,12 +20,13 @@ double shown(float roughness, double elevation_deg) {
   render::SceneDescription description = render::make_scene(render::make_square(50), metal);
   description.background = "environment";
   const render::Scene scene(description);
-  const render::Environment sky = made_sky(64, 0, 1);
+  static const render::Environment sky = made_sky(64, 0, 1);
   const auto directions = render::make_pinhole_directions(8, 8, 80);
   const double up = elevation_deg * calibrate::degree;
   render::FrameJob job;
   job.cam_from_set = calibrate::look_at({-2 * std::cos(up), 0, 2 * std::sin(up)}, {0, 0, 0}, 0);
   job.lights = even_lights(64);
+  job.effort.glint_contrast = glint_contrast;
   const auto plate = capture::to_half(capture::make_image(8, 8));
   render::FrameResult frame;
   render_frame({&scene, &directions, &sky}, job, plate, frame);
@@ -43,6 +44,16 @@ TEST(RoughLobes, KeepTheirLightWhereTheGroundIsDark) {
     for (const float roughness : {0.4F, 0.5F, 0.6F, 0.7F, 0.8F, 0.9F}) {
       EXPECT_GT(shown(roughness, elevation_deg), 0.86) << roughness << " " << elevation_deg;
     }
+  }
+}
+
+// The cones of further samples end at the horizon.
+TEST(RoughLobes, KeepTheirLightWherePixelsTakeFurtherSamples) {
+  constexpr float any = 1e-9F;
+  for (const double elevation_deg : {5.0, 10.0, 20.0, 40.0}) {
+    EXPECT_GT(shown(0.3F, elevation_deg, any), 0.97) << elevation_deg;
+    EXPECT_GT(shown(0.5F, elevation_deg, any), 0.955) << elevation_deg;
+    EXPECT_GT(shown(0.7F, elevation_deg, any), 0.93) << elevation_deg;
   }
 }
 
