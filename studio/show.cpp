@@ -112,7 +112,10 @@ class Show::Stages {
     posted_.notify_all();
   }
 
-  std::shared_ptr<const ShowStatus> status() const { return status_.load(); }
+  std::shared_ptr<const ShowStatus> status() const {
+    const std::lock_guard lock(mutex_);
+    return status_;
+  }
 
   void run(const std::function<void(const ShownFrame&)>& on_frame) {
     std::future<void> inputs = std::async(std::launch::async, [this] { make_inputs(); });
@@ -401,7 +404,7 @@ class Show::Stages {
   // Of a show that stands still: no frame comes that would tell it.
   void publish_pause() {
     const std::lock_guard publishing(publishing_);
-    ShowStatus status = *status_.load();
+    ShowStatus status = *this->status();
     publish(status);
   }
 
@@ -414,7 +417,9 @@ class Show::Stages {
       status.notes = notes_;
       status.noted = noted_;
     }
-    status_.store(std::make_shared<const ShowStatus>(status));
+    auto told = std::make_shared<const ShowStatus>(status);
+    const std::lock_guard lock(mutex_);
+    status_.swap(told);
   }
 
   // What a command cannot do is noted, and the show goes on.
@@ -472,7 +477,7 @@ class Show::Stages {
   std::atomic<bool> changing_ = false;
   std::atomic<Clock::rep> rendering_ = 0;  // how long the last frame took from hand to hand
   Handover<Work> work_;
-  std::atomic<std::shared_ptr<const ShowStatus>> status_;
+  std::shared_ptr<const ShowStatus> status_;  // what was published last; by mutex_
 };
 
 void check_show(const Set& set) {

@@ -506,7 +506,7 @@ TEST_F(SetChangeTest, APersonByItsFeetNeedsAMatte) {
 TEST_F(SetChangeTest, LiveCamerasAreOpenedOnceInAShowThatIsEditedAgainAndAgain) {
   const auto set = [&](int edit, const std::string& probe = "") {
     return probe_set("live_sole:0", "match = [1, 1, 1]\nlens = \"latlong\"\n" + probe,
-                     fmt::format("[[billboard]]\nsource = \"grey:100,25,0\"\ncolour = \"linear\"\n"
+                     fmt::format("[[billboard]]\nsource = \"grey:1000,25,0\"\ncolour = \"linear\"\n"
                                  "position = [0, 0, 0]\nheight = {}\n",
                                  2 + edit));
   };
@@ -515,16 +515,15 @@ TEST_F(SetChangeTest, LiveCamerasAreOpenedOnceInAShowThatIsEditedAgainAndAgain) 
   edits.push_back(set(0, "colour = \"sRGB\"\n"));
   ShowOptions options;
   options.live = true;
-  options.frames = 40;
+  options.frames = 500;  // of which so many are shown as it takes to refuse the last edit
   Show show(set(0), options);
-  std::vector<int> numbers;
+  int n = 0, furthest = 0;
   show.run([&](const ShownFrame& shown) {
-    const auto n = static_cast<int>(numbers.size());
-    numbers.push_back(shown_number(shown.prepared));
+    furthest = std::max(furthest, shown_number(shown.prepared));
     if (n % 5 == 4 && n < 35) show.post(ChangeSet{edits[static_cast<std::size_t>(n / 5)]});
+    if (++n > 40 && !show.status()->notes.empty()) show.post(Quit{});
   });
-  EXPECT_TRUE(std::ranges::is_sorted(numbers)) << testing::PrintToString(numbers);
-  EXPECT_THAT(numbers.back(), Gt(30));
+  EXPECT_GT(furthest, 30) << "the person's video goes on";
   EXPECT_EQ(opened, 1);
   EXPECT_THAT(show.status()->notes, ElementsAre(HasSubstr("It is on air")));
 }
