@@ -1,0 +1,254 @@
+// Edits of a set on air, and commands beside them.
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <future>
+#include <iterator>
+#include <mutex>
+#include <stdexcept>
+#include <system_error>
+#include <tuple>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "studio/frame_maker.h"
+#include "studio/set_scene.h"
+#include "studio/show_inputs.h"
+
+namespace studio {
+namespace {
+
+// How long an edit waits for devices that are being closed.
+constexpr std::chrono::seconds patience_for_leaving{10};
+
+}  // namespace
+
+// At once; while an edit is on its way, what cannot be done may be possible with that.
+void FrameMaker::command(Command command) {
+  if (!change_.valid()) return apply(command);
+  try {
+    apply(command);
+  } catch (const std::runtime_error& error) {
+    command.why_not = error.what();
+  } catch (const std::invalid_argument& error) {
+    command.why_not = error.what();
+  }
+  keep(std::move(command));
+}
+
+// In the place of one that asked the same thing of the same edits.
+void FrameMaker::keep(Command command) {
+  const auto asks_the_same = [&](const Command& other) {
+    if (other.what.index() != command.what.index()) return false;
+    if (const auto* move = std::get_if<Move>(&other.what)) {
+      return move->name == std::get<Move>(command.what).name;
+    }
+    const auto* video = std::get_if<VideoChange>(&other.what);
+    return video == nullptr || video->name == std::get<VideoChange>(command.what).name;
+  };
+  const auto since = commands_.begin() + static_cast<std::ptrdiff_t>(of_next_change_);
+  commands_.erase(std::remove_if(since, commands_.end(), asks_the_same), commands_.end());
+  commands_.push_back(std::move(command));
+}
+
+void FrameMaker::apply(const Command& command, const VideoFeed* videos_before) {
+  if (const auto* effort = std::get_if<render::Effort>(&command.what)) {
+    set_.effort = *effort;
+  } else if (const auto* move = std::get_if<Move>(&command.what)) {
+    apply(*move);
+  } else {
+    const auto& [name, uri] = std::get<VideoChange>(command.what);
+    leaving_.let_go(videos_->change_source(name, uri, videos_before));
+    const auto video = std::ranges::find(set_.videos, name, &VideoSettings::name);
+    if (video != set_.videos.end()) video->source = uri;
+  }
+}
+
+void FrameMaker::apply(const Move& move) {
+  const auto& [name, pose] = move;
+  const auto index_of = [&](std::string_view wanted) {
+    const auto found = std::ranges::find(set_.objects, wanted, &ObjectSettings::name);
+    return static_cast<std::size_t>(found - set_.objects.begin());
+  };
+  const std::size_t slash = name.find('/');
+  if (const std::size_t whole = index_of(name); whole < set_.objects.size()) {
+    set_.objects[whole].pose = pose;
+    place_object(set_, whole, set_scene_);
+  } else if (const std::size_t of_part = index_of(std::string_view(name).substr(0, slash));
+             slash != std::string::npos && of_part < set_.objects.size()) {
+    move_parts(set_, of_part, std::string_view(name).substr(slash + 1), pose, set_scene_);
+  } else {
+    throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
+  }
+  videos_->place(set_, set_scene_);
+  renew_scene(scene_->pictures());
+}
+
+// For the edit that is on air now, which they came after.
+void FrameMaker::repeat_commands(const VideoFeed& videos_before) {
+  for (Command& command : commands_) {
+    command.why_not.clear();
+    try {
+      apply(command, &videos_before);
+    } catch (const std::runtime_error& error) {
+      command.why_not = error.what();
+    } catch (const std::invalid_argument& error) {
+      command.why_not = error.what();
+    }
+  }
+}
+
+// Those of the edit that was on its way. What the next one may make possible is no fault yet.
+void FrameMaker::forget_commands() {
+  const auto end = next_change_ ? commands_.begin() + static_cast<std::ptrdiff_t>(of_next_change_)
+                                : commands_.end();
+  for (auto command = commands_.begin(); command != end; ++command) {
+    if (!command->why_not.empty()) notes_.push_back(std::move(command->why_not));
+  }
+  commands_.erase(commands_.begin(), end);
+  of_next_change_ = 0;
+}
+
+// A device may be held still by what edits before let go of.
+template <class Open>
+void FrameMaker::open_once_left(const Open& open) const {
+  try {
+    return open();
+  } catch (const std::runtime_error&) {
+    if (!leaving_.wait(patience_for_leaving)) throw;
+  }
+  open();
+}
+
+FrameMaker::Change FrameMaker::prepare(Set set,
+                                       std::uint64_t scene_version,
+                                       const VideoFeed& videos) const {
+  const bool live = plate_->is_live();
+  Change change;
+  open_once_left([&] {
+    change.persons = std::make_unique<PersonFeed>(set, std::nullopt, live, persons_.get());
+    change.videos = std::make_unique<VideoFeed>(set, std::nullopt, live, &videos);
+  });
+  change.track = track_of(set);
+  change.directions = directions_of(set);
+  change.lens = std::make_shared<calibrate::Lens>(lens_of(set));
+  change.set_scene = describe_scene(set, &given_up_);
+  change.scene = compile(set, *change.persons, change.set_scene, scene_version);
+  try {
+    change.videos->place(set, change.set_scene);
+  } catch (const std::invalid_argument& error) {
+    throw SetError({{set.path, 0, 0, error.what()}});
+  }
+  // Last, since the frames of a recording go on.
+  if (!light_->serves(set)) {
+    const std::optional<Moment> now = moment();
+    open_once_left([&] {
+      change.light = std::make_unique<LightFeed>(set, light_.get(),
+                                                 now ? std::optional(now->time) : std::nullopt);
+    });
+  }
+  change.set = std::move(set);
+  return change;
+}
+
+// So far that the next frame has no more to do for it than those after.
+void FrameMaker::begin_light(Change& change) const {
+  if (!change.light) return;
+  constexpr int steps = 3;  // each over what the one before took
+  for (int i = 0; i < steps; ++i) {
+    const std::optional<Moment> now = moment();
+    if (!now) return;
+    const PoseSettings& pose = change.set.camera.pose;
+    change.light->begin({now->time, now->plate.get(), change.directions.get(),
+                         pose.track.empty() ? pose.cam_from_set : now->cam_from_set,
+                         now->exposure_s, change.set.effort.light_samples});
+  }
+}
+
+std::optional<FrameMaker::Moment> FrameMaker::moment() const {
+  const std::lock_guard lock(moment_mutex_);
+  return moment_;
+}
+
+void FrameMaker::check_change(const Set& set) const {
+  const bool same_picture = set.show.width == set_.show.width &&
+                            set.show.height == set_.show.height && set.show.fps == set_.show.fps;
+  if (!same_picture) {
+    throw std::invalid_argument("the picture's size and rate cannot change on air: start anew");
+  }
+  if (!same_plate(set, set_)) {
+    throw std::invalid_argument("the plate's source cannot change on air: start anew");
+  }
+}
+
+void FrameMaker::take_over(Change change) {
+  // All that may fail comes before anything is taken over. Begun where the show is: before the
+  // first shape is shown.
+  auto shapes = std::make_unique<ShapeFeed>(change.set, change.set_scene, rate_, std::nullopt,
+                                            live_, shapes_.get());
+  change.persons->take_over();
+  shapes_.swap(shapes);
+  videos_.swap(change.videos);
+  persons_.swap(change.persons);
+  if (change.light) light_.swap(change.light);
+  set_ = std::move(change.set);
+  set_scene_ = std::move(change.set_scene);
+  scene_ = std::move(change.scene);
+  lamps_ = describe_lamps(set_);
+  track_ = std::move(change.track);
+  directions_ = std::move(change.directions);
+  lens_ = std::move(change.lens);
+  repeat_commands(*change.videos);
+  // No frame waits for a camera that stalls or a file that is being read.
+  leaving_.let_go(std::make_tuple(std::move(shapes), std::move(change.videos),
+                                  std::move(change.persons), std::move(change.light)));
+}
+
+void FrameMaker::change_set(Set set) {
+  check_change(set);
+  next_change_.reset();
+  finish_change();
+  take_over(prepare(std::move(set), ++scene_version_, *videos_));
+}
+
+void FrameMaker::change_set_beside(Set set) {
+  check_change(set);
+  if (change_.valid()) {
+    next_change_ = std::move(set);
+    of_next_change_ = commands_.size();
+  } else {
+    begin_change(std::move(set));
+  }
+}
+
+void FrameMaker::begin_change(Set set) {
+  const auto make = [this](Set& changed, std::uint64_t version, VideoFeed& videos) {
+    const VideoFeed on_air = std::move(videos);  // what only it holds by the end is closed here
+    Change change = prepare(std::move(changed), version, on_air);
+    begin_light(change);
+    return change;
+  };
+  try {
+    // A copy of the feed, for its videos may be changed by then.
+    change_ = std::async(std::launch::async,
+                         [make, set = std::move(set), version = ++scene_version_,
+                          videos = *videos_]() mutable { return make(set, version, videos); });
+  } catch (const std::system_error& error) {
+    notes_.emplace_back(error.what());  // no thread can be had
+  }
+}
+
+// Waits for the change that is on its way.
+void FrameMaker::finish_change() {
+  if (!change_.valid()) return;
+  try {
+    take_over(change_.get());
+  } catch (const std::exception& error) {  // whatever it is, what is on air goes on
+    notes_.emplace_back(error.what());
+  }
+  forget_commands();
+  if (next_change_) begin_change(*std::exchange(next_change_, std::nullopt));
+}
+
+}  // namespace studio
