@@ -23,8 +23,6 @@ namespace studio::show_test {
 namespace {
 
 using namespace std::chrono_literals;
-using testing::Contains;
-using testing::ElementsAre;
 using testing::HasSubstr;
 
 using ShowTest = MadeShowTest;
@@ -245,84 +243,6 @@ TEST_F(ShowTest, ChangesNoLightThatWasHandedOut) {
   EXPECT_EQ(first.environment->smoothed.back().pixels, smoothed);
 }
 
-TEST_F(ShowTest, NotesAPlateThatEndsEarly) {
-  ShowOptions options;
-  options.frames = 9;
-  Show show(made_set("grey:4,25,0"), options);
-  show.run();
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("ended after 4 of 9 frames")));
-}
-
-TEST_F(ShowTest, NotesLostFramesOfThePlateOnceInARow) {
-  Show show(made_set("grey:9,25,4"));
-  show.run();
-  const std::vector<std::string> notes = show.status()->notes;
-  EXPECT_EQ(std::ranges::count_if(notes,
-                                  [](const std::string& note) {
-                                    return note.find("the plate's frame") != std::string::npos;
-                                  }),
-            2);
-}
-
-TEST_F(ShowTest, NotesThatTheCamerasTrackHasEnded) {
-  std::ofstream(dir_ / "track.csv") << "time_s,px,py,pz,qw,qx,qy,qz\n"
-                                       "0,0,-8,4,0.7,-0.7,0,0\n0.1,0,-8,4,0.7,-0.7,0,0\n";
-  Set set = made_set("grey:9,25,0");
-  set.camera.pose.track = (dir_ / "track.csv").string();
-  Show show(set);
-  show.run();
-  EXPECT_THAT(show.status()->notes, ElementsAre(HasSubstr("no pose at 0.120 s")));
-}
-
-TEST_F(ShowTest, GoesOnRecordingWhereTheNextTakeCannotBe) {
-  ShowOptions options;
-  options.frames = 12;
-  Show show(made_set("grey:1,25,0"), options);
-  RecordSettings good, bad;
-  good.exr = (dir_ / "take").string();
-  bad.exr = good.exr;
-  bad.timecode = "99:00:00:00";
-  RecordSettings no_folder;
-  no_folder.exr = (dir_ / "cube.obj" / "take").string();
-  show.post(StartRecording{good});
-  show.run([&](const ShownFrame& shown) {
-    if (shown.prepared.job.frame == 2) show.post(StartRecording{bad});
-    if (shown.prepared.job.frame == 3) show.post(StartRecording{no_folder});
-  });
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("99:00:00:00")));
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("cube.obj")));
-  EXPECT_EQ(show.status()->recorder.written, 12);
-  // Another show says what is there.
-  Show again(made_set("grey:1,25,0"), options);
-  again.post(StartRecording{good});
-  again.run();
-  EXPECT_THAT(again.status()->notes, Contains(HasSubstr("has 12 frames already")));
-}
-
-TEST_F(ShowTest, RecordsNoTakeOverTheOneThatRuns) {
-  ShowOptions options;
-  options.frames = 8;
-  Show show(made_set("grey:1,25,0"), options);
-  RecordSettings take;
-  take.file = (dir_ / "take.mkv").string();
-  show.post(StartRecording{take});
-  show.run([&](const ShownFrame& shown) {
-    if (shown.prepared.job.frame == 4) show.post(StartRecording{take});
-  });
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("take.mkv is what is recorded to")));
-  EXPECT_EQ(show.status()->recorder.written, 8);
-}
-
-// What is told of every frame does not hide what is told once.
-TEST_F(ShowTest, KeepsNotesOfEveryKind) {
-  Show show(
-      made_set("grey:60,25,2",
-               "[[billboard]]\nsource = \"grey:3,25,0\"\nheight = 2\nposition = [0, 0, 0]\n"));
-  show.run();
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("has ended")));
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("the plate's frame")));
-}
-
 TEST_F(ShowTest, TakesThePlatesExposureFromItsSetWhereNoneIsTold) {
   Set set = made_set("grey:2,25,0");
   ASSERT_TRUE(set.probe);
@@ -454,24 +374,6 @@ TEST_F(ShowTest, DragsTheBulbOutOfTheHeadlight) {
   EXPECT_EQ(triangle_count(maker.make(4)->scene->description()), 800000U);
 }
 
-TEST_F(ShowTest, NotesWhatACommandCannotDoAndGoesOn) {
-  ShowOptions options;
-  options.frames = 5;
-  Show show(made_set("grey:1,25,0"), options);
-  show.post(MoveObject{"no such thing", {}});
-  RecordSettings record;
-  record.file = "/proc/nowhere/take.mkv";
-  show.post(StartRecording{record});
-  Set smaller = made_set("grey:1,25,0");
-  smaller.show.width = 32;
-  show.post(ChangeSet{smaller});
-  show.run();
-  EXPECT_EQ(show.status()->frames, 5);
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("no such thing")));
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("/proc/nowhere")));
-  EXPECT_THAT(show.status()->notes, Contains(HasSubstr("size and rate")));
-}
-
 // All that moves is where it would have been: the plate, persons and videos.
 TEST_F(ShowTest, BeginsWithAnyFrame) {
   const Set set = made_set("grey:20,25,0",
@@ -512,22 +414,6 @@ TEST_F(ShowTest, TakesAChangedSetOver) {
   EXPECT_NE(pictures.front(), empty);
   const capture::Half grey = capture::half_from_float(0.1F);
   for (std::size_t i = 0; i < empty.size(); ++i) ASSERT_EQ(empty[i], i % 4 == 3 ? 0 : grey) << i;
-}
-
-TEST_F(ShowTest, RecordsFromOneFrameToAnother) {
-  ShowOptions options;
-  options.frames = 12;
-  Show show(made_set("grey:1,25,0"), options);
-  RecordSettings record;
-  record.exr = (dir_ / "take").string();
-  show.run([&](const ShownFrame& shown) {
-    if (shown.prepared.job.frame == 2) show.post(StartRecording{record});
-    if (shown.prepared.job.frame == 6) show.post(StopRecording{});
-  });
-  EXPECT_FALSE(show.status()->recording);
-  EXPECT_GE(show.status()->recorder.written, 3);
-  EXPECT_LE(show.status()->recorder.written, 6);
-  EXPECT_EQ(show.status()->recorder.error, "");
 }
 
 TEST_F(ShowTest, ShowsAViewBesideAPictureThatStaysAsItIs) {
