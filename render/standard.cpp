@@ -41,10 +41,11 @@ Vec3f above(Vec3f view, Vec3f normal) {
 }
 
 // What a filtered normal map shows of a surface: the mean of its normals, and how they spread
-// about it, as what GGX's alpha squared grows by.
+// about it, as what GGX's alpha squared grows by and as what a matte ground shows less of light.
 struct MappedNormal {
   Vec3f normal;
   float rougher = 0;
+  float facing = 1;
 };
 
 // The spread of normals whose mean is of length `l`: twice the variance of their slopes, by the
@@ -57,6 +58,13 @@ float spread_of_normals(float l) {
   return squared < 1 ? 2 * (1 - squared) / (l * (3 - squared)) : 0;
 }
 
+// And back, to 1 % down to lengths of .4.
+float length_of_mean(float spread) { return 1 / (1 + spread * (0.5F + 0.39F * spread)); }
+
+// What normals whose mean is of length `l` get of diffuse light, beside what their mean would: l
+// times as much of a light that all of them see, (1 + l) / 2 of half a sky straight above. Halfway.
+float facing_of_normals(float l) { return (1 + 3 * l) / 4; }
+
 MappedNormal mapped_normal(const StandardParameters& parameters,
                            const SceneDescription& scene,
                            const HitPoint& hit,
@@ -66,18 +74,21 @@ MappedNormal mapped_normal(const StandardParameters& parameters,
   if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return {hit.normal};
   const auto in_tangents = [&](const UvFootprint& over) {
     const auto texel = sample(*map, hit.u, hit.v, over, filter);
-    return Vec3f{(2 * texel[0] - 1) * parameters.normal_scale,
-                 (2 * texel[1] - 1) * parameters.normal_scale, 2 * texel[2] - 1};
+    return Vec3f{2 * texel[0] - 1, 2 * texel[1] - 1, 2 * texel[2] - 1};
   };
   const Vec3f mean = in_tangents(footprint);
-  const float l = length(mean);
   const Vec3f tangent = normalize(hit.tangent - hit.normal * dot(hit.normal, hit.tangent));
   const Vec3f bitangent = cross(hit.normal, tangent) * hit.handedness;
-  const Vec3f normal = tangent * mean.x + bitangent * mean.y + hit.normal * mean.z;
+  const float scale = parameters.normal_scale;
+  const Vec3f normal = (tangent * mean.x + bitangent * mean.y) * scale + hit.normal * mean.z;
+  const float l = length(normal);
   if (!(l > 1e-6F) || !(dot(normal, hit.normal) > 0)) return {hit.normal};
   MappedNormal mapped{normal / l};
+  if (footprint == UvFootprint{}) return mapped;
   // Beside the map's own texels, whose eight bits are no unit vectors either.
-  if (footprint != UvFootprint{}) mapped.rougher = spread_of_normals(l / length(in_tangents({})));
+  const float of_map = length(mean) / length(in_tangents({}));
+  mapped.rougher = scale * scale * spread_of_normals(of_map);
+  if (mapped.rougher > 0) mapped.facing = facing_of_normals(length_of_mean(mapped.rougher));
   return mapped;
 }
 
@@ -161,6 +172,7 @@ StandardSurface standard_surface(const StandardParameters& parameters,
   }
   const MappedNormal mapped = mapped_normal(parameters, scene, hit, area, filter);
   surface.normal = mapped.normal;
+  surface.facing = mapped.facing;
   if (mapped.rougher > 0) {
     const float alpha = surface.roughness * surface.roughness;
     surface.roughness = std::sqrt(std::min(std::sqrt(alpha * alpha + mapped.rougher), 1.0F));

@@ -4,7 +4,7 @@
 // n.v), F = lerp(Fd, Schlick(base, n.v), metallic):
 //   coat         reflects Fc, in a lobe of coat_roughness
 //   specular     reflects (1 - Fc) F, in a lobe of roughness
-//   diffuse      (1 - Fc)(1 - metallic)(1 - Fd)(1 - transmission) base / pi
+//   diffuse      (1 - Fc)(1 - metallic)(1 - Fd)(1 - transmission) base facing / pi
 //   transmission (1 - Fc)(1 - metallic)(1 - Fd) transmission * base, straight through (thin wall)
 //   emission     added
 // The lobes are GGX's distribution of visible normals (Heitz, "Sampling the GGX Distribution of
@@ -68,6 +68,8 @@ struct StandardSurface {
   Vec3f coat_normal;  // without it: the coat is smooth over a rough ground
   float alpha;        // below alpha_cutoff = hole
   float specular = 1;
+  float facing =
+      1;  // of diffuse light, what the normals within the footprint get beside their mean
 };
 
 struct HitPoint;          // scene.h
@@ -113,9 +115,10 @@ inline StandardWeights standard_weights(const StandardSurface& surface, Vec3f vi
   const float dielectric = 1 - surface.metallic;
   const float sheen = surface.specular * schlick(0.04F, cosine);
   const float below = under * dielectric * (1 - sheen);
+  const float matte = below * (1 - surface.transmission) * surface.facing;
   const auto channel = [&](float base, float& specular, float& diffuse, float& transmission) {
     specular = under * (dielectric * sheen + surface.metallic * schlick(base, cosine));
-    diffuse = below * (1 - surface.transmission) * base;
+    diffuse = matte * base;
     transmission = below * surface.transmission * base;
   };
   channel(surface.base.x, weights.specular.x, weights.diffuse.x, weights.transmission.x);

@@ -264,5 +264,28 @@ TEST(StandardSurface, IsRougherTheMoreNormalsAFootprintHolds) {
   EXPECT_NEAR(standard_surface(parameters, flat, hit_at(0.25F), square(4)).roughness, 0.1, 1e-4);
 }
 
+TEST(StandardSurface, ShowsLessDiffuseLightTheMoreNormalsAFootprintHolds) {
+  // Slopes of .75 to both sides: a mean normal of length .8.
+  const SceneDescription scene = scene_with_texture({51, 128, 230}, {204, 128, 230});
+  const auto facing = [&](float width_m, float scale) {
+    StandardParameters parameters;
+    parameters.normal_texture = 0;
+    parameters.normal_scale = scale;
+    const render::Spread square{{width_m, 0, 0}, {0, width_m, 0}};
+    const StandardSurface surface = standard_surface(parameters, scene, hit_at(0.25F), square);
+    const float white = render::standard_weights(surface, {0, 0, 1}).diffuse.x;
+    StandardSurface flat = surface;
+    flat.facing = 1;
+    EXPECT_NEAR(white, surface.facing * render::standard_weights(flat, {0, 0, 1}).diffuse.x, 1e-6);
+    return surface.facing;
+  };
+  EXPECT_EQ(facing(0, 1), 1);
+  // A sun straight above shows .8 of what a flat surface would, half a sky .9.
+  EXPECT_NEAR(facing(4, 1), 0.85, 0.01);
+  // Half the slopes: a mean of length 1 / hypot(1, .375) = .936.
+  EXPECT_NEAR(facing(4, 0.5F), (1 + 3 * 0.936) / 4, 0.015);
+  EXPECT_EQ(facing(4, 0), 1);
+}
+
 }  // namespace
 }  // namespace render::standard_test
