@@ -44,9 +44,10 @@ struct CleanPlate {
 // frames, sizes differ, or a frame is not (height, width, 3).
 CleanPlate average_plate(std::span<const capture::Image> frames);
 
-// The same from footage in which the person never leaves: for each pixel the median of those frames
-// that show the screen there, and where none does, what surrounds it. `known` tells the share that
-// was seen. `colour` as the footage's most saturated large colour if not given. Frames as above.
+// The same from footage in which the person never leaves: for each pixel the upper quartile of
+// those frames that show the screen there, and where none does, what surrounds it. `known` tells
+// the share that was seen. `colour` as the footage's most saturated large colour if not given.
+// Frames as above.
 CleanPlate plate_from_footage(std::span<const capture::Image> frames);
 CleanPlate plate_from_footage(std::span<const capture::Image> frames, ScreenColour colour);
 

@@ -26,7 +26,7 @@ enum class KeyMethod : std::uint8_t {
 
 // How much is done for a frame.
 enum class KeyEffort : std::uint8_t {
-  // In about a third of the time, with greater errors (quick_pass.h, keying.md). For
+  // In about a third of the time, with greater errors (quick_pass.h, keying_measured.md). For
   // screens of one primary, by the table; others, and follow(), take the full way.
   quick,
   full

@@ -85,7 +85,7 @@ TEST(KeyQuality, HoldsOverAllScenesSeedsAndFrames) {
     EXPECT_LT(ours.error.alpha_mse, peer.error.alpha_mse);
     EXPECT_LT(ours.flicker, peer.flicker);
   }
-  // Scene by scene too, but for those that keying.md names.
+  // Scene by scene too, but for those that keying_measured.md names.
   for (const SceneTrial& trial : trials) {
     for (const KeyScore& peer : {trial.ffmpeg, trial.obs, trial.gstreamer}) {
       EXPECT_LT(trial.ours.error.composite, peer.error.composite) << trial.name;
