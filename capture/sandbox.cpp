@@ -206,8 +206,10 @@ bool SandboxedChild::wait_for(int fd, short event) {
   const auto left =
       std::chrono::ceil<std::chrono::milliseconds>(deadline_ - std::chrono::steady_clock::now());
   if (left.count() <= 0) throw std::runtime_error("it takes too long");
+  if (stop_.stop_requested()) throw std::runtime_error("it is given up");
   pollfd waiting{fd, event, 0};
-  const int ready = poll(&waiting, 1, static_cast<int>(std::min<long>(left.count(), 1000)));
+  const long longest = stop_.stop_possible() ? 20 : 1000;
+  const int ready = poll(&waiting, 1, static_cast<int>(std::min<long>(left.count(), longest)));
   if (ready < 0 && errno != EINTR) {
     throw std::runtime_error("cannot wait for a helper program: " + reason(errno));
   }

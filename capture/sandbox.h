@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cstddef>
 #include <span>
+#include <stop_token>
 #include <string>
+#include <utility>
 
 namespace capture {
 
@@ -44,6 +46,8 @@ class SandboxedChild {
   // Gives the child bytes to read; false if it takes no more. Throws as read.
   bool write(std::span<const std::byte> bytes);
   void allow_more_time(std::chrono::milliseconds time) { deadline_ += time; }
+  // Once a stop is requested, reading, writing and ending() soon throw std::runtime_error.
+  void give_up_on(std::stop_token stop) { stop_ = std::move(stop); }
 
   // Waits for its end, and says in words how it came: empty if it exited with status 0. The peak
   // memory is known afterwards.
@@ -56,6 +60,7 @@ class SandboxedChild {
   void reap();
 
   std::chrono::steady_clock::time_point deadline_;
+  std::stop_token stop_;
   int child_ = -1;      // process id; -1 once reaped
   int input_fd_ = -1;   // where we write; -1 = nowhere
   int output_fd_ = -1;  // where we read

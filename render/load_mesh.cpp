@@ -20,14 +20,16 @@ Material material_of(const RawMaterial& raw) {
   return make_standard_material(raw.name, raw.parameters);
 }
 
-LoadedModel load(const ModelFolder& folder, const LoadOptions& options) {
-  RawModel raw = read_model_confined(folder, options);
+LoadedModel load(const ModelFolder& folder,
+                 const LoadOptions& options,
+                 const std::stop_token& stop) {
+  RawModel raw = read_model_confined(folder, options, stop);
   LoadedModel model;
   for (Mesh& mesh : raw.meshes) {
     model.scene.meshes.push_back(std::make_shared<const Mesh>(std::move(mesh)));
   }
   if (!options.shape_alone) {
-    model.scene.textures = decode_textures(raw, folder);
+    model.scene.textures = decode_textures(raw, folder, stop);
     for (const RawMaterial& material : raw.materials) {
       model.scene.materials.push_back(material_of(material));
     }
@@ -43,7 +45,9 @@ LoadedModel load(const ModelFolder& folder, const LoadOptions& options) {
 
 }  // namespace
 
-LoadedModel load_model(const std::string& path, const LoadOptions& options) {
+LoadedModel load_model(const std::string& path,
+                       const LoadOptions& options,
+                       const std::stop_token& stop) {
   if (!(options.scale > 0) || !std::isfinite(options.scale))
     throw std::invalid_argument(path + ": the scale must be above 0");
   if (!(options.emission_gain >= 0) || !std::isfinite(options.emission_gain))
@@ -53,7 +57,7 @@ LoadedModel load_model(const std::string& path, const LoadOptions& options) {
         path + ": models are read from .gltf, .glb, .obj, .ply, .stl, .fbx and .x3d files");
   const ModelFolder folder(path);
   try {
-    return load(folder, options);
+    return load(folder, options, stop);
   } catch (const std::bad_alloc&) {
     throw std::runtime_error(path + ": not enough memory for it");
   } catch (const std::runtime_error& error) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -60,7 +61,9 @@ struct LoadedModel {
 // there (the nodes are listed). Throws std::runtime_error naming file and reason if the file cannot
 // be read, is damaged, holds no triangles, is too large (64 M triangles, 4 GB of texels),
 // takes its reader more memory or time than a file of its size may, or refers to anything outside
-// its own folder.
-LoadedModel load_model(const std::string& path, const LoadOptions& options = {});
+// its own folder; or, soon, once a stop is requested.
+LoadedModel load_model(const std::string& path,
+                       const LoadOptions& options = {},
+                       const std::stop_token& stop = {});
 
 }  // namespace render

@@ -40,9 +40,9 @@ MeshShape shape_of(const Mesh& mesh, const Placement& placed) {
   return shape;
 }
 
-LoadedModel load_whole(const std::string& path, LoadOptions options) {
+LoadedModel load_whole(const std::string& path, LoadOptions options, const std::stop_token& stop) {
   options.whole = true;
-  LoadedModel model = load_model(path, options);
+  LoadedModel model = load_model(path, options, stop);
   if (model.report.triangles > most_deforming_triangles) {
     throw std::runtime_error(path + ": it has " + std::to_string(model.report.triangles) +
                              " triangles, but a model that deforms at most " +
@@ -69,8 +69,10 @@ void check_same(const Mesh& mesh, const MeshShape& shape, const std::string& par
 
 }  // namespace
 
-LoadedModel load_deforming_model(const std::string& path, const LoadOptions& options) {
-  LoadedModel model = load_whole(path, options);
+LoadedModel load_deforming_model(const std::string& path,
+                                 const LoadOptions& options,
+                                 const std::stop_token& stop) {
+  LoadedModel model = load_whole(path, options, stop);
   std::vector<std::shared_ptr<const Mesh>> meshes;
   for (Instance& instance : model.scene.instances) {
     const Mesh& source = *model.scene.meshes[instance.mesh];
@@ -95,10 +97,11 @@ LoadedModel load_deforming_model(const std::string& path, const LoadOptions& opt
 
 std::vector<MeshShape> load_shape(const std::string& path,
                                   const LoadOptions& options,
-                                  std::span<const DeformingPart> parts) {
+                                  std::span<const DeformingPart> parts,
+                                  const std::stop_token& stop) {
   LoadOptions alone = options;
   alone.shape_alone = true;
-  const SceneDescription scene = load_whole(path, alone).scene;
+  const SceneDescription scene = load_whole(path, alone, stop).scene;
   if (scene.instances.size() != parts.size()) {
     throw std::runtime_error(path + ": it has " + std::to_string(scene.instances.size()) +
                              " parts, but the first file " + std::to_string(parts.size()));

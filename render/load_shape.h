@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,9 @@ inline constexpr std::size_t most_deforming_triangles = 1'000'000;
 //
 // Throws as load_model, and std::runtime_error if there are triangles with positions that are not
 // finite or more than most_deforming_triangles.
-LoadedModel load_deforming_model(const std::string& path, const LoadOptions& options = {});
+LoadedModel load_deforming_model(const std::string& path,
+                                 const LoadOptions& options = {},
+                                 const std::stop_token& stop = {});
 
 // A part of a deforming model, by its name.
 struct DeformingPart {
@@ -42,7 +45,8 @@ struct MeshShape {
 // triangles, or not the normals or tangents that the first file has.
 std::vector<MeshShape> load_shape(const std::string& path,
                                   const LoadOptions& options,
-                                  std::span<const DeformingPart> parts);
+                                  std::span<const DeformingPart> parts,
+                                  const std::stop_token& stop = {});
 
 // The mesh in another shape; the rest of it stays.
 std::shared_ptr<const Mesh> in_shape(const Mesh& mesh, MeshShape shape);

@@ -57,12 +57,13 @@ std::uint64_t bytes_beside(const ModelFolder& folder) {
 
 class Conversation {
  public:
-  Conversation(const ModelFolder& folder, const LoadOptions& options)
+  Conversation(const ModelFolder& folder, const LoadOptions& options, const std::stop_token& stop)
       : folder_(folder),
         input_bytes_(std::min(bytes_beside(folder), most_served)),
         processor_s_(least_s + input_bytes_ / bytes_per_s),
         child_(capture::helper_path("platelight-model"),
                milliseconds(1000 * patience * processor_s_)) {
+    child_.give_up_on(stop);
     const auto request = write_request(folder.model().filename().string(), options);
     const wire::Limits limits{std::min(least_memory + memory_per_byte * input_bytes_, most_memory),
                               processor_s_, request.size()};
@@ -194,8 +195,10 @@ class Conversation {
 
 }  // namespace
 
-RawModel read_model_confined(const ModelFolder& folder, const LoadOptions& options) {
-  return Conversation(folder, options).model();
+RawModel read_model_confined(const ModelFolder& folder,
+                             const LoadOptions& options,
+                             const std::stop_token& stop) {
+  return Conversation(folder, options, stop).model();
 }
 
 }  // namespace render

@@ -126,10 +126,15 @@ class Substitution {
 }  // namespace
 
 std::vector<std::shared_ptr<const Texture>> decode_textures(RawModel& model,
-                                                            const ModelFolder& folder) {
+                                                            const ModelFolder& folder,
+                                                            const std::stop_token& stop) {
   std::vector<Source> sources(model.textures.size());
+  const auto stop_if_given_up = [&] {
+    if (stop.stop_requested()) throw std::runtime_error("it is given up");
+  };
   std::size_t bytes = 0, file_bytes = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
+    stop_if_given_up();
     Source& source = sources[i];
     read(model.textures[i], folder, source);
     const std::size_t claimed = claimed_bytes(model.textures[i], source);
@@ -141,8 +146,10 @@ std::vector<std::shared_ptr<const Texture>> decode_textures(RawModel& model,
       throw std::runtime_error("its textures take more than 4 GB");
   }
   capture::parallel_for(std::size_t{0}, sources.size(), [&](std::size_t i) {
+    if (stop.stop_requested()) return;
     if (sources[i].why.empty() && !sources[i].texture) decode(model.textures[i], sources[i]);
   });
+  stop_if_given_up();
   Substitution substitution(sources);
   for (RawMaterial& material : model.materials) substitution.apply(material);
   std::vector<std::shared_ptr<const Texture>> textures;

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <variant>
 #include <vector>
@@ -78,8 +78,8 @@ class FrameMaker {
                       std::optional<capture::Rational> rate = std::nullopt,
                       bool live = false);
 
-  // Gives up an edit that is on its way, as soon as the model that is being read is there.
-  ~FrameMaker() { given_up_ = true; }
+  // Gives up an edit that is on its way, and the model that is being read for it.
+  ~FrameMaker() { given_up_.request_stop(); }
   FrameMaker(const FrameMaker&) = delete;
   FrameMaker& operator=(const FrameMaker&) = delete;
 
@@ -206,7 +206,7 @@ class FrameMaker {
   std::uint64_t scene_version_ = 0;
   mutable std::mutex moment_mutex_;
   std::optional<Moment> moment_;  // nothing = there was no frame yet
-  std::atomic<bool> given_up_ = false;
+  std::stop_source given_up_;
   Leaving leaving_;                 // of sets before
   std::future<Change> change_;      // on its way
   std::optional<Set> next_change_;  // after that

@@ -133,7 +133,7 @@ FrameMaker::Change FrameMaker::prepare(Set set,
   change.track = track_of(set);
   change.directions = directions_of(set);
   change.lens = std::make_shared<calibrate::Lens>(lens_of(set));
-  change.set_scene = describe_scene(set, &given_up_);
+  change.set_scene = describe_scene(set, given_up_.get_token());
   change.scene = compile(set, *change.persons, change.set_scene, scene_version);
   try {
     change.videos->place(set, change.set_scene);

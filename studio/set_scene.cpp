@@ -49,10 +49,12 @@ SceneDescription scene_of(render::LoadedModel model,
   return std::move(model.scene);
 }
 
-SceneDescription load_file(const ObjectSettings& object, std::vector<std::string>& notes) {
+SceneDescription load_file(const ObjectSettings& object,
+                           std::vector<std::string>& notes,
+                           const std::stop_token& stop) {
   const render::LoadOptions options = load_options(object);
-  return scene_of(object.shapes ? render::load_deforming_model(object.mesh, options)
-                                : render::load_model(object.mesh, options),
+  return scene_of(object.shapes ? render::load_deforming_model(object.mesh, options, stop)
+                                : render::load_model(object.mesh, options, stop),
                   object.mesh, notes);
 }
 
@@ -102,8 +104,10 @@ SceneDescription make_thing(const std::string& made) {
   return parts_of(render::make_tv_room(false), one_of({"table", "table legs"}));  // "desk"
 }
 
-SceneDescription load_object(const ObjectSettings& object, std::vector<std::string>& notes) {
-  if (object.made.empty()) return load_file(object, notes);
+SceneDescription load_object(const ObjectSettings& object,
+                             std::vector<std::string>& notes,
+                             const std::stop_token& stop) {
+  if (object.made.empty()) return load_file(object, notes, stop);
   if (object.made == "car") {
     render::MadeCarSettings car;
     car.head_lamp_gain = car.tail_lamp_gain = static_cast<float>(object.emission_gain);
@@ -164,13 +168,15 @@ render::Material stand_in_material(const StandInSettings& stand_in, const std::s
 void add_stand_in(SceneDescription& scene,
                   const StandInSettings& stand_in,
                   std::size_t number,
-                  std::vector<std::string>& notes) {
+                  std::vector<std::string>& notes,
+                  const std::stop_token& stop) {
   const std::string name = name_of(stand_in, number);
   const auto material = static_cast<std::uint32_t>(scene.materials.size());
   std::vector<Instance> parts;
   if (stand_in.shape == StandInSettings::Shape::mesh) {
     // Its own materials do not matter: the plate shows what it looks like.
-    SceneDescription model = scene_of(render::load_model(stand_in.mesh), stand_in.mesh, notes);
+    SceneDescription model =
+        scene_of(render::load_model(stand_in.mesh, {}, stop), stand_in.mesh, notes);
     for (const auto& mesh : model.meshes) {
       Mesh bare = *mesh;
       bare.materials = {material};
@@ -303,7 +309,7 @@ std::string name_of(const ObjectSettings& object, std::size_t number) {
   return object.name.empty() ? fmt::format("object {}", number) : object.name;
 }
 
-SetScene describe_scene(const Set& set, const std::atomic<bool>* given_up) {
+SetScene describe_scene(const Set& set, const std::stop_token& stop) {
   SetScene result;
   SceneDescription& scene = result.description;
   scene.background = "plate";
@@ -311,7 +317,7 @@ SetScene describe_scene(const Set& set, const std::atomic<bool>* given_up) {
   // A model that several objects show is held once, by the first of them.
   std::map<std::size_t, std::vector<Instance>> loaded;
   const auto stop_if_given_up = [&] {
-    if (given_up != nullptr && *given_up) throw std::runtime_error("the scene is given up");
+    if (stop.stop_requested()) throw std::runtime_error("the scene is given up");
   };
   for (std::size_t i = 0; i < set.objects.size(); ++i) {
     stop_if_given_up();
@@ -321,7 +327,7 @@ SetScene describe_scene(const Set& set, const std::atomic<bool>* given_up) {
       auto found = std::ranges::find_if(
           loaded, [&](const auto& one) { return same_model(set.objects[one.first], object); });
       if (found == loaded.end()) {
-        found = loaded.emplace(i, add_model(scene, load_object(object, result.notes))).first;
+        found = loaded.emplace(i, add_model(scene, load_object(object, result.notes, stop))).first;
         note_missing_shapes(object, name, result.notes);
       }
       place_copies(result, object, i, name, found->second);
@@ -334,7 +340,7 @@ SetScene describe_scene(const Set& set, const std::atomic<bool>* given_up) {
   for (std::size_t i = 0; i < set.stand_ins.size(); ++i) {
     stop_if_given_up();
     try {
-      add_stand_in(scene, set.stand_ins[i], i + 1, result.notes);
+      add_stand_in(scene, set.stand_ins[i], i + 1, result.notes, stop);
     } catch (const std::runtime_error& error) {
       faults.add(set.stand_ins[i].place, error.what());
     }

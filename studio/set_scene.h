@@ -2,9 +2,9 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,9 +52,9 @@ render::LoadOptions load_options(const ObjectSettings& object);
 
 // The scene of a set: first all objects, each part of each copy an instance named "OBJECT/PART",
 // then the stand-ins. Camera rays that meet nothing see the plate. Throws SetError naming every
-// mesh that cannot be loaded, with its place in the set file. Once `given_up` is set, no further
-// model is loaded, and it throws std::runtime_error.
-SetScene describe_scene(const Set& set, const std::atomic<bool>* given_up = nullptr);
+// mesh that cannot be loaded, with its place in the set file. Once a stop is requested, the model
+// that is being read is given up, no further one is read, and it throws std::runtime_error.
+SetScene describe_scene(const Set& set, const std::stop_token& stop = {});
 
 // What was found in a model's file that the set names: by an object or a stand-in.
 struct ModelReport {

@@ -52,10 +52,11 @@ std::shared_ptr<const ReadShape> ShapeReader::wait_for(std::size_t file) {
   return shapes_.at(file);
 }
 
-std::shared_ptr<const ReadShape> ShapeReader::read(std::size_t file) const {
+std::shared_ptr<const ReadShape> ShapeReader::read(std::size_t file,
+                                                   const std::stop_token& stop) const {
   auto result = std::make_shared<ReadShape>();
   try {
-    const auto shapes = render::load_shape(files_[file], options_, parts_);
+    const auto shapes = render::load_shape(files_[file], options_, parts_, stop);
     for (const ShapedMesh& shaped : meshes_) {
       result->meshes.push_back(render::in_shape(*shaped.mesh, shapes[shaped.part]));
     }
@@ -80,7 +81,7 @@ void ShapeReader::run(const std::stop_token& stop) {
     });
     if (!go_on || stop.stop_requested()) return;
     lock.unlock();
-    auto shape = read(file);
+    auto shape = read(file, stop);
     lock.lock();
     shapes_[file] = std::move(shape);
     changed_.notify_all();

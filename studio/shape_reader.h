@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -42,7 +43,7 @@ class ShapeReader {
               std::vector<render::DeformingPart> parts,
               std::vector<ShapedMesh> meshes,
               bool again);
-  // Waits for the file that is being read.
+  // Gives up the file that is being read.
   ~ShapeReader() = default;
   ShapeReader(const ShapeReader&) = delete;
   ShapeReader& operator=(const ShapeReader&) = delete;
@@ -59,7 +60,7 @@ class ShapeReader {
   std::size_t ahead() const { return ahead_; }
 
  private:
-  std::shared_ptr<const ReadShape> read(std::size_t file) const;
+  std::shared_ptr<const ReadShape> read(std::size_t file, const std::stop_token& stop) const;
   void run(const std::stop_token& stop);
 
   std::vector<std::string> files_;

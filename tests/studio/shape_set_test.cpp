@@ -248,6 +248,18 @@ TEST_F(ShapeSetTest, WaitsForNoShapeLiveAndTellsOnceThatTheyAreLate) {
   EXPECT_GE(number_in(anew.description), 3);
 }
 
+TEST_F(ShapeSetTest, GivesUpTheFileThatIsBeingReadWhenItEnds) {
+  if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";
+  const Set set = flag_set("");
+  SetScene scene = describe_scene(set);
+  const Gate gate(dir_);
+  auto feed = std::make_unique<ShapeFeed>(set, scene, pal, capture::Time{0}, true);
+  feed->at(capture::time_of_frame(1, pal), scene);
+  std::future<void> end = std::async(std::launch::async, [&] { feed.reset(); });
+  EXPECT_EQ(end.wait_for(10s), std::future_status::ready);
+  gate.open();
+}
+
 // However often it changes.
 TEST_F(ShapeSetTest, WaitsForNoFileOfTheSetsBefore) {
   if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";

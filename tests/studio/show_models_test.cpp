@@ -82,5 +82,37 @@ TEST_F(ShowModels, GoesOnLiveWhileAModelIsRead) {
               Contains(AllOf(HasSubstr("waiting.obj"), HasSubstr("went wrong"))));
 }
 
+TEST_F(ShowModels, GivesUpAModelThatIsBeingReadWhenItEnds) {
+  if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";
+  // In the place of the models' reader, one that takes its time, and says that it was let.
+  const std::filesystem::path helpers = dir_ / "helpers", begun = dir_ / "begun",
+                              done = dir_ / "done";
+  std::filesystem::create_directory(helpers);
+  std::filesystem::create_symlink(capture::helper_path("platelight-decode"),
+                                  helpers / "platelight-decode");
+  std::ofstream(helpers / "platelight-model")
+      << "#!/bin/sh\n: > " << begun.string() << "\nsleep 5\n: > " << done.string() << "\n";
+  std::filesystem::permissions(helpers / "platelight-model", std::filesystem::perms::owner_all);
+  Set changed = made_set("grey:100000,25,0");
+  ShowOptions options;
+  options.live = true;
+  options.frames = 400;
+  {
+    Show show(changed, options);
+    changed.objects.resize(1);
+    changed.objects[0].made.clear();
+    changed.objects[0].mesh = (dir_ / "waiting.obj").string();
+    std::ofstream(changed.objects[0].mesh) << "v 0 0 0\n";
+    setenv("PLATELIGHT_HELPERS", helpers.c_str(), 1);
+    show.post(ChangeSet{changed});
+    show.run([&](const ShownFrame&) {
+      if (std::filesystem::exists(begun)) show.post(Quit{});
+    });
+  }
+  unsetenv("PLATELIGHT_HELPERS");
+  EXPECT_TRUE(std::filesystem::exists(begun));
+  EXPECT_FALSE(std::filesystem::exists(done));
+}
+
 }  // namespace
 }  // namespace studio::show_models_test
