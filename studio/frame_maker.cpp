@@ -153,9 +153,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
   const auto [number, time] = due;
   PreparedFrame prepared;
   prepared.arrived = Clock::now();
-  if (change_.valid() && change_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-    finish_change();
-  }
+  take_what_is_there();
 
   std::optional<capture::Frame> frame;
   std::vector<VideoFrame> videos;
@@ -177,9 +175,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.sound = plate_->take_sound();
     videos = videos_->at(time);
     prepared.notes = videos_->take_notes();
-    for (auto* notes : {&notes_, &set_scene_.notes}) {
-      std::ranges::move(std::exchange(*notes, {}), std::back_inserter(prepared.notes));
-    }
+    std::ranges::move(take_notes(), std::back_inserter(prepared.notes));
   }
 
   render::FrameJob& job = prepared.job;
@@ -226,6 +222,12 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.lens = lens_;
   }
   return prepared;
+}
+
+std::vector<std::string> FrameMaker::take_notes() {
+  std::vector<std::string> notes = std::exchange(notes_, {});
+  std::ranges::move(std::exchange(set_scene_.notes, {}), std::back_inserter(notes));
+  return notes;
 }
 
 // Tells of the first of frames that are lost in a row.

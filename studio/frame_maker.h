@@ -130,6 +130,11 @@ class FrameMaker {
   void change_set_beside(Set set);
   // Whether an edit is on its way.
   bool is_changing() const { return change_.valid(); }
+  // What the next frame begins with: takes over what is on its way and there by now. For shows that
+  // stand still.
+  void take_what_is_there();
+  // What the next frame would note of edits; it does not then.
+  std::vector<std::string> take_notes();
 
  private:
   // A set that is ready to be taken over.

@@ -239,6 +239,12 @@ void FrameMaker::begin_change(Set set) {
   }
 }
 
+void FrameMaker::take_what_is_there() {
+  if (change_.valid() && change_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    finish_change();
+  }
+}
+
 // Waits for the change that is on its way.
 void FrameMaker::finish_change() {
   if (!change_.valid()) return;

@@ -29,6 +29,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t most_notes = 10;
+// How often a show that stands still looks for an edit that is on its way.
+constexpr std::chrono::milliseconds look_again{20};
 
 template <class... Handlers>
 struct Overloaded : Handlers... {
@@ -233,7 +235,8 @@ class Show::Stages {
     return number;
   }
 
-  // Takes what was posted. Waits while paused. False on Quit.
+  // Takes what was posted. Waits while paused, and takes over what is on its way when it is there.
+  // False on Quit.
   bool apply_commands(Work& work) {
     while (true) {
       std::vector<ShowCommand> commands;
@@ -241,7 +244,12 @@ class Show::Stages {
         std::unique_lock lock(mutex_);
         if (paused_) {
           const Clock::time_point before = Clock::now();
-          posted_.wait(lock, [&] { return !commands_.empty(); });
+          const auto any = [&] { return !commands_.empty(); };
+          if (maker_.is_changing()) {
+            posted_.wait_for(lock, look_again, any);
+          } else {
+            posted_.wait(lock, any);
+          }
           paused_for_ += Clock::now() - before;
         }
         commands = std::exchange(commands_, {});
@@ -249,6 +257,10 @@ class Show::Stages {
       for (ShowCommand& command : commands) {
         if (std::holds_alternative<Quit>(command)) return false;
         apply(command, work);
+      }
+      if (paused_) {
+        maker_.take_what_is_there();
+        for (std::string& what : maker_.take_notes()) note(std::move(what));
       }
       changing_ = maker_.is_changing();
       if (!paused_) return true;

@@ -448,6 +448,39 @@ TEST_F(SetChangeTest, NoFrameWaitsForWhatGoesAndWhatComesBackDoes) {
   EXPECT_EQ(open_now, 0) << "the end waits for all";
 }
 
+// No frame comes that would take it over and tell it.
+TEST_F(SetChangeTest, AnEditThatIsReadyInAPauseIsTakenOverAndToldThen) {
+  ShowOptions options;
+  options.live = true;
+  options.frames = 100'000;
+  Show show(made_set("grey:1,25,0"), options);
+  bool taken = false, told = false;
+  opening.shut();
+  std::jthread operating([&, edit = person_set("late:9"), wrong = person_set("nowhere:")] {
+    const auto wait_until = [&](const auto& is_so) {
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+      while (!is_so(*show.status()) && std::chrono::steady_clock::now() < end) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      return is_so(*show.status());
+    };
+    wait_until([](const ShowStatus& s) { return s.frames > 0; });
+    show.post(SetPaused{true});
+    wait_until([](const ShowStatus& s) { return s.paused; });
+    show.post(ChangeSet{edit});
+    taken = wait_until([](const ShowStatus& s) { return s.changing; });
+    opening.open();
+    taken = taken && wait_until([](const ShowStatus& s) { return !s.changing; });
+    show.post(ChangeSet{wrong});
+    told = wait_until([](const ShowStatus& s) { return !s.notes.empty(); });
+    show.post(Quit{});
+  });
+  show.run();
+  operating.join();
+  EXPECT_TRUE(taken);
+  EXPECT_TRUE(told);
+}
+
 // However long the show has run.
 TEST_F(SetChangeTest, ARecordedProbeThatIsOpenedAnewStaysInStepWithThePlate) {
   const std::string given = "match = [1, 1, 1]\nlens = \"latlong\"\n";
