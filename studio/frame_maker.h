@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -120,16 +121,23 @@ class FrameMaker {
   void change_video(const std::string& name, const std::string& uri) {
     command({VideoChange{name, uri}});
   }
+  // The same, but a source that is not open yet is opened beside the frames that follow, one after
+  // the other; the old one is shown until then, and on where it cannot be opened, which is a note
+  // of the next frame. Throws std::invalid_argument.
+  void change_video_beside(const std::string& name, const std::string& uri) {
+    command({VideoChange{name, uri, true}});
+  }
   // Takes over another set file's content. Sources that stay the same run on. Throws SetError and
   // changes nothing if it cannot be used, std::invalid_argument if the picture's size or rate
   // differ.
   void change_set(Set set);
   // The same, but what takes long, the reading of models above all, is done beside the frames that
-  // follow, and taken over when it is there. While one is on its way, only the newest of those that
-  // come is kept, and begun then. What goes wrong by then is a note of the next frame.
+  // follow, and taken over when it is there. While one, or a video before it, is on its way, only
+  // the newest of those that come is kept, and begun then. What goes wrong by then is a note of the
+  // next frame.
   void change_set_beside(Set set);
-  // Whether an edit is on its way.
-  bool is_changing() const { return change_.valid(); }
+  // Whether an edit or a video is on its way.
+  bool is_changing() const { return awaits_edit() || !openings_.empty(); }
   // What the next frame begins with: takes over what is on its way and there by now. For shows that
   // stand still.
   void take_what_is_there();
@@ -155,6 +163,7 @@ class FrameMaker {
   };
   struct VideoChange {
     std::string name, uri;
+    bool beside = false;
   };
   // What the light of an edit begins with: of the last frame.
   struct Moment {
@@ -171,6 +180,13 @@ class FrameMaker {
   void command(Command command);
   void apply(const Command& command, const VideoFeed* videos_before = nullptr);
   void apply(const Move& move);
+  void apply(const VideoChange& change, const VideoFeed* videos_before);
+  void show_video(const VideoChange& change, std::shared_ptr<VideoFeed::Player> player);
+  void open_next();
+  void finish_opening();
+  void tell_failure(const VideoChange& change, const std::string& why);
+  bool awaits_edit() const { return change_.valid() || next_change_; }
+  void begin_next();
   void keep(Command command);
   void repeat_commands(const VideoFeed& videos_before);
   void forget_commands();
@@ -212,12 +228,14 @@ class FrameMaker {
   mutable std::mutex moment_mutex_;
   std::optional<Moment> moment_;  // nothing = there was no frame yet
   std::stop_source given_up_;
-  Leaving leaving_;                 // of sets before
-  std::future<Change> change_;      // on its way
-  std::optional<Set> next_change_;  // after that
-  std::vector<Command> commands_;   // since change_ came
-  std::size_t of_next_change_ = 0;  // from which of them on they came after next_change_ as well
-  std::vector<std::string> notes_;  // for the next frame
+  Leaving leaving_;                   // of sets before
+  std::future<Change> change_;        // on its way
+  std::optional<Set> next_change_;    // after that, and after all openings_
+  std::vector<Command> commands_;     // since change_ came
+  std::size_t of_next_change_ = 0;    // from which of them on they came after next_change_ as well
+  std::deque<VideoChange> openings_;  // of one video none twice but the first, which is on its way
+  std::future<std::shared_ptr<VideoFeed::Player>> opening_;  // of the first
+  std::vector<std::string> notes_;                           // for the next frame
   bool plate_is_lost_ = false, is_off_track_ = false;
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;

@@ -26,7 +26,7 @@ constexpr std::chrono::seconds patience_for_leaving{10};
 
 // At once; while an edit is on its way, what cannot be done may be possible with that.
 void FrameMaker::command(Command command) {
-  if (!change_.valid()) return apply(command);
+  if (!awaits_edit()) return apply(command);
   try {
     apply(command);
   } catch (const std::runtime_error& error) {
@@ -58,11 +58,88 @@ void FrameMaker::apply(const Command& command, const VideoFeed* videos_before) {
   } else if (const auto* move = std::get_if<Move>(&command.what)) {
     apply(*move);
   } else {
-    const auto& [name, uri] = std::get<VideoChange>(command.what);
-    leaving_.let_go(videos_->change_source(name, uri, videos_before));
-    const auto video = std::ranges::find(set_.videos, name, &VideoSettings::name);
-    if (video != set_.videos.end()) video->source = uri;
+    apply(std::get<VideoChange>(command.what), videos_before);
   }
+}
+
+void FrameMaker::apply(const VideoChange& change, const VideoFeed* videos_before) {
+  const auto& [name, uri, beside] = change;
+  auto player = videos_->find_source(name, uri, videos_before);
+  if (!beside && videos_before == nullptr) {
+    while (opening_.valid()) finish_opening();
+    return show_video(change, player ? std::move(player) : videos_->open_source(name, uri));
+  }
+  // What was asked of it before, and has not begun, is passed over.
+  const auto waiting = openings_.begin() + (opening_.valid() ? 1 : 0);
+  openings_.erase(std::remove_if(waiting, openings_.end(),
+                                 [&](const VideoChange& other) { return other.name == name; }),
+                  openings_.end());
+  const bool comes = !openings_.empty() && openings_.front().name == name;
+  if (player && !comes) return show_video(change, std::move(player));
+  if (comes && openings_.front().uri == uri) return;
+  openings_.push_back(change);
+  begin_next();
+}
+
+// Opens it anew where an edit since has it read in another way.
+void FrameMaker::show_video(const VideoChange& change, std::shared_ptr<VideoFeed::Player> player) {
+  auto before = videos_->take_source(change.name, player);
+  if (before == nullptr) {
+    leaving_.let_go(std::move(player));
+    openings_.push_back(change);
+    return;
+  }
+  leaving_.let_go(std::move(before));
+  const auto video = std::ranges::find(set_.videos, change.name, &VideoSettings::name);
+  if (video != set_.videos.end()) video->source = change.uri;
+}
+
+// Begins to open the first of openings_.
+void FrameMaker::open_next() {
+  const auto open = [this](const VideoChange& change, VideoFeed& videos) {
+    const VideoFeed on_air = std::move(videos);  // what only it holds by the end is closed here
+    std::shared_ptr<VideoFeed::Player> player;
+    open_once_left([&] { player = on_air.open_source(change.name, change.uri); });
+    return player;
+  };
+  try {
+    // A copy of the feed, as for an edit.
+    opening_ = std::async(std::launch::async,
+                          [open, change = openings_.front(), videos = *videos_]() mutable {
+                            return open(change, videos);
+                          });
+  } catch (const std::system_error& error) {
+    notes_.emplace_back(error.what());  // no thread can be had
+    openings_.pop_front();
+  }
+}
+
+// Waits for the video that is on its way.
+void FrameMaker::finish_opening() {
+  const VideoChange change = std::move(openings_.front());
+  openings_.pop_front();
+  try {
+    auto player = opening_.get();
+    if (std::ranges::find(openings_, change.name, &VideoChange::name) == openings_.end()) {
+      show_video(change, std::move(player));
+    } else {  // another one was asked for since
+      leaving_.let_go(std::move(player));
+    }
+  } catch (const std::exception& error) {  // whatever it is, what is on air goes on
+    tell_failure(change, error.what());
+  }
+  begin_next();
+}
+
+// An edit that is on its way may make it possible.
+void FrameMaker::tell_failure(const VideoChange& change, const std::string& why) {
+  for (Command& command : commands_) {
+    const auto* kept = std::get_if<VideoChange>(&command.what);
+    if (kept == nullptr || kept->name != change.name || kept->uri != change.uri) continue;
+    command.why_not = why;
+    return;
+  }
+  notes_.push_back(why);
 }
 
 void FrameMaker::apply(const Move& move) {
@@ -208,17 +285,25 @@ void FrameMaker::take_over(Change change) {
 void FrameMaker::change_set(Set set) {
   check_change(set);
   next_change_.reset();
-  finish_change();
+  if (change_.valid()) finish_change();
+  forget_commands();
+  while (opening_.valid()) finish_opening();
   take_over(prepare(std::move(set), ++scene_version_, *videos_));
 }
 
 void FrameMaker::change_set_beside(Set set) {
   check_change(set);
-  if (change_.valid()) {
-    next_change_ = std::move(set);
-    of_next_change_ = commands_.size();
-  } else {
-    begin_change(std::move(set));
+  next_change_ = std::move(set);
+  of_next_change_ = commands_.size();
+  if (!change_.valid()) forget_commands();
+  begin_next();
+}
+
+// Of what waits: a video after the one before it, an edit after all that came before it.
+void FrameMaker::begin_next() {
+  if (!opening_.valid() && !openings_.empty()) open_next();
+  if (next_change_ && !change_.valid() && openings_.empty()) {
+    begin_change(*std::exchange(next_change_, std::nullopt));
   }
 }
 
@@ -240,21 +325,22 @@ void FrameMaker::begin_change(Set set) {
 }
 
 void FrameMaker::take_what_is_there() {
-  if (change_.valid() && change_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-    finish_change();
-  }
+  const auto is_there = [](const auto& coming) {
+    return coming.valid() && coming.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  };
+  if (is_there(opening_)) finish_opening();
+  if (is_there(change_)) finish_change();
 }
 
 // Waits for the change that is on its way.
 void FrameMaker::finish_change() {
-  if (!change_.valid()) return;
   try {
     take_over(change_.get());
   } catch (const std::exception& error) {  // whatever it is, what is on air goes on
     notes_.emplace_back(error.what());
   }
   forget_commands();
-  if (next_change_) begin_change(*std::exchange(next_change_, std::nullopt));
+  begin_next();
 }
 
 }  // namespace studio

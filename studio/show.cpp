@@ -268,12 +268,21 @@ class Show::Stages {
     }
   }
 
-  // A live show goes on while models are read; in others frames depend on no timing.
+  // A live show goes on while models are read and videos opened; in others frames depend on no
+  // timing.
   void change_set(Set set) {
     if (options_.live) {
       maker_.change_set_beside(std::move(set));
     } else {
       maker_.change_set(std::move(set));
+    }
+  }
+
+  void change_video(const SetVideo& video) {
+    if (options_.live) {
+      maker_.change_video_beside(video.name, video.uri);
+    } else {
+      maker_.change_video(video.name, video.uri);
     }
   }
 
@@ -288,7 +297,7 @@ class Show::Stages {
                      [&](const StopRecording& c) { work.recorder.emplace_back(c); },
                      [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
                      [&](const SetView& c) { view_ = c.view; },
-                     [&](const SetVideo& c) { maker_.change_video(c.name, c.uri); },
+                     [&](const SetVideo& c) { change_video(c); },
                      [&](const SetPaused& c) { paused_ = c.paused; },
                      [&](ChangeSet& c) { change_set(std::move(c.set)); }, [](const Quit&) {}},
           command);

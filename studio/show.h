@@ -38,7 +38,8 @@ struct MoveObject {
 struct SetView {
   std::optional<render::RayView> view;
 };
-// Another camera or file for one of the set's videos.
+// Another camera or file for one of the set's videos. A live show goes on with the old one until it
+// is open.
 struct SetVideo {
   std::string name;
   std::string uri;
@@ -91,7 +92,7 @@ struct ShowStatus {
   // What pixels took, by view, in the last frame that had one.
   std::optional<std::array<render::RayViewFigures, render::ray_views>> pixel_figures;
   bool paused = false;
-  bool changing = false;  // an edit is on its way, and not on air yet
+  bool changing = false;  // an edit, or a video's source, is on its way, and not on air yet
   bool recording = false;
   compositing::RecorderStatus recorder;  // of the present or last recording
   bool finished = false;

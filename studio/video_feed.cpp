@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "capture/pool.h"
+
 namespace studio {
 namespace {
 
@@ -16,6 +18,16 @@ bool same_source(const VideoSettings& a, const VideoSettings& b) {
 }
 
 }  // namespace
+
+// An open source, with the texture of its newest frame.
+struct VideoFeed::Player {
+  VideoSettings settings;
+  std::unique_ptr<TimedSource> source;
+  std::shared_ptr<const capture::Image> image;  // that `frame` was made from
+  VideoFrame frame;
+  bool reported = false;  // numbers that are none
+  capture::Pool<render::VideoTexture> textures;
+};
 
 VideoFeed::VideoFeed(const Set& set,
                      std::optional<capture::Time> start,
@@ -40,14 +52,20 @@ VideoFeed::VideoFeed(const Set& set,
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
 }
 
-std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings,
-                                                   const VideoFeed* before) {
-  for (const VideoFeed* feed : {static_cast<const VideoFeed*>(this), before}) {
+std::shared_ptr<VideoFeed::Player> VideoFeed::find(const VideoSettings& settings,
+                                                   const VideoFeed* before) const {
+  for (const VideoFeed* feed : {this, before}) {
     if (feed == nullptr) continue;
     for (const Channel& channel : feed->channels_) {
       if (channel.player && same_source(channel.player->settings, settings)) return channel.player;
     }
   }
+  return nullptr;
+}
+
+std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings,
+                                                   const VideoFeed* before) const {
+  if (auto found = find(settings, before)) return found;
   auto player = std::make_shared<Player>();
   player->settings = settings;
   player->source = std::make_unique<TimedSource>(
@@ -121,9 +139,8 @@ std::vector<render::LocalLight> VideoFeed::lamps(const std::vector<VideoFrame>& 
   return all;
 }
 
-std::shared_ptr<void> VideoFeed::change_source(const std::string& name,
-                                               const std::string& uri,
-                                               const VideoFeed* before) {
+// Of another source for the video of that name.
+VideoSettings VideoFeed::settings_of(const std::string& name, const std::string& uri) const {
   const auto channel =
       std::ranges::find(channels_, name, [](const Channel& c) { return c.settings.name; });
   if (channel == channels_.end()) {
@@ -131,7 +148,26 @@ std::shared_ptr<void> VideoFeed::change_source(const std::string& name,
   }
   VideoSettings settings = channel->settings;
   settings.source = uri;
-  std::shared_ptr<Player> player = open(settings, before);
+  return settings;
+}
+
+std::shared_ptr<VideoFeed::Player> VideoFeed::find_source(const std::string& name,
+                                                          const std::string& uri,
+                                                          const VideoFeed* before) const {
+  return find(settings_of(name, uri), before);
+}
+
+std::shared_ptr<VideoFeed::Player> VideoFeed::open_source(const std::string& name,
+                                                          const std::string& uri) const {
+  return open(settings_of(name, uri), nullptr);
+}
+
+std::shared_ptr<VideoFeed::Player> VideoFeed::take_source(const std::string& name,
+                                                          std::shared_ptr<Player> player) {
+  VideoSettings settings = settings_of(name, player->settings.source);
+  if (!same_source(settings, player->settings)) return nullptr;
+  const auto channel =
+      std::ranges::find(channels_, name, [](const Channel& c) { return c.settings.name; });
   channel->settings = std::move(settings);
   return std::exchange(channel->player, std::move(player));
 }

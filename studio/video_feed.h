@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "capture/pool.h"
 #include "render/area_light.h"
 #include "render/video_texture.h"
 #include "studio/set_scene.h"
@@ -24,6 +23,8 @@ struct VideoFrame {
 // that ends or stalls holds its last. Videos of the same source share it.
 class VideoFeed {
  public:
+  struct Player;  // an open source
+
   // Opens the sources of a set; those that `before` has open run on. Files begin at `start` of the
   // show's time, or, without one, at the next time that is asked for. `live`: the show's time is
   // the monotonic clock. Throws SetError.
@@ -40,33 +41,31 @@ class VideoFeed {
   // Of these frames.
   std::vector<render::LocalLight> lamps(const std::vector<VideoFrame>& frames) const;
 
-  // Another source for the video of that name, from the next frame on; what `before` has open runs
-  // on. Returns the source that it had, to be let go. Throws std::invalid_argument if there is no
-  // such video, std::runtime_error if it cannot be opened.
-  std::shared_ptr<void> change_source(const std::string& name,
+  // Another source for the video of that name, if this or `before` has it open, which then shares
+  // it; else null. Throws std::invalid_argument if there is no such video.
+  std::shared_ptr<Player> find_source(const std::string& name,
                                       const std::string& uri,
-                                      const VideoFeed* before = nullptr);
+                                      const VideoFeed* before = nullptr) const;
+  // The same; opens it if need be. Throws std::runtime_error if it cannot be opened.
+  std::shared_ptr<Player> open_source(const std::string& name, const std::string& uri) const;
+  // Shows it as that video from the next frame on; gives back the source that it had, to be let go.
+  // Null, and nothing done, where the video is to be read in another way than it was opened for.
+  // Throws std::invalid_argument if there is no such video.
+  std::shared_ptr<Player> take_source(const std::string& name, std::shared_ptr<Player> player);
 
   // What went wrong since the last call, in words.
   std::vector<std::string> take_notes();
 
  private:
-  // An open source, with the texture of its newest frame.
-  struct Player {
-    VideoSettings settings;
-    std::unique_ptr<TimedSource> source;
-    std::shared_ptr<const capture::Image> image;  // that `frame` was made from
-    VideoFrame frame;
-    bool reported = false;  // numbers that are none
-    capture::Pool<render::VideoTexture> textures;
-  };
   struct Channel {
     VideoSettings settings;
     std::shared_ptr<Player> player;
     std::vector<render::AreaLight> lights;
   };
 
-  std::shared_ptr<Player> open(const VideoSettings& settings, const VideoFeed* before);
+  VideoSettings settings_of(const std::string& name, const std::string& uri) const;
+  std::shared_ptr<Player> find(const VideoSettings& settings, const VideoFeed* before) const;
+  std::shared_ptr<Player> open(const VideoSettings& settings, const VideoFeed* before) const;
   void update(Player& player, capture::Time time);
 
   std::string base_dir_;
