@@ -78,6 +78,16 @@ VideoSource video_of(const PersonCamera& s, const std::string& base_dir) {
   return {s.source, base_dir, s.loop, s.first, s.colour, !s.key};
 }
 
+std::shared_ptr<TimedSource> open_source(const VideoSource& source,
+                                         const PersonCameraFeed::Options& options,
+                                         const std::string& held) {
+  try {
+    return std::make_shared<TimedSource>(source, options.start, options.live);
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(error.what() + held);
+  }
+}
+
 FileTimes times_of(const std::optional<KeyChoice>& key) {
   return key ? file_times({key->plate, key->masks.garbage, key->masks.core}) : FileTimes{};
 }
@@ -99,7 +109,8 @@ std::shared_ptr<const render::LivePicture> clear_picture() {
 PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
                                    const Options& options,
                                    Faults& faults,
-                                   const PersonCameraFeed* before)
+                                   const PersonCameraFeed* before,
+                                   const std::string& held)
     : settings_(settings),
       options_(options),
       times_(times_of(settings.key)),
@@ -108,8 +119,7 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
   const VideoSource source = video_of(s, options.base_dir);
   try {
     opened_ = before ? before->opened_ : source;
-    source_ = before ? before->source_
-                     : std::make_shared<TimedSource>(source, options.start, options.live);
+    source_ = before ? before->source_ : open_source(source, options, held);
     const capture::CameraInfo& info = source_->info();
     if (s.lens && (s.lens->width != info.width || s.lens->height != info.height)) {
       throw std::invalid_argument(
@@ -161,6 +171,12 @@ bool PersonCameraFeed::has_source_of(const PersonCamera& settings) const {
   const bool has_none = opened_.alpha && first && first->channels != 4;
   if (has_none || source_->info().live) asked.alpha = opened_.alpha;
   return asked == opened_;
+}
+
+std::string PersonCameraFeed::words_for_held(const PersonCamera& asked,
+                                             const std::string& holder) const {
+  if (!source_->info().live || asked.source != opened_.uri) return "";
+  return studio::words_for_held(opened_, video_of(asked, options_.base_dir), holder);
 }
 
 void PersonCameraFeed::advance(capture::Time time) {

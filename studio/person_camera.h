@@ -36,16 +36,20 @@ class PersonCameraFeed {
   };
   // Opens the source, or goes on with that of `before`, which is then of no more use; reads plate
   // and masks. Adds faults at their places; is of no use then. May be made while `before` runs.
+  // `held`: what to add to why the source cannot be opened.
   PersonCameraFeed(const PersonCamera& settings,
                    const Options& options,
                    Faults& faults,
-                   const PersonCameraFeed* before = nullptr);
+                   const PersonCameraFeed* before = nullptr,
+                   const std::string& held = "");
 
   // Whether another one would show just the same, so that this one may go on in its place: its
   // plate and masks are those that are on disk, too. `start` does not count.
   bool serves(const PersonCamera& settings, const Options& options) const;
   // Whether another one could go on with this one's source.
   bool has_source_of(const PersonCamera& settings) const;
+  // As words_for_held() of timed_source.h; "" where this holds no such device.
+  std::string words_for_held(const PersonCamera& asked, const std::string& holder) const;
 
   const PersonCamera& settings() const { return settings_; }
   float aspect() const { return aspect_; }  // of its picture: width over height

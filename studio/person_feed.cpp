@@ -128,6 +128,17 @@ class PersonFeed::Claims {
     return {};
   }
 
+  // What to add to why the camera's source cannot be opened.
+  std::string words_for_held(const PersonCamera& camera) const {
+    for (const std::shared_ptr<Person>& person : persons_) {
+      for (std::size_t k = 0; k < person->cameras.size(); ++k) {
+        auto words = person->cameras[k].feed.words_for_held(camera, person->name_of(k));
+        if (!words.empty()) return words;
+      }
+    }
+    return "";
+  }
+
  private:
   bool is_claimed(const PersonCameraFeed& feed) const {
     return std::ranges::find(claimed_, &feed) != claimed_.end();
@@ -176,7 +187,8 @@ PersonFeed::PersonFeed(const Set& set,
     for (std::size_t k = 0; k < s.cameras.size(); ++k) {
       const Claims::Source source = claims.source(s.cameras[k]);
       person->cameras.push_back(
-          {PersonCameraFeed(s.cameras[k], options_of(s, k), faults, source.feed)});
+          {PersonCameraFeed(s.cameras[k], options_of(s, k), faults, source.feed,
+                            source.feed ? "" : claims.words_for_held(s.cameras[k]))});
       if (k == 0 && source.person && stands_alike(source.person->settings, s)) {
         coming_[i] = Coming{s, source.person};
       }

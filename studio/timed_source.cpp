@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "capture/live_reader.h"
 
 namespace studio {
@@ -24,6 +26,22 @@ std::unique_ptr<capture::Camera> open_video(const VideoSource& source) {
   options.alpha = source.alpha;
   if (source.first > 0) options.frame = source.first;
   return capture::open_camera(source.uri, options);
+}
+
+std::string words_for_held(const VideoSource& held,
+                           const VideoSource& asked,
+                           const std::string& holder) {
+  std::string other;
+  if (held.colour != asked.colour) {
+    other += fmt::format(" with colour = \"{}\", not \"{}\"", capture::name_of(held.colour),
+                         capture::name_of(asked.colour));
+  }
+  if (held.loop != asked.loop) other += " with another loop";
+  if (held.first != asked.first) other += " with another frame";
+  return fmt::format(
+      ". {} holds it{}: what can be opened only once changes in two edits, one without it and one "
+      "with it as it is to be, or by starting anew",
+      holder, other);
 }
 
 TimedSource::TimedSource(const VideoSource& source, std::optional<capture::Time> start, bool live)

@@ -24,6 +24,12 @@ struct VideoSource {
 // Opens it. Throws as capture::open_camera.
 std::unique_ptr<capture::Camera> open_video(const VideoSource& source);
 
+// What to add to why a source cannot be opened while it is open as `held` by `holder`, as people
+// call it: devices may be opened only once.
+std::string words_for_held(const VideoSource& held,
+                           const VideoSource& asked,
+                           const std::string& holder);
+
 // One thread uses it.
 class TimedSource {
  public:

@@ -29,6 +29,12 @@ struct VideoFeed::Player {
   capture::Pool<render::VideoTexture> textures;
 };
 
+// For people.
+std::string VideoFeed::name_of(const Channel& channel) const {
+  if (!channel.settings.name.empty()) return fmt::format("video \"{}\"", channel.settings.name);
+  return fmt::format("video {}", &channel - channels_.data() + 1);
+}
+
 VideoFeed::VideoFeed(const Set& set,
                      std::optional<capture::Time> start,
                      bool live,
@@ -66,10 +72,26 @@ std::shared_ptr<VideoFeed::Player> VideoFeed::find(const VideoSettings& settings
 std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings,
                                                    const VideoFeed* before) const {
   if (auto found = find(settings, before)) return found;
+  const auto video_of = [&](const VideoSettings& s) {
+    return VideoSource{s.source, base_dir_, s.loop, 0, s.colour};
+  };
   auto player = std::make_shared<Player>();
   player->settings = settings;
-  player->source = std::make_unique<TimedSource>(
-      VideoSource{settings.source, base_dir_, settings.loop, 0, settings.colour}, start_, live_);
+  try {
+    player->source = std::make_unique<TimedSource>(video_of(settings), start_, live_);
+  } catch (const std::runtime_error& error) {
+    for (const VideoFeed* feed : {this, before}) {
+      if (feed == nullptr) continue;
+      for (const Channel& channel : feed->channels_) {
+        if (!channel.player || channel.player->settings.source != settings.source) continue;
+        if (!channel.player->source->info().live) continue;
+        throw std::runtime_error(error.what() + words_for_held(video_of(channel.player->settings),
+                                                               video_of(settings),
+                                                               feed->name_of(channel)));
+      }
+    }
+    throw;
+  }
   return player;
 }
 

@@ -63,6 +63,7 @@ class VideoFeed {
     std::vector<render::AreaLight> lights;
   };
 
+  std::string name_of(const Channel& channel) const;
   VideoSettings settings_of(const std::string& name, const std::string& uri) const;
   std::shared_ptr<Player> find(const VideoSettings& settings, const VideoFeed* before) const;
   std::shared_ptr<Player> open(const VideoSettings& settings, const VideoFeed* before) const;

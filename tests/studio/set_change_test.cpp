@@ -497,6 +497,38 @@ TEST_F(SetChangeTest, AVideoThatIsBeingOpenedWhenAnEditIsThereComesAfterIt) {
   EXPECT_EQ(open_now, 1);
 }
 
+// A device gives one colour at a time.
+TEST_F(SetChangeTest, SaysWhoHoldsADeviceThatIsAskedForInAnotherColour) {
+  const auto refusal = [](FrameMaker& maker, const Set& edit) -> std::string {
+    try {
+      maker.change_set(edit);
+    } catch (const SetError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string tv = "[[object]]\nname = \"set\"\nmade = \"tv\"\n";
+  const Set videos = made_set("grey:1,25,0", tv + "[[video]]\nname = \"news\"\nsource = "
+                                                  "\"live_sole:0\"\nobject = \"set/tv\"\n");
+  const Set persons = person_set("live_sole:0", placed + "name = \"she\"\n");
+  const Set without = made_set("grey:1,25,0");
+  for (const Set& set : {videos, persons}) {
+    FrameMaker maker(set);
+    ASSERT_TRUE(maker.make(0));
+    Set edit = set;
+    for (VideoSettings& video : edit.videos) video.colour = capture::Transfer::srgb;
+    for (PersonSettings& she : edit.persons) she.cameras[0].colour = capture::Transfer::srgb;
+    EXPECT_THAT(
+        refusal(maker, edit),
+        testing::AllOf(HasSubstr("busy"), HasSubstr("colour"), HasSubstr("two edits"),
+                       HasSubstr(set.videos.empty() ? "she holds it" : "video \"news\" holds it")));
+    ASSERT_TRUE(maker.make(1));
+    EXPECT_EQ(refusal(maker, without), "");  // as it says
+    EXPECT_EQ(refusal(maker, edit), "");
+    ASSERT_TRUE(maker.make(2));
+  }
+}
+
 // A device that stalls: it is closed beside the frames, and opened again once it is.
 TEST_F(SetChangeTest, NoFrameWaitsForWhatGoesAndWhatComesBackDoes) {
   const std::string tv = "[[object]]\nname = \"set\"\nmade = \"tv\"\n";
