@@ -190,10 +190,12 @@ void FrameMaker::forget_commands() {
 // A device may be held still by what edits before let go of.
 template <class Open>
 void FrameMaker::open_once_left(const Open& open) const {
+  // Asked before, since it may be gone just when the device is found busy.
+  const bool leaves = leaving_.wait(std::chrono::milliseconds(0));
   try {
     return open();
   } catch (const std::runtime_error&) {
-    if (!leaving_.wait(patience_for_leaving)) throw;
+    if (!leaving_.wait(patience_for_leaving) && !leaves) throw;
   }
   open();
 }

@@ -109,6 +109,21 @@ class HeldCamera final : public SoleCamera {
   ~HeldCamera() override { closing.pass(); }
 };
 
+// The same, which is closed by the time that it says that it is busy.
+class TardyCamera final : public SoleCamera {
+ public:
+  TardyCamera(std::int64_t frames, const capture::CameraOptions& options)
+      : SoleCamera(frames, false, options) {}
+  ~TardyCamera() override { closing.pass(); }
+  static void wait_if_open() {
+    if (open_now == 0) return;
+    closing.open();
+    while (open_now > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    throw std::runtime_error("cannot open tardy: it is busy");
+  }
+};
+
 std::atomic<int> recorded_frames_read = 0;
 
 // A recording of grey frames of 64x32, 25 a second: frame n of them is grey by (n + 1) / 1000.
@@ -141,7 +156,8 @@ class RecordedCamera final : public capture::Camera {
   bool loop_;
 };
 
-// Opens "sole:FRAMES", "live_sole:FRAMES", "held:FRAMES", "late:FRAMES" and "recorded:FRAMES".
+// Opens "sole:FRAMES", "live_sole:FRAMES", "held:FRAMES", "tardy:FRAMES", "late:FRAMES" and
+// "recorded:FRAMES".
 void register_sole_camera() {
   for (const bool live : {false, true}) {
     capture::register_camera(live ? "live_sole" : "sole", [live](std::string_view rest,
@@ -151,6 +167,10 @@ void register_sole_camera() {
   }
   capture::register_camera("held", [](std::string_view rest, const capture::CameraOptions& o) {
     return std::make_unique<HeldCamera>(std::stol(std::string(rest)), o);
+  });
+  capture::register_camera("tardy", [](std::string_view rest, const capture::CameraOptions& o) {
+    TardyCamera::wait_if_open();
+    return std::make_unique<TardyCamera>(std::stol(std::string(rest)), o);
   });
   capture::register_camera("late", [](std::string_view rest, const capture::CameraOptions&) {
     opening.pass();
@@ -557,6 +577,19 @@ TEST_F(SetChangeTest, NoFrameWaitsForWhatGoesAndWhatComesBackDoes) {
     EXPECT_EQ(open_now, 1);
   }
   EXPECT_EQ(open_now, 0) << "the end waits for all";
+}
+
+TEST_F(SetChangeTest, WhatComesBackMayBeGoneJustWhenItIsFoundBusy) {
+  const Set with = person_set("tardy:0"), without = made_set("grey:1,25,0");
+  FrameMaker maker(with);
+  std::int64_t n = 0;
+  ASSERT_TRUE(maker.make(n++));
+  closing.shut();
+  maker.change_set(without);
+  maker.change_set_beside(with);
+  const auto notes = make_until(maker, n, [&](const auto&) { return !maker.is_changing(); });
+  EXPECT_THAT(notes, IsEmpty());
+  EXPECT_EQ(opened, 2);
 }
 
 // No frame comes that would take it over and tell it.
