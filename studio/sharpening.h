@@ -41,6 +41,9 @@ class Sharpening {
   void took(double render_ms, bool full);
   // Of the last frame: 0 = coarse, 1 = as the effort asks.
   double share() const;
+  // Whether the last frame is not as sharp as the effort asks, and stays so until something moves,
+  // for the memory for kept cells is used up.
+  bool is_stopped() const { return stopped_ && share() < 1; }
   // Share of its cells that had to be found anew, for something moved.
   double lost_share() const;
 

@@ -11,6 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "capture/pool.h"
 #include "compositing/display.h"
 #include "compositing/exr_sequence.h"
@@ -321,6 +323,7 @@ class Show::Stages {
       if (sharpening_) {
         render_sharpening(*sharpening_, inputs, job, plate, *result);
         tally_.status().sharpness = sharpening_->share();
+        note_sharpness();
       } else {
         render::render_frame(inputs, job, plate, *result);
       }
@@ -375,6 +378,18 @@ class Show::Stages {
   }
 
   // Once whenever the light ceases to be renewed.
+  void note_sharpness() {
+    const bool stopped = sharpening_->is_stopped();
+    if (stopped && !stays_coarse_) {
+      note(
+          "the memory for what is kept is used up: the picture gets no sharper while nothing "
+          "moves, " +
+          fmt::format("and stays at a sharpness of {:.2f}; a lower [effort] can be finished",
+                      sharpening_->share()));
+    }
+    stays_coarse_ = stopped;
+  }
+
   void note_probe(const PreparedFrame& frame) {
     const std::string& why = frame.probe.kept_because;
     if (!why.empty() && light_kept_because_.empty()) {
@@ -474,6 +489,7 @@ class Show::Stages {
   std::optional<ToneFollower> tone_;
   std::optional<Sharpening> sharpening_;
   render::KeptTransport kept_;
+  bool stays_coarse_ = false;
   std::string light_kept_because_;
   capture::Pool<render::FrameResult> results_;
   capture::Pool<std::vector<std::uint8_t>> pictures_;

@@ -254,8 +254,7 @@ void run(const RunOptions& options, Console& console) {
   warnings.tell_rest(status);
   report_end(status, set, console);
   if (status.changing) {
-    console.say(
-        "the last edit was not on air yet: it is given up once the file being read is there");
+    console.say("the last edit was not on air yet, and is given up");
   }
   if (!options.view_png.empty() && last.view_rgb8) {
     capture::write_png(options.view_png, set.show.width, set.show.height, 3, *last.view_rgb8);

@@ -154,6 +154,7 @@ TEST(Sharpening, StaysWhereTheMemoryEnds) {
     if (i > 20) {
       EXPECT_EQ(sharpening.share(), last);
     }
+    EXPECT_EQ(sharpening.is_stopped(), full) << i;
     last = sharpening.share();
   }
   EXPECT_LT(last, 0.7);
