@@ -18,6 +18,11 @@ constexpr double least_share = 0.005;
 // Light that has grown or shrunk by more than this is planned for anew.
 constexpr double most_change = 1.5;
 
+// Share of the light that may go from some regions to others before they are cut anew, and frames
+// that light is calm, or another, before a change is taken for one that stays.
+constexpr double most_shifted = 0.3;
+constexpr int settled_frames = 12;
+
 Vec3f to_float(const std::array<double, 3>& v) {
   return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
 }
@@ -45,7 +50,9 @@ LightTable LightFollower::follow(const Environment& env, const LightFollowerSett
       made_with_ == settings.table) {
     sums = sum_regions(regions_, map_, env.radiance);
   }
-  if (sums.empty() || (total_luminance(sums) > 0 && has_moved(sums, settings.tolerance_rad))) {
+  if (sums.empty()) calm_frames_ = settled_frames;
+  if (sums.empty() || (total_luminance(sums) > 0 &&
+                       (has_shifted(sums) || has_moved(sums, settings.tolerance_rad)))) {
     sums = make_anew(env, settings.table);
   }
   if (!(total_luminance(sums) > 0)) {
@@ -78,10 +85,32 @@ std::vector<RegionLight> LightFollower::make_anew(const Environment& env,
   std::vector<DirectionalLight> lights;
   for (const Followed& followed : lights_) lights.push_back(followed.light);
   parts_ = part_regions(regions_, map_, lights);
+  const double total = total_luminance(sums);
+  cut_shares_.clear();
+  for (const RegionLight& sum : sums) cut_shares_.push_back(total > 0 ? sum.luminance / total : 0);
+  shifted_frames_ = 0;
   averaged_frames_ = 0;
   ++version_;
   mark_compact();
   return sums;
+}
+
+// Whether so much of the light went from some regions to others that it would be cut otherwise, and
+// stays there for all that is known.
+bool LightFollower::has_shifted(const std::vector<RegionLight>& sums) {
+  const double total = total_luminance(sums);
+  double shifted = 0;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    shifted += std::abs(sums[i].luminance / total - cut_shares_[i]) / 2;
+  }
+  if (!(shifted > most_shifted)) {
+    ++calm_frames_;
+    shifted_frames_ = 0;
+    return false;
+  }
+  const bool was_calm = calm_frames_ >= settled_frames;
+  calm_frames_ = 0;
+  return was_calm || ++shifted_frames_ >= settled_frames;
 }
 
 // Decisions were taken for another light than this: they are taken anew.

@@ -21,8 +21,11 @@ struct LightFollowerSettings {
 };
 
 // Follows the light of a show. Directions stay frozen while the light stays where it is, so that
-// what was found about their shadows stays true; energies follow each frame. The state is all
-// memory that the table has: it lives with the show, not with a kernel.
+// what was found about their shadows stays true; energies follow each frame. Where three tenths of
+// the light are elsewhere than when directions were made, as when a lamp goes off that had most of
+// them, they are made anew: at once where light was calm for twelve frames, else, as under a lamp
+// that blinks, once that has lasted for twelve. The state is all memory that the table has: it
+// lives with the show, not with a kernel.
 class LightFollower {
  public:
   // The table of the next frame. Its version grows when directions or planned irradiances change. A
@@ -46,6 +49,7 @@ class LightFollower {
   std::vector<RegionLight> make_anew(const Environment& env, const LightTableSettings& settings);
   void mark_compact();
   bool has_moved(const std::vector<RegionLight>& sums, float tolerance_rad) const;
+  bool has_shifted(const std::vector<RegionLight>& sums);
   void take_energies(const std::vector<RegionLight>& sums, const LightFollowerSettings& settings);
   void plan();
   static double gain_of_drift(Followed& followed, double now);
@@ -58,6 +62,9 @@ class LightFollower {
   int made_height_ = 0;  // of the environment
   std::vector<Followed> lights_;
   int averaged_frames_ = 0;
+  std::vector<double> cut_shares_;  // of the light, when regions were cut
+  int calm_frames_ = 0;             // in a row whose shares are about those
+  int shifted_frames_ = 0;          // in a row whose shares are others
   std::uint64_t version_ = 0;
 };
 

@@ -27,6 +27,22 @@ std::vector<DirectionalLight> without_marks(std::vector<DirectionalLight> lights
   return lights;
 }
 
+// A lamp of 10 degrees in an even room.
+Environment make_room_with_lamp(Vec3f lamp, float room = 1) {
+  Environment env = make_even_environment(room, 128);
+  for (int y = 0; y < 128; ++y) {
+    for (int x = 0; x < 256; ++x) {
+      const Vec3f d = direction_of_texel(static_cast<float>(x), static_cast<float>(y), 256, 128);
+      if (dot(d, normalize(Vec3f{1, 1, 1})) < std::cos(0.17F)) continue;
+      float* const p = &env.radiance.pixels[env.radiance.index(y, x)];
+      p[0] = lamp.x;
+      p[1] = lamp.y;
+      p[2] = lamp.z;
+    }
+  }
+  return env;
+}
+
 TEST(LightFollower, StartsWithTheTableOfTheFrame) {
   const Environment env = make_sun_and_sky({}, 128);
   LightFollower follower;
@@ -114,6 +130,46 @@ TEST(LightFollower, FollowsALampThatIsSwitchedOnAtOnce) {
   for (int i = 0; i < 20; ++i) follower.follow(dark, {});
   const LightTable table = follower.follow(lit, {});
   EXPECT_NEAR(energy(table), energy(make_light_table(lit, {})), 1e-4);
+}
+
+TEST(LightFollower, CutsAnewWhenALampThatHadMostLightsGoesOff) {
+  const Environment on = make_room_with_lamp({1e4F, 1e4F, 1e4F});
+  const Environment off = make_room_with_lamp({1, 1, 1});
+  LightFollower follower;
+  for (int i = 0; i < 5; ++i) follower.follow(on, {});
+  const LightTable table = follower.follow(off, {});
+  EXPECT_EQ(without_marks(table.lights), make_light_table(off, {}).lights);
+}
+
+TEST(LightFollower, IsNotCutAnewByLightThatOnlyDims) {
+  Environment env = make_room_with_lamp({1e3F, 1e3F, 1e3F});
+  LightFollower follower;
+  const LightTable first = follower.follow(env, {});
+  for (int i = 0; i < 20; ++i) {
+    dim(env, 0.7F);
+    const LightTable table = follower.follow(env, {});
+    for (std::size_t l = 0; l < table.lights.size(); ++l) {
+      ASSERT_EQ(table.lights[l].direction, first.lights[l].direction) << i;
+    }
+  }
+}
+
+TEST(LightFollower, IsNotCutAnewOverAndOverUnderALampThatBlinks) {
+  const Environment on = make_room_with_lamp({1e3F, 1e3F, 1e3F});
+  const Environment off = make_room_with_lamp({1, 1, 1});
+  LightFollower follower;
+  std::vector<DirectionalLight> before = follower.follow(on, {}).lights;
+  int cuts = 0;
+  for (int frame = 1; frame < 80; ++frame) {
+    const std::vector<DirectionalLight> now = follower.follow(frame % 2 == 0 ? on : off, {}).lights;
+    cuts += now.back().direction == before.back().direction ? 0 : 1;
+    before = now;
+  }
+  EXPECT_LE(cuts, 2);
+  // Once it has stayed off for long, it is.
+  for (int i = 0; i < 12; ++i) before = follower.follow(off, {}).lights;
+  EXPECT_EQ(without_marks(before).back().direction,
+            make_light_table(off, {}).lights.back().direction);
 }
 
 TEST(LightFollower, ReachesASmallChangeWithinAFewTimesItsSmoothing) {
