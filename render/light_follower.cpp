@@ -31,6 +31,19 @@ double luminance_of(const std::array<double, 3>& irradiance) {
   return .2126 * irradiance[0] + .7152 * irradiance[1] + .0722 * irradiance[2];
 }
 
+// Whether a channel has changed by more than a part of itself, or of the luminance where that is
+// more: a lamp's least channel may be all noise.
+bool differs(const std::array<double, 3>& now,
+             const std::array<double, 3>& before,
+             double part,
+             double least) {
+  const double base = std::max(luminance_of(before), least);
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (std::abs(now[c] - before[c]) > part * std::max(before[c], base)) return true;
+  }
+  return false;
+}
+
 double total_luminance(const std::vector<RegionLight>& sums) {
   double total = 0;
   for (const RegionLight& sum : sums) total += sum.luminance;
@@ -174,14 +187,17 @@ double LightFollower::gain_of_drift(Followed& followed, double now) {
 void LightFollower::take_energies(const std::vector<RegionLight>& sums,
                                   const LightFollowerSettings& settings) {
   const double least_gain = 1 / std::max(settings.smoothing_frames, 1.0F);
-  double averaged_total = 0;
-  for (const Followed& followed : lights_) averaged_total += luminance_of(followed.irradiance);
-  const double total = total_luminance(sums);
-  bool changed = std::abs(total - averaged_total) > settings.sudden_change / 2 * averaged_total;
+  std::array<double, 3> total{}, averaged_total{};
   for (std::size_t i = 0; i < sums.size(); ++i) {
-    const double before = luminance_of(lights_[i].irradiance);
-    const double change = std::abs(sums[i].luminance - before);
-    changed = changed || change > settings.sudden_change * std::max(before, least_share * total);
+    for (std::size_t c = 0; c < 3; ++c) {
+      total[c] += sums[i].irradiance[c];
+      averaged_total[c] += lights_[i].irradiance[c];
+    }
+  }
+  bool changed = differs(total, averaged_total, settings.sudden_change / 2, 0);
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    changed = changed || differs(sums[i].irradiance, lights_[i].irradiance, settings.sudden_change,
+                                 least_share * luminance_of(total));
   }
   // All at once: light that went from one region to another must not count in both for a while.
   if (changed) averaged_frames_ = 0;

@@ -15,8 +15,8 @@ struct LightFollowerSettings {
   // Directions are made anew when the light has moved this far from them, in the energy-weighted
   // mean.
   float tolerance_rad = 0.01F;
-  // Relative change of a light's energy, or of all light by half of it, that is taken for a change
-  // of the light and not for noise: its averaging starts anew.
+  // Relative change of a light's energy in any channel, or of all light by half of it, that is
+  // taken for a change of the light and not for noise: its averaging starts anew.
   float sudden_change = 0.3F;
 };
 

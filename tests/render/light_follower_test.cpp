@@ -172,6 +172,19 @@ TEST(LightFollower, IsNotCutAnewOverAndOverUnderALampThatBlinks) {
             make_light_table(off, {}).lights.back().direction);
 }
 
+TEST(LightFollower, FollowsALampThatChangesItsColourAlone) {
+  const Environment white = make_room_with_lamp({100, 100, 100}, 0.1F);
+  const float level = luminance(.55F, 1.02F, 2.1F);
+  const Environment blue = make_room_with_lamp({55 / level, 102 / level, 210 / level}, 0.1F);
+  LightFollower follower;
+  for (int i = 0; i < 20; ++i) follower.follow(white, {});
+  Vec3f followed{}, made{};
+  for (const DirectionalLight& l : follower.follow(blue, {}).lights) followed += l.irradiance;
+  for (const DirectionalLight& l : make_light_table(blue, {}).lights) made += l.irradiance;
+  EXPECT_NEAR(followed.x / made.x, 1, 0.001);
+  EXPECT_NEAR(followed.z / made.z, 1, 0.001);
+}
+
 TEST(LightFollower, ReachesASmallChangeWithinAFewTimesItsSmoothing) {
   Environment env = make_sun_and_sky({}, 128);
   LightFollower follower;
