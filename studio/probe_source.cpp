@@ -185,7 +185,9 @@ void ProbeSource::open_camera(const Set& set,
     cycle = bracketed.cycle;
   }
   camera_ = std::make_unique<Source>(std::move(camera));
-  if (camera_->first().image == nullptr) throw std::runtime_error("its first frame is lost");
+  if (camera_->first().image == nullptr && (camera_->is_live() || camera_->is_still())) {
+    throw std::runtime_error("its first frame is lost");
+  }
   if (camera_->is_still()) {
     newest_ = {camera_->first().image, camera_->first().time};
     camera_.reset();
@@ -194,9 +196,14 @@ void ProbeSource::open_camera(const Set& set,
   status_.live = true;
   if (cycle > 0) {
     prime_live(cycle);
-  } else {
-    prime();
+    return;
   }
+  prime();
+  if (!bracket_ && !camera_->is_live()) {
+    camera_ = std::make_unique<Source>(capture::open_camera(probe.source, options));
+    begin_unmerged();
+  }
+  if (newest_.image == nullptr) throw std::runtime_error("its first frames are all lost");
 }
 
 double ProbeSource::exposure_s_of(const capture::Frame& frame) const {
@@ -212,23 +219,49 @@ capture::Frame ProbeSource::wait_for_next() {
   return camera_->advance(*time).front();
 }
 
-// The first cycle is taken at once, so that no frame is lit by half a bracket.
+// The first cycle is taken at once, so that no frame is lit by half a bracket. It ends with an
+// exposure that was known and is not the last one's, which may have been sent again. Frames that
+// tell no exposure are passed over, but a live camera is not waited for.
 void ProbeSource::prime() {
-  std::vector<capture::Frame> cycle{camera_->first()};
-  std::vector<double> exposures_s{exposure_s_of(cycle.front())};
-  while (exposures_s.back() > 0 && cycle.size() < longest_cycle) {
-    const capture::Frame frame = wait_for_next();
-    if (frame.image == nullptr) break;
-    const double exposure_s = exposure_s_of(frame);
-    cycle.push_back(frame);
-    const bool again = std::ranges::any_of(
-        exposures_s, [&](double other) { return about_equal(exposure_s, other); });
-    if (again) break;
-    exposures_s.push_back(exposure_s);
+  std::vector<double> exposures_s;
+  double last_s = 0;
+  std::optional<capture::Time> fresh;
+  capture::Frame frame = camera_->first();
+  for (std::size_t read = 1;; ++read) {
+    if (add(frame)) fresh = frame.time;
+    const bool tells = tells_exposure(frame);
+    const double exposure_s = tells ? exposure_s_of(frame) : 0;
+    const bool known = tells && std::ranges::any_of(exposures_s, [&](double other) {
+                         return about_equal(exposure_s, other);
+                       });
+    if (tells && !known) exposures_s.push_back(exposure_s);
+    const bool cycle_ends =
+        camera_->is_live() ? known || !tells : known && !about_equal(exposure_s, last_s);
+    if (tells) last_s = exposure_s;
+    if (cycle_ends || read == longest_cycle) break;
+    frame = wait_for_next();
+    if (frame.image == nullptr && frame.status != capture::FrameStatus::lost) break;
   }
-  if (exposures_s.size() > 1)
-    bracket_ = std::make_unique<RollingBracket>(exposures_s.size(), merging_);
-  take(cycle);
+  if (bracket_) {
+    bracket_->set_cycle(exposures_s.size());
+    if (fresh) merge(*fresh);
+  }
+  note_camera();
+}
+
+// Of a recording that does not bracket: from its first picture on, each at its time. It was opened
+// anew.
+void ProbeSource::begin_unmerged() {
+  status_ = {};
+  status_.live = true;
+  single_ = {};
+  newest_ = {};
+  take({camera_->first()});
+  for (std::size_t read = 1; newest_.image == nullptr && read < longest_cycle; ++read) {
+    const capture::Frame frame = wait_for_next();
+    if (frame.image == nullptr && frame.status != capture::FrameStatus::lost) break;
+    take({frame});
+  }
 }
 
 // Waits for a whole bracket, or what comes of it in time.
@@ -251,6 +284,12 @@ void ProbeSource::prime_live(std::size_t cycle) {
   }
 }
 
+// Whether it is good for a bracket.
+bool ProbeSource::tells_exposure(const capture::Frame& frame) const {
+  return frame.image != nullptr && frame.status == capture::FrameStatus::good &&
+         exposure_s_of(frame) > 0;
+}
+
 // Whether the frame tells new light.
 bool ProbeSource::add(const capture::Frame& frame) {
   ++status_.frames;
@@ -258,12 +297,24 @@ bool ProbeSource::add(const capture::Frame& frame) {
     ++status_.lost;
     return false;
   }
+  const bool tells = tells_exposure(frame);
+  const double exposure_s = tells ? exposure_s_of(frame) : 0;
+  if (!bracket_ && tells) {
+    const double single_s = single_.image ? exposure_s_of(single_) : exposure_s;
+    if (about_equal(exposure_s, single_s)) {
+      single_ = frame;
+    } else {
+      bracket_ = std::make_unique<RollingBracket>(2, merging_);
+      bracket_->add(single_.image, single_s, single_.number, single_.time);
+      single_ = {};
+      newest_ = {};  // it was a shot alone, in other units
+    }
+  }
   if (!bracket_) {
     newest_ = {frame.image, frame.time};
     return true;
   }
-  const double exposure_s = exposure_s_of(frame);
-  if (!(exposure_s > 0) || frame.status == capture::FrameStatus::damaged) {
+  if (!tells) {
     ++status_.rejected;
     return false;
   }

@@ -41,7 +41,9 @@ struct ProbeStatus {
 class ProbeSource {
  public:
   // Opens or merges what the set names. A recording is in step with the plate: where it is first
-  // asked for at `from` of the show's time, it begins there. Throws SetError.
+  // asked for at `from` of the show's time, it begins there. It brackets if two exposures are known
+  // among its first 16 frames, or later; lost, damaged and unlabelled ones are passed over. Throws
+  // SetError.
   explicit ProbeSource(const Set& set, std::optional<capture::Time> from = std::nullopt);
 
   // Whether it may go on for another set: it is a camera, and that set has the same one, asked in
@@ -68,10 +70,12 @@ class ProbeSource {
   void open(const Set& set, std::optional<capture::Time> from);
   void open_camera(const Set& set, const ProbeSettings& probe, std::optional<capture::Time> from);
   void prime();
+  void begin_unmerged();
   void prime_live(std::size_t cycle);
   void note_camera();
   capture::Frame wait_for_next();
   void take(const std::vector<capture::Frame>& frames);
+  bool tells_exposure(const capture::Frame& frame) const;
   bool add(const capture::Frame& frame);
   void merge(capture::Time time);
   double exposure_s_of(const capture::Frame& frame) const;
@@ -83,9 +87,10 @@ class ProbeSource {
   std::vector<double> exposures_s_;
   capture::Time offset_{};  // its clock less the show's
   capture::Time passed_{};  // of a recording that loops: by passes before it was opened
-  capture::WindowMergeSettings merging_;  // with the camera's noise, if calibration has told it
-  std::unique_ptr<Source> camera_;        // null = the radiance stays
-  std::unique_ptr<RollingBracket> bracket_;
+  capture::WindowMergeSettings merging_;     // with the camera's noise, if calibration has told it
+  std::unique_ptr<Source> camera_;           // null = the radiance stays
+  std::unique_ptr<RollingBracket> bracket_;  // null while no two exposures are known
+  capture::Frame single_;                    // the newest of the one exposure that is known
   Radiance newest_;
   ProbeStatus status_;
 };

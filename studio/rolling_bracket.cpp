@@ -32,6 +32,8 @@ std::int64_t checked(std::size_t cycle) {
 RollingBracket::RollingBracket(std::size_t cycle, capture::WindowMergeSettings settings)
     : settings_(settings), cycle_(checked(cycle)) {}
 
+void RollingBracket::set_cycle(std::size_t cycle) { cycle_ = checked(cycle); }
+
 void RollingBracket::set_cycle(std::span<const double> exposures_s) {
   cycle_ = checked(exposures_s.size());
   exposures_s_.assign(exposures_s.begin(), exposures_s.end());

@@ -24,6 +24,8 @@ class RollingBracket {
   // `cycle` is how many shots the camera takes until its exposures repeat, 1 to 16.
   explicit RollingBracket(std::size_t cycle, capture::WindowMergeSettings settings = {});
 
+  // So many shots are taken until exposures repeat, 1 to 16; any may come.
+  void set_cycle(std::size_t cycle);
   // The exposures that the camera takes in turn have changed: shots of others stay for two cycles.
   // Throws std::invalid_argument for none, or more than 16.
   void set_cycle(std::span<const double> exposures_s);

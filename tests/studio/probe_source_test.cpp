@@ -32,14 +32,16 @@ struct Moment {
   double radiance = 100;  // of all pixels; the middle exposure resolves it
   bool lost = false;
   bool labelled = true;
+  bool damaged = false;
 };
 
 // A camera of three exposures in turn that films what the test says.
 class ScriptedCamera final : public capture::Camera {
  public:
   explicit ScriptedCamera(std::function<Moment(std::int64_t)> script,
-                          std::int64_t frames = INT64_MAX)
-      : script_(std::move(script)), frames_(frames) {
+                          std::int64_t frames = INT64_MAX,
+                          std::int64_t times_each = 1)
+      : script_(std::move(script)), frames_(frames), times_each_(times_each) {
     info_.width = 8;
     info_.height = 4;
     info_.rate = rate;
@@ -49,7 +51,7 @@ class ScriptedCamera final : public capture::Camera {
   std::optional<capture::Frame> next() override {
     if (number_ == frames_) return std::nullopt;
     const Moment moment = script_(number_);
-    const double exposure_s = exposures_s[static_cast<std::size_t>(number_ % 3)];
+    const double exposure_s = exposures_s[static_cast<std::size_t>(number_ / times_each_ % 3)];
     capture::Frame frame;
     frame.number = number_;
     frame.time = capture::time_of_frame(number_, rate);
@@ -64,6 +66,7 @@ class ScriptedCamera final : public capture::Camera {
       }
       last_ = std::move(image);
       if (moment.labelled) frame.exposure_s = exposure_s;
+      if (moment.damaged) frame.status = capture::FrameStatus::damaged;
     }
     frame.image = last_;
     return frame;
@@ -72,6 +75,7 @@ class ScriptedCamera final : public capture::Camera {
  private:
   std::function<Moment(std::int64_t)> script_;
   std::int64_t frames_;
+  std::int64_t times_each_;
   capture::CameraInfo info_;
   std::int64_t number_ = 0;
   std::shared_ptr<const capture::Image> last_;
@@ -80,9 +84,11 @@ class ScriptedCamera final : public capture::Camera {
 class ProbeSourceTest : public testing::Test {
  protected:
   // The light at each frame's time, the first `frames` of them.
-  std::vector<double> light_over(std::int64_t frames, std::function<Moment(std::int64_t)> script) {
+  std::vector<double> light_over(std::int64_t frames,
+                                 std::function<Moment(std::int64_t)> script,
+                                 std::int64_t times_each = 1) {
     capture::register_camera("scripted", [&](std::string_view, const capture::CameraOptions&) {
-      return std::make_unique<ScriptedCamera>(script);
+      return std::make_unique<ScriptedCamera>(script, INT64_MAX, times_each);
     });
     Set set;
     set.probe.emplace();
@@ -203,6 +209,49 @@ TEST_F(ProbeSourceTest, MergesWithoutAMemberThatIsMissingForAWhile) {
   for (const double now : light) EXPECT_NEAR(now, 100, 1);
   EXPECT_EQ(statuses_[50 - 3].shots, 2U);
   EXPECT_EQ(statuses_.back().shots, 3U);
+}
+
+TEST_F(ProbeSourceTest, MergesABracketWhoseFirstFramesTellNothing) {
+  for (const int what : {0, 1, 2}) {
+    const auto light = light_over(20, [&](std::int64_t n) {
+      const bool first = n < 2;
+      return Moment{.radiance = 100,
+                    .lost = first && what == 0,
+                    .labelled = !first || what != 1,
+                    .damaged = first && what == 2};
+    });
+    for (const double now : light) EXPECT_NEAR(now, 100, 1) << what;
+    EXPECT_EQ(statuses_.back().shots, 3U) << what;
+  }
+}
+
+TEST_F(ProbeSourceTest, MergesABracketThatSendsEachShotTwice) {
+  const auto light = light_over(
+      20, [](std::int64_t) { return Moment{.radiance = 100}; }, 2);
+  for (const double now : light) EXPECT_NEAR(now, 100, 1);
+  EXPECT_EQ(statuses_.front().shots, 3U);
+}
+
+TEST_F(ProbeSourceTest, MergesFromWhenASecondExposureIsKnown) {
+  const auto light =
+      light_over(60, [](std::int64_t n) { return Moment{.radiance = 100, .labelled = n >= 30}; });
+  EXPECT_NEAR(light[19 - 3], 0.1, 0.001) << "a shot alone, of the middle exposure";
+  for (std::int64_t n = 31; n < 60; ++n) {
+    EXPECT_NEAR(light[static_cast<std::size_t>(n - 3)], 100, 1) << n;
+  }
+}
+
+// Frames that were read to find a bracket are shown at their time all the same.
+TEST_F(ProbeSourceTest, ShowsWhatHasNoExposuresFrameByFrame) {
+  const auto light = light_over(20, [](std::int64_t n) {
+    return Moment{.radiance = static_cast<double>(n), .lost = n == 0, .labelled = false};
+  });
+  for (std::int64_t n = 3; n < 20; ++n) {
+    const double shot =
+        std::min(static_cast<double>(n) * exposures_s[static_cast<std::size_t>(n % 3)], 1.0);
+    EXPECT_NEAR(light[static_cast<std::size_t>(n - 3)], shot, 1e-6) << n;
+  }
+  EXPECT_EQ(statuses_.back().frames, 20);
 }
 
 // The made light camera as time goes by, some five times as fast as its frames' numbers say.
