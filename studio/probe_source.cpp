@@ -22,7 +22,7 @@ constexpr std::size_t longest_cycle = 16;                            // exposure
 constexpr double same_exposure = 0.02;                               // relative
 constexpr capture::Time bracket_patience = std::chrono::seconds(5);  // for a live camera's first
 constexpr capture::Time next_patience = std::chrono::seconds(2);  // for a live camera's next frame
-// From these shares of pixels on, the shots tell nothing.
+// From these shares of pixels on, of those that the lens sees, the shots tell nothing.
 constexpr double all_saturated = 0.5;
 constexpr double least_told = 1e-4;
 
@@ -67,6 +67,34 @@ capture::LightMeterSettings meter_of(const ProbeSettings& probe, const capture::
     }
   }
   return meter;
+}
+
+// Of the pixels that the lens sees, or all if none is known, one in so many rows and columns that
+// they are some ten thousands. All where it sees none.
+std::vector<std::size_t> pixels_seen(const ProbeSettings& probe, const capture::CameraInfo& info) {
+  constexpr int steps = 128;  // along the shorter side
+  const int step = std::max(std::min(info.width, info.height) / steps, 1);
+  const bool has_lens =
+      probe.lens && probe.lens->width == info.width && probe.lens->height == info.height;
+  std::vector<std::size_t> all, seen;
+  for (int y = 0; y < info.height; y += step) {
+    for (int x = 0; x < info.width; x += step) {
+      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(info.width) +
+                         static_cast<std::size_t>(x);
+      all.push_back(pixel);
+      const calibrate::Vec2 q{static_cast<double>(x), static_cast<double>(y)};
+      if (has_lens && calibrate::unproject(*probe.lens, q)) seen.push_back(pixel);
+    }
+  }
+  return seen.empty() ? all : seen;
+}
+
+double share_of(capture::MergeStatus status,
+                const capture::MergedFrame& merged,
+                const std::vector<std::size_t>& pixels) {
+  const auto count =
+      std::ranges::count_if(pixels, [&](std::size_t i) { return merged.status[i] == status; });
+  return static_cast<double>(count) / static_cast<double>(pixels.size());
 }
 
 // Light that has gone is expected back for half a second.
@@ -194,6 +222,7 @@ void ProbeSource::open_camera(const Set& set,
     return;
   }
   status_.live = true;
+  seen_ = pixels_seen(probe, camera_->info());
   if (cycle > 0) {
     prime_live(cycle);
     return;
@@ -328,10 +357,8 @@ void ProbeSource::merge(capture::Time time) {
   status_.shots = bracket_->shots();
   status_.flicker = bracket_->flicker();
   status_.shares = merged->status_shares();
-  const auto share_of = [&](capture::MergeStatus status) {
-    return status_.shares[static_cast<std::size_t>(status)];
-  };
-  const bool saturated = share_of(capture::MergeStatus::lower_bound) > all_saturated;
+  const bool saturated =
+      share_of(capture::MergeStatus::lower_bound, *merged, seen_) > all_saturated;
   const double told = share_above(merged->radiance, bracket_->least_radiance());
   const bool first = newest_.image == nullptr;
   status_.kept_because = first               ? ""

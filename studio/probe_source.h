@@ -85,8 +85,9 @@ class ProbeSource {
   FileTimes times_;  // of the response, when it was read
   int height_ = 0, width_ = 0;
   std::vector<double> exposures_s_;
-  capture::Time offset_{};  // its clock less the show's
-  capture::Time passed_{};  // of a recording that loops: by passes before it was opened
+  capture::Time offset_{};         // its clock less the show's
+  capture::Time passed_{};         // of a recording that loops: by passes before it was opened
+  std::vector<std::size_t> seen_;  // some of the pixels that the lens sees, evenly spread
   capture::WindowMergeSettings merging_;     // with the camera's noise, if calibration has told it
   std::unique_ptr<Source> camera_;           // null = the radiance stays
   std::unique_ptr<RollingBracket> bracket_;  // null while no two exposures are known

@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "calibrate/lens.h"
 #include "capture/live_reader.h"
 #include "studio/rolling_bracket.h"
 #include "tests/capture/made_light_camera.h"
@@ -33,6 +34,7 @@ struct Moment {
   bool lost = false;
   bool labelled = true;
   bool damaged = false;
+  bool circle = false;  // the rest of the picture, most of it, is black
 };
 
 // A camera of three exposures in turn that films what the test says.
@@ -64,6 +66,10 @@ class ScriptedCamera final : public capture::Camera {
       for (float& v : image->pixels) {
         v = static_cast<float>(std::min(moment.radiance * exposure_s, 1.0));
       }
+      for (int i = 0; moment.circle && i < 4 * 8; ++i) {
+        if (std::hypot(i % 8 - 3.5, i / 8 - 1.5) < 2.05) continue;
+        for (int c = 0; c < 3; ++c) image->at(i / 8, i % 8, c) = 0;
+      }
       last_ = std::move(image);
       if (moment.labelled) frame.exposure_s = exposure_s;
       if (moment.damaged) frame.status = capture::FrameStatus::damaged;
@@ -94,17 +100,19 @@ class ProbeSourceTest : public testing::Test {
     set.probe.emplace();
     set.probe->kind = ProbeSettings::Kind::camera;
     set.probe->source = "scripted:";
+    set.probe->lens = lens_;
     ProbeSource source(set);
     std::vector<double> light;
     statuses_.clear();
     for (std::int64_t n = 3; n < frames; ++n) {  // it has read a bracket ahead
-      light.push_back(source.at(capture::time_of_frame(n, rate)).image->pixels.front());
+      light.push_back(source.at(capture::time_of_frame(n, rate)).image->at(1, 3, 0));
       statuses_.push_back(source.status());
     }
     return light;
   }
 
   std::vector<ProbeStatus> statuses_;
+  std::optional<calibrate::Lens> lens_;
 };
 
 // Light changes at an instant; a probe that stamps it later shows it at that instant all the same.
@@ -166,6 +174,23 @@ TEST_F(ProbeSourceTest, KeepsTheLastGoodLightWhileAllIsSaturatedOrBlack) {
     EXPECT_NEAR(light.back(), 100, 1);
     EXPECT_EQ(statuses_.back().kept_because, "");
   }
+}
+
+// The corners of a fish-eye's picture are black for ever.
+TEST_F(ProbeSourceTest, KeepsTheLastGoodLightWhileAllThatItsLensSeesIsSaturated) {
+  lens_ = calibrate::Lens{.model = "equisolid",
+                          .width = 8,
+                          .height = 4,
+                          .parameters = {1.45, 3.5, 1.5},
+                          .max_angle_rad = 1.5707963};
+  const auto light = light_over(60, [](std::int64_t n) {
+    return Moment{.radiance = n >= 15 && n < 40 ? 1e7 : 100.0, .circle = true};
+  });
+  for (std::int64_t n = 20; n < 40; ++n) {
+    EXPECT_NEAR(light[static_cast<std::size_t>(n - 3)], 100, 1) << n;
+    EXPECT_THAT(statuses_[static_cast<std::size_t>(n - 3)].kept_because, HasSubstr("saturated"));
+  }
+  EXPECT_EQ(statuses_.back().kept_because, "");
 }
 
 TEST_F(ProbeSourceTest, KeepsTheLastGoodLightWhileTheCameraIsAway) {
