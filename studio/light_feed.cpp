@@ -17,7 +17,7 @@ constexpr int environment_height = 256;
 // The gain is averaged over about this many frames, and starts anew on a change beyond noise.
 constexpr double gain_frames = 12;
 constexpr double sudden_gain = 0.2;
-// Smaller changes than this leave the environment as it is.
+// Smaller changes than this, of the gain or the floor, leave the environment as it is.
 constexpr double gain_step = 0.01;
 
 [[noreturn]] void fail(const Set& set, const std::string& message) {
@@ -57,6 +57,13 @@ std::optional<calibrate::Vec3f> floor_of_plate(const capture::Image* plate,
   }
   if (pixels == 0) return std::nullopt;
   return calibrate::to_float({sum[0] / pixels, sum[1] / pixels, sum[2] / pixels});
+}
+
+bool differ(const calibrate::Vec3f& a, const calibrate::Vec3f& b) {
+  const auto apart = [](float u, float v) {
+    return std::abs(u - v) > static_cast<float>(gain_step) * std::max(u, v);
+  };
+  return apart(a.x, b.x) || apart(a.y, b.y) || apart(a.z, b.z);
 }
 
 // The probe that `before` has open, or the set's own.
@@ -136,15 +143,24 @@ const capture::Image* LightFeed::even_plate(const LightRequest& request) {
   return &evened_;
 }
 
-void LightFeed::build_environment(const LightRequest& request) {
+// Measures the floor of a new plate. True if it differs from the environment's.
+bool LightFeed::follow_floor(const LightRequest& request) {
+  if (!mapper_ || settings_->unseen != render::Unseen::floor) return false;
+  if (request.plate == nullptr || request.plate == floor_plate_) return false;
+  floor_plate_ = request.plate;
+  const std::optional<calibrate::Vec3f> now = floor_of_plate(plate_, request);
+  if (now && floor_ && !differ(*now, *floor_)) return false;
+  if (!now && !floor_) return false;
+  floor_ = now;
+  return true;
+}
+
+void LightFeed::build_environment() {
   std::shared_ptr<render::Environment> env = environments_.lend();
   const render::ColourMatrix match = render::matrix_of(match_);
   int below_zero = 0;
   if (mapper_) {
-    render::ProbeFrame frame{match, {}};
-    if (settings_->unseen == render::Unseen::floor)
-      frame.floor_radiance = floor_of_plate(plate_, request);
-    mapper_->map(*radiance_, frame, *env);
+    mapper_->map(*radiance_, {match, floor_}, *env);
     below_zero = mapper_->texels_below_zero();
   } else {
     *env = render::environment_from_map(*radiance_, settings_->yaw_rad, environment_height);
@@ -222,10 +238,11 @@ void LightFeed::update_environment(const LightRequest& request) {
   const ProbeSource::Radiance newest = source_->at(request.time);
   const bool fresh = newest.image != radiance_;
   radiance_ = newest.image;
-  if (fresh) build_environment(request);
+  const bool new_floor = follow_floor(request);
+  if (fresh || new_floor) build_environment();
   const bool new_gain = follow_match(request);
-  if (new_gain) build_environment(request);
-  if (!fresh && !new_gain) return;
+  if (new_gain) build_environment();
+  if (!fresh && !new_floor && !new_gain) return;
   table_count_ = 0;
 }
 
@@ -233,7 +250,7 @@ std::shared_ptr<const render::Environment> LightFeed::begin(const LightRequest& 
   if (goes_on_) return nullptr;
   Light light = at(request);
   // That plate may be gone, and another one be in its place.
-  matched_plate_ = nullptr;
+  matched_plate_ = floor_plate_ = nullptr;
   return std::move(light.environment);
 }
 

@@ -63,7 +63,8 @@ class LightFeed {
  private:
   const capture::Image* even_plate(const LightRequest& request);
   void update_environment(const LightRequest& request);
-  void build_environment(const LightRequest& request);
+  bool follow_floor(const LightRequest& request);
+  void build_environment();
   render::MatchResult measure_match(const LightRequest& request) const;
   bool follow_match(const LightRequest& request);
   render::MatchResult given_match(double exposure) const;
@@ -77,6 +78,8 @@ class LightFeed {
   std::unique_ptr<render::ProbeMapper> mapper_;  // null = latitude-longitude
   render::LightFollower follower_;
   std::shared_ptr<const capture::Image> radiance_;  // that the environment was made from
+  const capture::Image* floor_plate_ = nullptr;     // that the floor was measured in
+  std::optional<calibrate::Vec3f> floor_;           // of the environment, where it is the plate's
   const capture::Image* matched_plate_ = nullptr;
   bool matched_ = false;
   std::array<double, 3> averaged_gain_{1, 1, 1};

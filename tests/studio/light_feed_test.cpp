@@ -1,0 +1,100 @@
+// The light of a still probe under a plate that changes.
+#include "studio/light_feed.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "calibrate/angles.h"
+#include "capture/camera.h"
+#include "render/environment.h"
+
+namespace studio::light_feed_test {
+namespace {
+
+// One even picture.
+class StillCamera final : public capture::Camera {
+ public:
+  explicit StillCamera(float radiance) {
+    info_.width = info_.height = 64;
+    image_ = std::make_shared<capture::Image>(capture::make_image(64, 64));
+    for (float& value : image_->pixels) value = radiance;
+  }
+  const capture::CameraInfo& info() const override { return info_; }
+  capture::CameraStatistics statistics() const override { return {}; }
+  std::optional<capture::Frame> next() override {
+    if (!image_) return std::nullopt;
+    capture::Frame frame;
+    frame.image = std::move(image_);
+    return frame;
+  }
+
+ private:
+  capture::CameraInfo info_;
+  std::shared_ptr<capture::Image> image_;
+};
+
+// A probe that looks up and sees the upper half, or more.
+Set set_of(float radiance, double max_angle_rad = std::numbers::pi / 2) {
+  capture::register_camera("still", [radiance](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<StillCamera>(radiance);
+  });
+  Set set;
+  set.probe.emplace();
+  set.probe->kind = ProbeSettings::Kind::camera;
+  set.probe->source = "still:";
+  set.probe->lens = calibrate::Lens{"equisolid", 64, 64, {22, 31.5, 31.5}, max_angle_rad};
+  set.probe->match.method = MatchSettings::Method::given;
+  return set;
+}
+
+// What a camera films of even radiance: down at the floor, or up.
+class Plate {
+ public:
+  explicit Plate(double looks_at_z)
+      : cam_from_set_(calibrate::look_at({0, -4, 1}, {0, 0, looks_at_z}, 0)) {}
+  LightRequest request(float radiance) {
+    pictures_.push_back(std::make_unique<capture::Image>(capture::make_image(64, 64)));
+    for (float& value : pictures_.back()->pixels) value = radiance;
+    LightRequest request;
+    request.plate = pictures_.back().get();
+    request.directions = &directions_;
+    request.cam_from_set = cam_from_set_;
+    return request;
+  }
+
+ private:
+  calibrate::DirectionTable directions_ =
+      calibrate::make_direction_table({"pinhole", 64, 64, {60, 60, 31.5, 31.5}});
+  calibrate::Pose cam_from_set_;
+  std::vector<std::unique_ptr<capture::Image>> pictures_;  // each has an address of its own
+};
+
+TEST(LightFeed, FillsTheFloorAsThePresentPlateHasIt) {
+  const Set set = set_of(0.1F, std::numbers::pi / 3);
+  Plate plate(0);
+  LightFeed faded(set);
+  EXPECT_EQ(faded.at(plate.request(0)).table.unseen_share, 0);
+  const Light late = faded.at(plate.request(0.6F));
+  const Light early = LightFeed(set).at(plate.request(0.6F));
+  EXPECT_GT(late.table.unseen_share, 0.1);
+  EXPECT_EQ(late.table.unseen_share, early.table.unseen_share);
+  EXPECT_EQ(late.environment->radiance.pixels, early.environment->radiance.pixels);
+}
+
+TEST(LightFeed, KeepsItsEnvironmentUnderAPlateThatHardlyChanges) {
+  Plate plate(0);
+  LightFeed light(set_of(0.1F));
+  const auto first = light.at(plate.request(0.5F)).environment;
+  EXPECT_EQ(light.at(plate.request(0.502F)).environment, first);
+  EXPECT_NE(light.at(plate.request(0.51F)).environment, first);
+}
+
+}  // namespace
+}  // namespace studio::light_feed_test
