@@ -393,7 +393,11 @@ Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness, cons
   return sum;
 }
 
-Vec3f irradiance_of(const Environment& env, Vec3f normal) {
+namespace {
+
+// Of the texels that count.
+template <class Counts>
+Vec3f sum_irradiance(const Environment& env, Vec3f normal, const Counts& counts) {
   const capture::Image& map = env.radiance;
   // What the cosine owes to a column, before the row's sine.
   std::vector<float> across(static_cast<std::size_t>(map.width));
@@ -410,7 +414,9 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal) {
     const float along = normal.z * std::cos(polar_rad);
     std::array<float, 3> row{};
     const float* p = &map.pixels[map.index(y, 0)];
+    const std::size_t first = map.index(y, 0) / 3;
     for (std::size_t x = 0; x < across.size(); ++x, p += 3) {
+      if (!counts(first + x)) continue;
       const float cosine = std::max(sine * across[x] + along, 0.0F);
       for (std::size_t c = 0; c < 3; ++c) row[c] += cosine * counted_radiance(p[c]);
     }
@@ -418,6 +424,18 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal) {
     for (std::size_t c = 0; c < 3; ++c) sum[c] += row[c] * solid_angle;
   }
   return {static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2])};
+}
+
+}  // namespace
+
+Vec3f irradiance_of(const Environment& env, Vec3f normal) {
+  return sum_irradiance(env, normal, [](std::size_t) { return true; });
+}
+
+SplitIrradiance split_irradiance_of(const Environment& env, Vec3f normal) {
+  const auto is_seen = [&](std::size_t t) { return env.seen.empty() || env.seen[t] != 0; };
+  return {sum_irradiance(env, normal, is_seen),
+          sum_irradiance(env, normal, [&](std::size_t t) { return !is_seen(t); })};
 }
 
 void smooth_for_reflections(Environment& env, int levels) {

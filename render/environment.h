@@ -109,6 +109,12 @@ Vec3f radiance_at(const capture::Image& level, float x, float y);
 // Irradiance on a surface that faces `normal` (unit), summed over all texels.
 Vec3f irradiance_of(const Environment& env, Vec3f normal);
 
+// The same of texels that the probe saw, and of those that were filled in.
+struct SplitIrradiance {
+  Vec3f seen, filled;
+};
+SplitIrradiance split_irradiance_of(const Environment& env, Vec3f normal);
+
 // Fills `smoothed` with `levels` (at least 2) levels, and `halved`. About 2 ms for 512x256. The
 // lobe is that of a surface seen head-on, the same all around, of alpha = roughness^2; what it
 // would send below the surface is mirrored up again, as in standard.h, so every level keeps a white

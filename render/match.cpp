@@ -199,7 +199,8 @@ MatchResult match_by_patch(const capture::Image& plate,
                            const Patch& patch,
                            std::array<float, 3> albedo,
                            Vec3f irradiance,
-                           const MatchSettings& settings) {
+                           const MatchSettings& settings,
+                           Vec3f filled) {
   for (const float a : albedo) {
     if (!(a > 0 && a <= 1)) throw std::invalid_argument("an albedo must be above 0 and at most 1");
   }
@@ -212,8 +213,17 @@ MatchResult match_by_patch(const capture::Image& plate,
   }
   const Robust robust = robust_mean(pixels);
   const std::array light{irradiance.x, irradiance.y, irradiance.z};
+  const std::array filled_in{filled.x, filled.y, filled.z};
   for (std::size_t c = 0; c < 3; ++c) {
-    result.gain[c] = static_cast<float>(pi * robust.median[c] / (albedo[c] * light[c]));
+    const double missing = pi * robust.median[c] / albedo[c] - filled_in[c];
+    if (!(missing > 0)) {
+      result.gain = {1, 1, 1};
+      result.note =
+          "the floor that is filled in from the plate lights the patch more than it is: gain left "
+          "at 1";
+      return result;
+    }
+    result.gain[c] = static_cast<float>(missing / light[c]);
   }
   result.implied_albedo = albedo;
   result.pixels = static_cast<int>(pixels.size());

@@ -62,14 +62,17 @@ struct Patch {
 };
 
 // From a matt patch of stated albedo per channel, lit by `irradiance` (irradiance_of() with the
-// patch's normal, at gain 1): gain = pi * plate / (albedo * irradiance). Throws
+// patch's normal, at gain 1): gain = (pi * plate / albedo - filled) / irradiance, `filled` being
+// irradiance in the plate's units that no gain changes, of a floor filled in from the plate. Throws
 // std::invalid_argument if the patch leaves the plate or an albedo is not above 0 and at most 1. A
-// patch that is clipped, dark or unlit leaves the gain at 1, and the note says so.
+// patch that is clipped, dark, unlit, or lit enough by `filled` alone, leaves the gain at 1, and
+// the note says so.
 MatchResult match_by_patch(const capture::Image& plate,
                            const Patch& patch,
                            std::array<float, 3> albedo,
                            Vec3f irradiance,
-                           const MatchSettings& settings = {});
+                           const MatchSettings& settings = {},
+                           Vec3f filled = {});
 
 // A given gain, or matrix, of a plate whose exposure is another by this factor.
 MatchResult match_given(std::array<float, 3> gain, double exposure = 1);

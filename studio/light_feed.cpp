@@ -177,8 +177,10 @@ render::MatchResult LightFeed::measure_match(const LightRequest& request) const 
   if (match.method == MatchSettings::Method::patch) {
     const auto [x, y, width, height] = match.patch;
     const calibrate::Vec3f normal = calibrate::to_float(calibrate::normalize(match.normal));
-    return render::match_by_patch(*plate_, {x, y, width, height}, match.albedo,
-                                  render::irradiance_of(*environment_, normal));
+    render::SplitIrradiance light = render::split_irradiance_of(*environment_, normal);
+    if (!floor_) light = {light.seen + light.filled, {}};  // what is filled in goes with the gain
+    return render::match_by_patch(*plate_, {x, y, width, height}, match.albedo, light.seen, {},
+                                  light.filled);
   }
   return render::match_by_overlap(*plate_, *request.directions, request.cam_from_set,
                                   *environment_);

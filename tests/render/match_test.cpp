@@ -118,6 +118,21 @@ TEST(MatchByPatch, FindsTheGainThatGivesThePatchItsAlbedo) {
   for (const float albedo : result.implied_albedo) EXPECT_NEAR(albedo, 0.6F, 1e-6F);
 }
 
+TEST(MatchByPatch, LeavesLightThatNoGainChangesToItself) {
+  capture::Image plate = capture::make_image(8, 8);
+  for (float& value : plate.pixels) value = 0.3F;
+  const std::array<float, 3> albedo{0.6F, 0.6F, 0.6F};  // irradiance pi / 2
+  const Vec3f quarter = Vec3f{1, 1, 1} * (pi_f / 4);
+  const MatchResult result =
+      match_by_patch(plate, {0, 0, 8, 8}, albedo, Vec3f{1, 1, 1} * pi_f, {}, quarter);
+  for (const float gain : result.gain) EXPECT_NEAR(gain, 0.25F, 1e-6F);
+  const MatchResult none =
+      match_by_patch(plate, {0, 0, 8, 8}, albedo, Vec3f{1, 1, 1} * pi_f, {}, quarter * 2.1F);
+  EXPECT_EQ(none.pixels, 0);
+  EXPECT_EQ(none.gain, (std::array<float, 3>{1, 1, 1}));
+  EXPECT_NE(none.note.find("filled in"), std::string::npos);
+}
+
 TEST(MatchByPatch, SaysWhyAPatchIsOfNoUse) {
   capture::Image plate = capture::make_image(8, 8);
   const std::array<float, 3> grey{0.18F, 0.18F, 0.18F};

@@ -96,5 +96,26 @@ TEST(LightFeed, KeepsItsEnvironmentUnderAPlateThatHardlyChanges) {
   EXPECT_NE(light.at(plate.request(0.51F)).environment, first);
 }
 
+// Walls, too, that the floor lights: it is in the plate's units, whatever the gain.
+TEST(LightFeed, GivesAPatchItsAlbedoWhereverItFaces) {
+  for (const float radiance : {0.01F, 1.0F, 100.0F}) {
+    for (const calibrate::Vec3 normal : {calibrate::Vec3{0, 0, 1}, {0, -1, 0}, {0, -0.7, 0.7}}) {
+      Set set = set_of(radiance);
+      MatchSettings& match = set.probe->match;
+      match.method = MatchSettings::Method::patch;
+      match.patch = {10, 10, 20, 20};
+      match.albedo = {0.5F, 0.5F, 0.5F};
+      match.normal = normal;
+      Plate plate(1);
+      LightFeed feed(set);
+      const Light light = feed.at(plate.request(0.3F));
+      const render::Vec3f n = calibrate::to_float(calibrate::normalize(normal));
+      const float needed = calibrate::pi_f * 0.3F / 0.5F;
+      EXPECT_NEAR(render::irradiance_of(*light.environment, n).y / needed, 1, 0.002)
+          << radiance << ", " << normal.z;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace studio::light_feed_test
