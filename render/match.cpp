@@ -179,8 +179,8 @@ MatchResult match_by_overlap(const capture::Image& plate,
   }
   if (ratios.empty()) {
     result.note =
-        "no direction is seen by both cameras, unclipped and not dark: gain left at 1; state "
-        "a patch of known albedo, or a gain";
+        "no direction is seen by both cameras, unclipped and not dark: " + settings.else_gain +
+        "; state a patch of known albedo, or a gain";
     return result;
   }
   const Robust robust = robust_mean(ratios);
@@ -207,8 +207,9 @@ MatchResult match_by_patch(const capture::Image& plate,
   const std::vector<Colour> pixels = patch_pixels(plate, patch, settings);
   MatchResult result;
   if (pixels.empty() || !is_lit(irradiance)) {
-    result.note = pixels.empty() ? "the patch is clipped or dark: gain left at 1"
-                                 : "the lightprobe puts no light on the patch: gain left at 1";
+    result.note = (pixels.empty() ? "the patch is clipped or dark: "
+                                  : "the lightprobe puts no light on the patch: ") +
+                  settings.else_gain;
     return result;
   }
   const Robust robust = robust_mean(pixels);
@@ -219,8 +220,8 @@ MatchResult match_by_patch(const capture::Image& plate,
     if (!(missing > 0)) {
       result.gain = {1, 1, 1};
       result.note =
-          "the floor that is filled in from the plate lights the patch more than it is: gain left "
-          "at 1";
+          "the floor that is filled in from the plate lights the patch more than it is: " +
+          settings.else_gain;
       return result;
     }
     result.gain[c] = static_cast<float>(missing / light[c]);

@@ -27,6 +27,8 @@ struct MatchResult {
 struct MatchSettings {
   float clipped = 0.98F;   // plate values from here on say nothing
   float darkest = 0.005F;  // neither do plate values below this
+  // What becomes of the gain where nothing tells it, for the note.
+  std::string else_gain = "gain left at 1";
 };
 
 // A texel of the environment that both cameras see.

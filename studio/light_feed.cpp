@@ -174,16 +174,18 @@ void LightFeed::build_environment() {
 // Of the plate over the environment as it is now, which already holds the gain so far.
 render::MatchResult LightFeed::measure_match(const LightRequest& request) const {
   const MatchSettings& match = settings_->match;
+  render::MatchSettings matching;
+  if (matched_) matching.else_gain = "the last gain is held";
   if (match.method == MatchSettings::Method::patch) {
     const auto [x, y, width, height] = match.patch;
     const calibrate::Vec3f normal = calibrate::to_float(calibrate::normalize(match.normal));
     render::SplitIrradiance light = render::split_irradiance_of(*environment_, normal);
     if (!floor_) light = {light.seen + light.filled, {}};  // what is filled in goes with the gain
-    return render::match_by_patch(*plate_, {x, y, width, height}, match.albedo, light.seen, {},
-                                  light.filled);
+    return render::match_by_patch(*plate_, {x, y, width, height}, match.albedo, light.seen,
+                                  matching, light.filled);
   }
-  return render::match_by_overlap(*plate_, *request.directions, request.cam_from_set,
-                                  *environment_);
+  return render::match_by_overlap(*plate_, *request.directions, request.cam_from_set, *environment_,
+                                  matching);
 }
 
 render::MatchResult LightFeed::given_match(double exposure) const {

@@ -1,6 +1,7 @@
 // The light of a still probe under a plate that changes.
 #include "studio/light_feed.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -17,6 +18,9 @@
 
 namespace studio::light_feed_test {
 namespace {
+
+using testing::HasSubstr;
+using testing::Not;
 
 // One even picture.
 class StillCamera final : public capture::Camera {
@@ -115,6 +119,20 @@ TEST(LightFeed, GivesAPatchItsAlbedoWhereverItFaces) {
           << radiance << ", " << normal.z;
     }
   }
+}
+
+TEST(LightFeed, SaysThatTheLastGainIsHeldWhileThePlateIsDark) {
+  Set set = set_of(100);
+  set.probe->match = {};
+  Plate plate(4);
+  LightFeed feed(set);
+  EXPECT_THAT(feed.at(plate.request(0)).match.note, HasSubstr("gain left at 1"));
+  const Light found = feed.at(plate.request(0.5F));
+  EXPECT_NEAR(found.match.gain[1], 0.005, 1e-4);
+  const Light dark = feed.at(plate.request(0));
+  EXPECT_EQ(dark.match.gain, found.match.gain);
+  EXPECT_THAT(dark.match.note, HasSubstr("the last gain is held"));
+  EXPECT_THAT(dark.match.note, Not(HasSubstr("left at 1")));
 }
 
 }  // namespace
