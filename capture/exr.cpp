@@ -256,7 +256,9 @@ Image receive(SandboxedChild& child, const ExrLimits& limits) {
       constexpr double digits = 1e5;
       p[i] = std::round(static_cast<double>(header.primaries[i]) * digits) / digits;
     }
-    convert_to_rec709(image, {{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}});
+    const Primaries primaries{{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}};
+    if (primaries != rec709) limit_infinite(image);
+    convert_to_rec709(image, primaries);
   }
   return image;
 }
@@ -324,6 +326,22 @@ void write_exr(const std::string& path, const Image& image, const ExrOptions& op
         {names[c], image.pixels.data() + c, pixel, pixel * static_cast<std::size_t>(image.width)});
   }
   write_slices(path, make_header(image.width, image.height, options), Imf::FLOAT, slices);
+}
+
+void limit_infinite(Image& image) {
+  constexpr float largest_half = 65504;
+  if (std::ranges::none_of(image.pixels, [](float value) { return std::isinf(value); })) return;
+  const auto channels = static_cast<std::size_t>(image.channels);
+  const auto is_alpha = [&](std::size_t i) { return channels == 4 && i % channels == 3; };
+  float largest = largest_half;
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    const float size = std::abs(image.pixels[i]);
+    if (!is_alpha(i) && std::isfinite(size)) largest = std::max(largest, size);
+  }
+  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+    float& value = image.pixels[i];
+    if (!is_alpha(i) && std::isinf(value)) value = std::copysign(largest, value);
+  }
 }
 
 Image read_exr(const std::string& path, const ExrLimits& limits) {

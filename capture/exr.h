@@ -76,12 +76,17 @@ struct ExrLimits {
 // primaries.h). The display window is the picture: data outside are cut off, and what the data
 // window leaves out is 0. Of a multi-part file the first part is read, of a tiled one the finest
 // level; luminance-chroma files become RGB. NaN and infinity come as they are: whoever makes light
-// of the image counts and removes them.
+// of the image counts and removes them. Only before a conversion limit_infinite() comes, which
+// would make nothing of infinity less infinity.
 //
 // OpenEXR decodes in a confined child process (sandbox.h), since hostile files are known to crash
 // it. Throws std::runtime_error with path and reason: missing, damaged, too large (a side over
 // 16,384 pixels, or the limits), deep data, other channels than these.
 Image read_exr(const std::string& path, const ExrLimits& limits = {});
+
+// Infinite values, of light that was beyond the file's format, become as much as the picture's
+// largest finite one, or 65504, the largest half, if that is more. Alpha stays.
+void limit_infinite(Image& image);
 
 // What a file tells of its frames' noise (ExrOptions::noise), if it does and both are finite and
 // not negative. Throws as read_exr, of what comes before the pixels.

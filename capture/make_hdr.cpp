@@ -49,6 +49,7 @@ ShotFile read_shot(const std::string& path) {
   switch (file.kind) {
     case Kind::exr:
       file.picture = read_exr(path);
+      limit_infinite(file.picture);
       break;
     case Kind::rgbe:
       file.picture = read_rgbe(path);

@@ -82,7 +82,9 @@ class PictureReader {
     if (is_coded_file(path)) return coded_.read(path, image);
     if (!is_exr(path) && !is_radiance(path)) return read_still(path, stills_, image);
     check_is_file(path);
-    image = as_colour(is_exr(path) ? read_exr(path) : read_rgbe(path), alpha_);
+    Image light = is_exr(path) ? read_exr(path) : read_rgbe(path);
+    if (is_exr(path)) limit_infinite(light);
+    image = as_colour(std::move(light), alpha_);
     const std::string words = is_exr(path) ? "OpenEXR, linear" : "Radiance, linear";
     return image.channels == 4 ? words + ", alpha" : words;
   }

@@ -4,16 +4,20 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <random>
 #include <stdexcept>
 
+#include "capture/camera.h"
 #include "capture/primaries.h"
 #include "tests/made_files.h"
 
@@ -58,6 +62,39 @@ TEST(WriteExr, KeepsEveryBitOfHalfChannelsUnderEveryCompression) {
       }
     }
   }
+}
+
+// A file of 1 x 3 half pixels that says other primaries.
+std::string write_with_primaries(const HalfImage& image, const std::array<float, 8>& primaries) {
+  const std::string path = made::make_temporary_directory() / "a.exr";
+  write_exr(path, std::vector<ExrPlanes>{{image, {"R", "G", "B"}}});
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  constexpr std::array<float, 8> written{0.64F, 0.33F, 0.3F, 0.6F, 0.15F, 0.06F, 0.3127F, 0.329F};
+  std::string from(sizeof written, 0), to(sizeof written, 0);
+  std::memcpy(from.data(), written.data(), sizeof written);
+  std::memcpy(to.data(), primaries.data(), sizeof written);
+  bytes.replace(bytes.find(from), from.size(), to);
+  std::ofstream(path, std::ios::binary) << bytes;
+  return path;
+}
+
+// A sun that was too much for half floats.
+TEST(ReadExr, TakesInfiniteLightOfAnyPrimariesAsTheLargestHalf) {
+  constexpr Half infinite = 0x7C00, one = 0x3C00;
+  const HalfImage image{
+      1, 3, {infinite, infinite, infinite, infinite, infinite, one, one, one, one}, 3};
+  const Image sun = read_exr(write_with_primaries(
+      image, {0.713F, 0.293F, 0.165F, 0.830F, 0.128F, 0.044F, 0.32168F, 0.33767F}));
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(sun.at(0, 0, c) / 65504, 1, 1e-3) << c;
+    EXPECT_TRUE(std::isfinite(sun.at(0, 1, c))) << c;
+    EXPECT_NEAR(sun.at(0, 2, c), 1, 1e-3) << c;
+  }
+  const std::string plain = made::make_temporary_directory() / "plain.exr";
+  write_exr(plain, std::vector<ExrPlanes>{{image, {"R", "G", "B"}}});
+  EXPECT_EQ(open_camera(plain)->next()->image->pixels,
+            (std::vector<float>{65504, 65504, 65504, 65504, 65504, 1, 1, 1, 1}));
 }
 
 TEST(WriteExr, KeepsEveryBitOfFloats) {
