@@ -45,8 +45,9 @@ enum class FrameStatus {
 struct Frame {
   std::shared_ptr<const Image> image;  // scene-linear; null only if nothing ever arrived
   std::int64_t number = 0;             // counts the source's frames, lost ones included
-  Time time{};                         // middle of the exposure
-  double exposure_s = 0;               // 0 = unknown
+  std::int64_t pass_first = 0;  // of a file that loops: the number of its first frame in this pass
+  Time time{};                  // middle of the exposure
+  double exposure_s = 0;        // 0 = unknown
   FrameStatus status = FrameStatus::good;
   std::string note;  // what happened, in words, if not good
   // What the image was made from; null unless CameraOptions::keep_coded, of live cameras.

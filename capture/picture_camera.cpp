@@ -127,6 +127,7 @@ class PictureCamera : public Camera {
   std::shared_ptr<const Image> last_image_;
   std::size_t entry_ = 0;  // of the next frame
   std::int64_t number_ = 0;
+  std::int64_t pass_first_ = 0;
   Time pass_start_{};
   CameraStatistics statistics_;
 };
@@ -205,11 +206,13 @@ std::optional<Frame> PictureCamera::next() {
       return std::nullopt;
     }
     entry_ = 0;
+    pass_first_ = number_;
     pass_start_ += pass_length_;
   }
   const PictureEntry& entry = entries_[entry_];
   Frame frame;
   frame.number = number_++;
+  frame.pass_first = pass_first_;
   frame.time = pass_start_ + entry.time;
   frame.exposure_s = entry.exposure_s;
   frame.status = entry.status;

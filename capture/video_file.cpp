@@ -108,6 +108,7 @@ class VideoFile : public Camera {
   std::deque<Frame> ahead_;  // made while opening
   std::shared_ptr<const Image> last_image_;
   std::int64_t number_ = 0;       // of the next frame
+  std::int64_t pass_first_ = 0;   // of this pass's first
   std::int64_t pass_frames_ = 0;  // in this pass through the file
   Time pass_start_{};
   Time last_time_{};  // of the last frame given
@@ -294,6 +295,7 @@ bool VideoFile::jump_before(std::int64_t frame) {
 Frame VideoFile::make_frame(const DecodedPicture& picture) {
   Frame frame;
   frame.number = number_++;
+  frame.pass_first = pass_first_;
   frame.time = pass_start_ + clock_->time_of(picture.pts);
   frame.status = picture.status;
   frame.note = picture.note;
@@ -340,6 +342,7 @@ std::optional<DecodedPicture> VideoFile::start_again() {
   }
   std::optional<DecodedPicture> first = first_again();
   pass_start_ = end;
+  pass_first_ = number_;
   pass_frames_ = 0;
   clock_->restart();
   return first;

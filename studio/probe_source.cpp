@@ -237,7 +237,8 @@ void ProbeSource::open_camera(const Set& set,
 
 double ProbeSource::exposure_s_of(const capture::Frame& frame) const {
   if (exposures_s_.empty() || camera_->is_live()) return frame.exposure_s;
-  return exposures_s_[static_cast<std::size_t>(frame.number) % exposures_s_.size()];
+  const auto place = static_cast<std::size_t>(frame.number - frame.pass_first);
+  return exposures_s_[place % exposures_s_.size()];
 }
 
 // The frame after those that were taken; of a live camera, waits for it.

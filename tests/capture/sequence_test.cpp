@@ -91,6 +91,7 @@ TEST(Sequence, StartsAtTheFrameThatIsAskedForAndLoops) {
     const std::optional<Frame> frame = camera->next();
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->number, i + 1);
+    EXPECT_EQ(frame->pass_first, (i + 1) / 3 * 3);
     EXPECT_EQ(frame->time, milliseconds(40 * (i + 1)));
     EXPECT_EQ(frame->image->at(0, 0, 0), light_of(codes[i]));
   }

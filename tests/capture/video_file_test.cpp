@@ -209,6 +209,7 @@ TEST_F(VideoFile, LoopsWithTimeGoingOn) {
     }
     for (std::size_t n = 0; n < frames.size(); ++n) {
       EXPECT_EQ(frames[n].number, static_cast<std::int64_t>(n));
+      EXPECT_EQ(frames[n].pass_first, static_cast<std::int64_t>(n / 20 * 20)) << name;
       EXPECT_EQ(frames[n].time, milliseconds(40 * n)) << name;
       EXPECT_EQ(frames[n].image->pixels, frames[n % 20].image->pixels) << name << " " << n;
     }

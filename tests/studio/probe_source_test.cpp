@@ -9,15 +9,20 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "calibrate/lens.h"
+#include "capture/exr.h"
 #include "capture/live_reader.h"
 #include "studio/rolling_bracket.h"
 #include "tests/capture/made_light_camera.h"
+#include "tests/made_files.h"
 
 namespace studio::probe_source_test {
 namespace {
@@ -277,6 +282,29 @@ TEST_F(ProbeSourceTest, ShowsWhatHasNoExposuresFrameByFrame) {
     EXPECT_NEAR(light[static_cast<std::size_t>(n - 3)], shot, 1e-6) << n;
   }
   EXPECT_EQ(statuses_.back().frames, 20);
+}
+
+// Ten pictures of three exposures: the eleventh frame has the first one's again.
+TEST(ProbeSource, TakesGivenExposuresByPlacesInARecordingThatLoops) {
+  const std::filesystem::path directory = made::make_temporary_directory();
+  for (int n = 0; n < 10; ++n) {
+    capture::Image shot = capture::make_image(4, 8);
+    const double exposure_s = exposures_s.at(static_cast<std::size_t>(n % 3));
+    for (float& value : shot.pixels) value = static_cast<float>(std::min(100 * exposure_s, 1.0));
+    capture::write_exr((directory / ("p" + std::to_string(n) + ".exr")).string(), shot);
+  }
+  Set set;
+  set.camera.loop = true;
+  set.show.fps = rate;
+  set.probe.emplace();
+  set.probe->kind = ProbeSettings::Kind::camera;
+  set.probe->source = "file:" + (directory / "p%d.exr").string();
+  set.probe->exposures_s.assign(exposures_s.begin(), exposures_s.end());
+  ProbeSource source(set);
+  for (std::int64_t n = 0; n < 25; ++n) {
+    const auto light = source.at(capture::time_of_frame(n, rate));
+    EXPECT_NEAR(light.image->pixels.front(), 100, 1) << n;
+  }
 }
 
 // The made light camera as time goes by, some five times as fast as its frames' numbers say.
