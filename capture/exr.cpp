@@ -14,6 +14,7 @@
 #include <set>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
@@ -220,7 +221,24 @@ wire::Header receive_header(SandboxedChild& child) {
   return header;
 }
 
-Image receive(SandboxedChild& child, const ExrLimits& limits) {
+// The simplest ratio that the file's float is nearest to.
+Rational ratio_of(float value) {
+  constexpr float most = 16;
+  constexpr std::int64_t largest_denominator = 10'000;
+  if (!(value >= 1 / most && value <= most)) return {1, 1};
+  Rational before{0, 1}, ratio{1, 0};  // of its continued fraction
+  double rest = static_cast<double>(value);
+  while (true) {
+    const auto whole = static_cast<std::int64_t>(rest);
+    const Rational next{whole * ratio.num + before.num, whole * ratio.den + before.den};
+    if (next.den > largest_denominator) return ratio;
+    before = std::exchange(ratio, next);
+    if (static_cast<float>(ratio.value()) == value) return ratio;
+    rest = 1 / (rest - static_cast<double>(whole));
+  }
+}
+
+ExrPicture receive(SandboxedChild& child, const ExrLimits& limits) {
   const wire::Header header = receive_header(child);
   if (header.width < 1 || header.width > wire::max_side || header.height < 1 ||
       header.height > wire::max_side || header.channels < 1 || header.channels > 4) {
@@ -260,7 +278,7 @@ Image receive(SandboxedChild& child, const ExrLimits& limits) {
     if (primaries != rec709) limit_infinite(image);
     convert_to_rec709(image, primaries);
   }
-  return image;
+  return {std::move(image), ratio_of(header.pixel_aspect)};
 }
 
 // What `visit` makes of the child that decodes a file.
@@ -345,6 +363,10 @@ void limit_infinite(Image& image) {
 }
 
 Image read_exr(const std::string& path, const ExrLimits& limits) {
+  return read_exr_picture(path, limits).image;
+}
+
+ExrPicture read_exr_picture(const std::string& path, const ExrLimits& limits) {
   return decode(path, limits, [&](SandboxedChild& child) { return receive(child, limits); });
 }
 

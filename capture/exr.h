@@ -84,6 +84,13 @@ struct ExrLimits {
 // 16,384 pixels, or the limits), deep data, other channels than these.
 Image read_exr(const std::string& path, const ExrLimits& limits = {});
 
+// The same, with what the file says of its pixels' shape.
+struct ExrPicture {
+  Image image;
+  Rational pixel_aspect{1, 1};  // width over height; 1/1 where the file's is none of 1/16 to 16
+};
+ExrPicture read_exr_picture(const std::string& path, const ExrLimits& limits = {});
+
 // Infinite values, of light that was beyond the file's format, become as much as the picture's
 // largest finite one, or 65504, the largest half, if that is more. Alpha stays.
 void limit_infinite(Image& image);

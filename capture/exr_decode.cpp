@@ -186,7 +186,8 @@ void send_header(const Imf::Header& header, const Window& display, std::size_t c
                    0,
                    {},
                    0,
-                   {}};
+                   {},
+                   header.pixelAspectRatio()};
   if (Imf::hasChromaticities(header)) {
     const Imf::Chromaticities& c = Imf::chromaticities(header);
     out.has_primaries = 1;

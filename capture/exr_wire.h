@@ -24,6 +24,7 @@ struct Header {
   std::array<float, 8> primaries{};  // x y of red, green, blue, white
   std::int32_t has_noise = 0;
   std::array<float, 2> noise{};  // gain, floor
+  float pixel_aspect = 1;
 };
 
 inline constexpr const char* noise_attribute = "frameNoise";

@@ -79,20 +79,26 @@ class PictureReader {
   // Into `image` as it is if it has the size. Returns the description. Throws std::runtime_error
   // with path, reason and what to do.
   std::string read(const std::string& path, Image& image) {
+    pixel_aspect_ = {1, 1};
     if (is_coded_file(path)) return coded_.read(path, image);
     if (!is_exr(path) && !is_radiance(path)) return read_still(path, stills_, image);
     check_is_file(path);
-    Image light = is_exr(path) ? read_exr(path) : read_rgbe(path);
-    if (is_exr(path)) limit_infinite(light);
-    image = as_colour(std::move(light), alpha_);
+    ExrPicture picture = is_exr(path) ? read_exr_picture(path) : ExrPicture{read_rgbe(path)};
+    if (is_exr(path)) limit_infinite(picture.image);
+    image = as_colour(std::move(picture.image), alpha_);
+    pixel_aspect_ = picture.pixel_aspect;
     const std::string words = is_exr(path) ? "OpenEXR, linear" : "Radiance, linear";
     return image.channels == 4 ? words + ", alpha" : words;
   }
+
+  // Of the picture that was read last: 1/1 where it tells none.
+  Rational pixel_aspect() const { return pixel_aspect_; }
 
  private:
   Lineariser stills_;
   CodedFileReader coded_;
   bool alpha_;
+  Rational pixel_aspect_{1, 1};
 };
 
 class PictureCamera : public Camera {
@@ -162,6 +168,7 @@ PictureCamera::PictureCamera(const std::string& name,
       cut(*image, crop_);
       last_image_ = image;
       loaded_entry_ = i;
+      info_.pixel_aspect = reader_.pixel_aspect();
     } catch (const std::runtime_error& error) {
       if (source_width_ > 0) {
         fail(std::string(": ") + error.what());

@@ -44,6 +44,28 @@ HalfImage made_half_image(int height, int width, int channels, unsigned seed) {
 
 bool is_nan(Half half) { return (half & 0x7FFF) > 0x7C00; }
 
+TEST(ReadExr, TellsTheShapeOfPixels) {
+  const std::filesystem::path directory = made::make_temporary_directory();
+  const std::string path = directory / "a.exr";
+  for (const Rational aspect :
+       {Rational{1, 1}, Rational{2, 1}, Rational{1, 2}, Rational{4, 3}, Rational{64, 45},
+        Rational{128, 117}, Rational{4320, 4739}, Rational{16, 1}, Rational{1, 16}}) {
+    ExrOptions options;
+    options.pixel_aspect = aspect;
+    write_exr(path, make_image(2, 3), options);
+    const ExrPicture picture = read_exr_picture(path);
+    EXPECT_EQ(picture.pixel_aspect, aspect) << aspect.num << "/" << aspect.den;
+    EXPECT_EQ(picture.image.width, 3);
+    EXPECT_EQ(open_camera(path)->info().pixel_aspect, aspect);
+  }
+  for (const Rational absurd : {Rational{17, 1}, Rational{1, 17}}) {
+    ExrOptions options;
+    options.pixel_aspect = absurd;
+    write_exr(path, make_image(2, 3), options);
+    EXPECT_EQ(read_exr_picture(path).pixel_aspect, (Rational{1, 1}));
+  }
+}
+
 TEST(WriteExr, KeepsEveryBitOfHalfChannelsUnderEveryCompression) {
   for (const auto compression :
        {ExrCompression::none, ExrCompression::rle, ExrCompression::zip, ExrCompression::piz}) {
