@@ -124,6 +124,7 @@ class PictureCamera : public Camera {
   Pool<Image> pool_;
   int source_width_ = 0;
   int source_height_ = 0;
+  int channels_ = 0;
   Crop crop_;
   CameraInfo info_;
   Time pass_length_{};
@@ -164,6 +165,7 @@ PictureCamera::PictureCamera(const std::string& name,
       info_.description = reader_.read(entries_[i].path, *image);
       source_width_ = image->width;
       source_height_ = image->height;
+      channels_ = image->channels;
       crop_ = crop_within(options.crop, source_width_, source_height_);
       cut(*image, crop_);
       last_image_ = image;
@@ -201,6 +203,11 @@ std::shared_ptr<const Image> PictureCamera::load(std::size_t entry) {
   reader_.read(entries_[entry].path, *image);
   if (image->width != source_width_ || image->height != source_height_) {
     throw std::runtime_error(entries_[entry].path + " has another size than the first picture");
+  }
+  if (image->channels != channels_) {
+    throw std::runtime_error(entries_[entry].path +
+                             (image->channels == 4 ? " has alpha, and the first picture has none"
+                                                   : " has no alpha, but the first picture has"));
   }
   loaded_entry_ = entry;
   cut(*image, crop_);

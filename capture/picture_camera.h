@@ -27,7 +27,8 @@ bool is_picture(const std::string& path);
 double exposure_in(const std::string& path);
 
 // Shows `entries`, which are in order of time and at least one. Pictures that are missing, damaged
-// or of another size than the first readable one are lost frames.
+// or, unlike the first readable one, of another size or with or without alpha, where that is asked
+// for, are lost frames.
 // `jitter` as of CameraInfo. Throws std::runtime_error if none can be read, or options.frame or
 // options.crop lie outside.
 std::unique_ptr<Camera> make_picture_camera(const std::string& name,

@@ -59,7 +59,10 @@ std::optional<capture::Frame> TimedSource::at(capture::Time time) {
   const bool stalls = frame && source_.is_live() && asked - frame->time > patience;
   const bool lost = frame && frame->status == capture::FrameStatus::lost;
   const bool holds = !frame || stalls || lost;
-  if (holds && !holds_) note_ = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
+  if (holds && !holds_) {
+    note_ = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
+    if (lost && !frame->note.empty()) *note_ += " (" + frame->note + ")";
+  }
   holds_ = holds;
   if (frame && !lost) pictured_ = frame;
   // Asked for the first time, and after its end.

@@ -82,6 +82,27 @@ TEST_F(Alpha, ComesOnlyWhereItIsAskedForAndThere) {
   EXPECT_EQ(open_camera(in("c.exr"), with_alpha())->next()->image->channels, 3);
 }
 
+// Either way round: nobody sees a picture turn from cut out to whole, or back, without being told.
+TEST_F(Alpha, OfASequenceIsThatOfItsFirstPicture) {
+  for (const int first : {3, 4}) {
+    for (const int number : {0, 1, 2}) {
+      const int channels = number == 1 ? 7 - first : first;
+      write_png(in("s" + std::to_string(number) + ".png"), 1, 1, channels,
+                std::vector<std::uint8_t>(static_cast<std::size_t>(channels), 128));
+    }
+    const auto camera = open_camera(in("s%d.png"), with_alpha());
+    const auto good = camera->next(), other = camera->next(), again = camera->next();
+    EXPECT_EQ(good->image->channels, first);
+    EXPECT_EQ(other->status, FrameStatus::lost);
+    EXPECT_EQ(other->image, good->image);
+    EXPECT_THAT(other->note, HasSubstr(first == 3 ? "s1.png has alpha" : "s1.png has no alpha"));
+    EXPECT_EQ(again->status, FrameStatus::good);
+    const auto without = open_camera(in("s%d.png"));
+    without->next();
+    EXPECT_EQ(without->next()->status, FrameStatus::good) << "nobody asks for it";
+  }
+}
+
 TEST_F(Alpha, OfDeepAndGreyPngsIsReadInItsOwnCodes) {
   for (const auto& [format, channels, deep] :
        {std::tuple{"rgba64be", 4, true}, {"ya8", 2, false}, {"ya16be", 2, true}}) {
