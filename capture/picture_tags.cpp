@@ -1,6 +1,7 @@
 // Tags of decoded pictures.
 #include "capture/picture_tags.h"
 
+#include <cstring>
 #include <stdexcept>
 
 extern "C" {
@@ -116,6 +117,14 @@ TransferTag transfer_tag(const AVFrame& frame) {
     default:
       return TransferTag::display;
   }
+}
+
+std::optional<std::array<std::int32_t, 9>> display_matrix(const AVFrame& frame) {
+  const AVFrameSideData* its = av_frame_get_side_data(&frame, AV_FRAME_DATA_DISPLAYMATRIX);
+  std::array<std::int32_t, 9> matrix{};
+  if (its == nullptr || its->size < sizeof matrix) return std::nullopt;
+  std::memcpy(matrix.data(), its->data, sizeof matrix);
+  return matrix;
 }
 
 bool are_alike(const AVFrame& a, const AVFrame& b) {

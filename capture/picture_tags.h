@@ -1,6 +1,9 @@
 // What libav's tags say about the colours of a decoded picture. For the files that wrap libav.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <optional>
 #include <string>
 
 #include "capture/chroma.h"
@@ -35,6 +38,10 @@ bool is_limited_rgb(const AVFrame& frame);
 
 // Throws std::runtime_error, without a file name, for curves that are not handled: PQ, HLG, log.
 TransferTag transfer_tag(const AVFrame& frame);
+
+// The picture's own display matrix, for turn_of_matrix: of H.264's messages, or of the orientation
+// in a JPEG's EXIF data. Nothing if it has none.
+std::optional<std::array<std::int32_t, 9>> display_matrix(const AVFrame& frame);
 
 // Whether two pictures have one size, one format and the same tags.
 bool are_alike(const AVFrame& a, const AVFrame& b);

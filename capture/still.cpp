@@ -18,6 +18,8 @@
 #include "capture/libav.h"
 #include "capture/linearise.h"
 #include "capture/media_file.h"
+#include "capture/picture_tags.h"
+#include "capture/turn.h"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -141,6 +143,13 @@ libav::FrameHandle decode(AVCodecID codec,
   }
 }
 
+// Of a turn that the file asks for, as the orientation in a JPEG's EXIF data does.
+std::string words_on_turn(const AVFrame& frame) {
+  const auto matrix = display_matrix(frame);
+  const Turn turn = matrix ? turn_of_matrix(*matrix).value_or(Turn{}) : Turn{};
+  return turn.any() ? ", as it lies (upright it would be " + describe(turn) + ")" : "";
+}
+
 std::vector<std::byte> first_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::vector<std::byte> bytes(signature_bytes);
@@ -218,7 +227,8 @@ std::string read_still(const std::string& path, Lineariser& lineariser, Image& i
   const libav::FrameHandle frame = decode(*codec, bytes, path);
   try {
     lineariser.linearise(*frame, crop_within({}, frame->width, frame->height), image);
-    return std::string(avcodec_get_name(*codec)) + ", " + lineariser.description();
+    return std::string(avcodec_get_name(*codec)) + ", " + lineariser.description() +
+           words_on_turn(*frame);
   } catch (const std::runtime_error& error) {
     fail(path, error.what());
   }

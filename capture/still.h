@@ -40,7 +40,8 @@ struct Still {
 // TGA by its name. A single file of Motion JPEG by its name is none.
 bool is_still(const std::string& path);
 
-// Reads a still file; its codes become light by `curves`, as colour.md defines it. Throws
+// Reads a still file; its codes become light by `curves`, as colour.md defines it. It stays as the
+// sensor saw it, whatever orientation its EXIF data tell; the description names that. Throws
 // std::runtime_error with path, reason and what to do.
 Still read_still(const std::string& path, const LightCurves& curves);
 // The same for many, which keeps tables between them: into `image`, used again if it has the size.

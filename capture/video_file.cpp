@@ -53,14 +53,9 @@ Rational rate_of(const AVStream& stream) {
 
 // As the frame or else its stream says.
 std::optional<Turn> turn_of(const AVFrame& frame, const AVStream& stream) {
-  const std::uint8_t* bytes = nullptr;
+  if (const auto its = display_matrix(frame)) return turn_of_matrix(*its);
   std::size_t size = 0;
-  if (const AVFrameSideData* its = av_frame_get_side_data(&frame, AV_FRAME_DATA_DISPLAYMATRIX)) {
-    bytes = its->data;
-    size = its->size;
-  } else {
-    bytes = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &size);
-  }
+  const std::uint8_t* bytes = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &size);
   std::array<std::int32_t, 9> matrix{};
   if (bytes == nullptr || size < sizeof matrix) return Turn{};
   std::memcpy(matrix.data(), bytes, sizeof matrix);

@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <fstream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -14,6 +17,7 @@ namespace capture::turn_test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 std::vector<Turn> all_turns() {
   std::vector<Turn> turns;
@@ -141,7 +145,7 @@ class TurnedVideo : public testing::Test {
 };
 
 TEST_F(TurnedVideo, IsUprightAsTheContainerSays) {
-  EXPECT_THAT(expect_upright(turned_by("0"), 48, 32), testing::Not(HasSubstr("turned")));
+  EXPECT_THAT(expect_upright(turned_by("0"), 48, 32), Not(HasSubstr("turned")));
   EXPECT_THAT(expect_upright(turned_by("90"), 32, 48), HasSubstr("counter-clockwise"));
   EXPECT_THAT(expect_upright(turned_by("180"), 48, 32), HasSubstr("turned by 180 degrees"));
   EXPECT_THAT(expect_upright(turned_by("270"), 32, 48),
@@ -161,6 +165,56 @@ TEST_F(TurnedVideo, IsUprightAsItsPicturesSay) {
   EXPECT_THAT(expect_upright(marked("c", "flip=vertical"), 48, 32), HasSubstr("mirrored"));
   EXPECT_THAT(expect_upright(marked("d", "rotate=270:flip=horizontal"), 32, 48),
               HasSubstr("and mirrored"));
+}
+
+// The EXIF standard's orientations, 1 to 8.
+constexpr std::array<Turn, 8> orientations{{{},
+                                            {false, true, false},
+                                            {false, true, true},
+                                            {false, false, true},
+                                            {true, false, false},
+                                            {true, true, false},
+                                            {true, true, true},
+                                            {true, false, true}}};
+
+class TurnedStill : public testing::Test {
+ protected:
+  void SetUp() override {
+    independent::ffmpeg("-f lavfi -i \"testsrc2=size=48x32:rate=1:duration=1,format=yuvj444p\" '" +
+                        in("plain.jpg") + "'");
+    const std::ifstream file(in("plain.jpg"), std::ios::binary);
+    std::stringstream bytes;
+    bytes << file.rdbuf();
+    plain_ = bytes.str();
+  }
+  std::string in(const std::string& name) const { return (directory_ / name).string(); }
+  // The plain picture with an orientation in its EXIF data.
+  std::string marked(const std::string& name, int orientation) const {
+    using namespace std::string_literals;
+    const std::string exif = "Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0"s +
+                             static_cast<char>(orientation) + "\0\0\0\0\0\0"s;
+    std::ofstream(in(name), std::ios::binary)
+        << plain_.substr(0, 2) << "\xff\xe1\0"s << static_cast<char>(exif.size() + 2) << exif
+        << plain_.substr(2);
+    return in(name);
+  }
+
+  std::filesystem::path directory_ = made::make_temporary_directory();
+  std::string plain_;
+};
+
+// Lenses are calibrated by pictures of rolled cameras, and probes look up, where cameras do not
+// know which way they are held.
+TEST_F(TurnedStill, StaysAsTheSensorSawItAndSaysHowItWouldBeUpright) {
+  const Image plain = *open_camera(in("plain.jpg"))->next()->image;
+  for (int orientation = 1; orientation <= 8; ++orientation) {
+    const Turn turn = orientations[static_cast<std::size_t>(orientation - 1)];
+    const auto camera = open_camera(marked("a.jpg", orientation));
+    EXPECT_EQ(camera->next()->image->pixels, plain.pixels) << orientation;
+    const std::string description = camera->info().description;
+    EXPECT_EQ(description.find(describe(turn)) != std::string::npos, turn.any()) << description;
+  }
+  EXPECT_THAT(open_camera(marked("a.jpg", 9))->info().description, Not(HasSubstr("upright")));
 }
 
 TEST_F(TurnedVideo, IsTakenAsItIsForOtherAngles) {
