@@ -30,26 +30,43 @@ class AveragedCovariance {
     scale_ = smoothness.scale_s / std::sqrt(static_cast<double>(2 * smoothness.order + 1));
   }
 
-  double operator()(double apart_s, double exposure_s, double other_s) const {
+  double operator()(double apart_s, double exposure_s, double other_s) {
     const double t = std::abs(apart_s);
-    const double outer = (exposure_s + other_s) / 2;
-    const double inner = std::abs(exposure_s - other_s) / 2;
-    double sum = bent(t + outer) - bent(t + inner) - bent(t - inner) + bent(t - outer);
-    if (t < outer) {  // beyond, the straight parts cancel
-      sum += terms_[0] / scale_ *
-             (outer + t - (inner + t) - std::abs(t - inner) + std::abs(t - outer));
+    if (exposure_s != exposure_s_ || other_s != other_s_) set_exposures(exposure_s, other_s);
+    double sum = 0;
+    if (t >= outer_) {  // most pairs: the straight parts cancel, and one exponential does
+      const double near = std::exp((outer_ - t) / scale_);
+      sum = near * (falls_[2] * factor(t + outer_) - falls_[1] * factor(t + inner_) -
+                    falls_[0] * factor(t - inner_) + factor(t - outer_));
+    } else {
+      sum = bent(t + outer_) - bent(t + inner_) - bent(t - inner_) + bent(t - outer_) +
+            terms_[0] / scale_ *
+                (outer_ + t - (inner_ + t) - std::abs(t - inner_) + std::abs(t - outer_));
     }
     return sum * scale_ * scale_ / (exposure_s * other_s);
   }
 
  private:
-  double bent(double t) const {
-    const double s = std::abs(t) / scale_;
-    return (terms_[1] + s * (terms_[2] + s * terms_[3])) * std::exp(-s);
+  void set_exposures(double exposure_s, double other_s) {
+    exposure_s_ = exposure_s;
+    other_s_ = other_s;
+    outer_ = (exposure_s + other_s) / 2;
+    inner_ = std::abs(exposure_s - other_s) / 2;
+    falls_ = {std::exp((inner_ - outer_) / scale_), std::exp(-(inner_ + outer_) / scale_),
+              std::exp(-2 * outer_ / scale_)};
   }
+  double factor(double t) const {
+    const double s = t / scale_;
+    return terms_[1] + s * (terms_[2] + s * terms_[3]);
+  }
+  double bent(double t) const { return factor(std::abs(t)) * std::exp(-std::abs(t) / scale_); }
 
   std::array<double, 4> terms_{};
   double scale_ = 1;
+  // Of the exposures of the last pair: half their sum and difference, and by how much the process
+  // falls from outer_ before a time to inner_ before and after it, and to outer_ after it.
+  double exposure_s_ = 0, other_s_ = 0, outer_ = 0, inner_ = 0;
+  std::array<double, 3> falls_{};
 };
 
 }  // namespace
@@ -94,7 +111,7 @@ SignalLikelihood::SignalLikelihood(std::span<const SignalSample> a,
 std::vector<SignalLikelihood::Terms> SignalLikelihood::terms(const Smoothness& smoothness,
                                                              double offset_s,
                                                              std::size_t stride) const {
-  const AveragedCovariance covariance(smoothness);
+  AveragedCovariance covariance(smoothness);
   std::vector<Terms> all;
   for (std::size_t k = 0; k < stretches_.size(); k += stride) {
     const Stretch& stretch = stretches_[k];
