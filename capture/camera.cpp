@@ -8,12 +8,16 @@
 #include <utility>
 
 #include "capture/aravis_camera.h"
+#include "capture/aravis_request.h"
 #include "capture/camera_response.h"
+#include "capture/genicam_format.h"
 #include "capture/linearise.h"
 #include "capture/picture_camera.h"
 #include "capture/replay.h"
 #include "capture/sequence.h"
 #include "capture/v4l2_camera.h"
+#include "capture/v4l2_format.h"
+#include "capture/v4l2_request.h"
 #include "capture/video_file.h"
 
 namespace capture {
@@ -74,6 +78,46 @@ std::map<std::string, CameraOpener, std::less<>>& openers() {
   return by_scheme;
 }
 
+struct SchemeAndRest {
+  std::string_view scheme;  // "" = none, a bare path
+  std::string_view rest;
+};
+
+// A path may have a colon in it. Throws std::runtime_error if there is no such scheme.
+SchemeAndRest parts_of_uri(std::string_view uri, const CameraOptions& options) {
+  const std::size_t colon = uri.find(':');
+  const std::string_view scheme = uri.substr(0, colon == uri.npos ? 0 : colon);
+  if (openers().contains(scheme)) return {scheme, uri.substr(colon + 1)};
+  if (scheme.empty() || scheme.find('/') != scheme.npos ||
+      std::filesystem::exists(absolute(uri, options))) {
+    return {"", uri};
+  }
+  std::string known;
+  for (const auto& [name, opener] : openers()) {
+    known += (known.empty() ? "" : ", ") + name + ":";
+  }
+  throw std::runtime_error("no camera is called " + std::string(scheme) + ":; there are " + known);
+}
+
+[[noreturn]] void refuse_format(const std::string& name) {
+  throw std::runtime_error("format " + name +
+                           " is not read (platelight devices lists what each camera has)");
+}
+
+void check_v4l2_uri(std::string_view rest) {
+  const V4l2Request request = parse_v4l2(rest);
+  if (request.fourcc && coding_of(*request.fourcc) == nullptr) {
+    refuse_format(name_of_fourcc(*request.fourcc));
+  }
+}
+
+void check_aravis_uri(std::string_view rest) {
+  const AravisRequest request = parse_aravis(rest);
+  if (request.format && genicam_format_of(*request.format) == nullptr) {
+    refuse_format(*request.format);
+  }
+}
+
 }  // namespace
 
 double Camera::set_exposure(double exposure_s) {
@@ -90,22 +134,25 @@ std::unique_ptr<Camera> open_camera(std::string_view uri, const CameraOptions& o
   if (options.picture_rate.num <= 0 || options.picture_rate.den <= 0) {
     throw std::invalid_argument("pictures need a rate above 0");
   }
-  const std::size_t colon = uri.find(':');
-  const std::string_view scheme = uri.substr(0, colon == uri.npos ? 0 : colon);
-  if (const auto opener = openers().find(scheme); opener != openers().end()) {
-    return opener->second(uri.substr(colon + 1), options);
-  }
-  // A path may have a colon in it.
-  if (scheme.empty() || scheme.find('/') != scheme.npos ||
-      std::filesystem::exists(absolute(uri, options))) {
-    return open_file(uri, options);
-  }
-  std::string known;
-  for (const auto& [name, opener] : openers()) {
-    known += (known.empty() ? "" : ", ") + name + ":";
-  }
-  throw std::runtime_error("cannot open " + std::string(uri) + ": no camera is called " +
-                           std::string(scheme) + ":; there are " + known);
+  const auto parts = [&] {
+    try {
+      return parts_of_uri(uri, options);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error("cannot open " + std::string(uri) + ": " + error.what());
+    }
+  }();
+  if (parts.scheme.empty()) return open_file(uri, options);
+  return openers().find(parts.scheme)->second(parts.rest, options);
+}
+
+bool is_device(std::string_view uri) {
+  return uri.starts_with("v4l2:") || uri.starts_with("aravis:");
+}
+
+void check_camera_uri(std::string_view uri) {
+  const auto [scheme, rest] = parts_of_uri(uri, {});
+  if (scheme == "v4l2") check_v4l2_uri(rest);
+  if (scheme == "aravis") check_aravis_uri(rest);
 }
 
 }  // namespace capture

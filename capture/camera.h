@@ -101,6 +101,15 @@ class Camera {
 // counts as `file:`. Throws std::runtime_error naming the URI, the reason, and what to do.
 std::unique_ptr<Camera> open_camera(std::string_view uri, const CameraOptions& options = {});
 
+// Whether the URI names a device (`v4l2:`, `aravis:`), whose pictures come as time goes by.
+bool is_device(std::string_view uri);
+
+// What can be told from a URI alone, without opening anything: throws std::runtime_error, without
+// the URI, with the reason and what to write, if its scheme is none that there is, or if it names a
+// device with settings that none could have (see parse_v4l2 and parse_aravis) or with a pixel
+// format that is not read. What else is wrong is found by open_camera.
+void check_camera_uri(std::string_view uri);
+
 using CameraOpener =
     std::function<std::unique_ptr<Camera>(std::string_view rest, const CameraOptions&)>;
 // Adds a scheme ("made"). Call at start-up, before threads.

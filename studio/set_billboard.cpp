@@ -64,7 +64,7 @@ void read_camera(Section& section, const SetContext& context, PersonCamera& came
   camera.place = section.place_of("source");
   read_source_key(section, "source", context.base, camera.source);
   section.boolean("loop", camera.loop);
-  section.integer("frame", camera.first, std::int64_t{0}, std::int64_t{1} << 40);
+  read_start(section, camera.source, camera.first);
   read_colour(section, camera.colour);
   if (auto lens = read_lens_key(section, {0, 0}, context.base)) camera.lens = *lens;
   if (auto table = section.table("pose")) camera.cam_from_set = read_fixed_pose(*table);

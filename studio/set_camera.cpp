@@ -9,6 +9,8 @@
 #include "calibrate/angles.h"
 #include "calibrate/track.h"
 #include "calibrate/vignetting.h"
+#include "capture/camera.h"
+#include "capture/camera_response.h"
 #include "studio/set_sections.h"
 
 namespace studio {
@@ -211,6 +213,14 @@ calibrate::Pose read_fixed_pose(Section table) {
   return pose;
 }
 
+bool read_start(Section& section, const std::string& uri, std::int64_t& frame) {
+  if (!section.integer("frame", frame, std::int64_t{0}, std::int64_t{1} << 40)) return false;
+  if (frame > 0 && capture::is_device(uri)) {
+    section.fault("frame", "is of use only with what was recorded: a device starts at its frame 0");
+  }
+  return true;
+}
+
 bool read_source_key(Section& section,
                      std::string_view key,
                      const fs::path& base,
@@ -221,6 +231,12 @@ bool read_source_key(Section& section,
   std::string scheme = colon == std::string::npos ? "file" : given.substr(0, colon);
   const std::string rest = colon == std::string::npos ? given : given.substr(colon + 1);
   if (scheme != "file" && scheme != "replay") {
+    try {
+      capture::check_camera_uri(given);
+    } catch (const std::runtime_error& error) {
+      section.fault(key, fmt::format("cannot be opened: {}", error.what()));
+      return false;
+    }
     uri = given;
     return true;
   }
@@ -299,7 +315,7 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
   const bool cropped = section.has("crop");
   read_rectangle(section, "crop", {0, 0}, camera.crop);
   std::int64_t frame = 0;
-  if (section.integer("frame", frame, std::int64_t{0}, std::int64_t{1} << 40)) camera.frame = frame;
+  if (read_start(section, camera.source, frame)) camera.frame = frame;
   read_colour(section, camera.colour);
   double exposure_s = 0;
   if (section.number("exposure_s", exposure_s, exposure_range)) camera.exposure_s = exposure_s;

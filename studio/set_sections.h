@@ -81,7 +81,11 @@ calibrate::Pose read_fixed_pose(Section table);
 // How a source's codes become light: `colour`.
 void read_colour(Section& section, capture::Transfer& colour);
 
-// A source's URI with its path made absolute and, where it names a file or directory, found.
+// Where a source begins, `frame`; of a device nowhere but at 0. False if there is no such key.
+bool read_start(Section& section, const std::string& uri, std::int64_t& frame);
+
+// A source's URI with its path made absolute and, where it names a file or directory, found. Of a
+// device, that its settings can be read: it need not be there.
 bool read_source_key(Section& section,
                      std::string_view key,
                      const std::filesystem::path& base,

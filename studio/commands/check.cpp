@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/camera.h"
 #include "studio/commands/commands.h"
 #include "studio/json_text.h"
 #include "studio/set.h"
@@ -62,10 +63,6 @@ void say(const ModelReport& model, Console& console) {
   for (const std::string& note : r.notes) console.say("  note: " + note);
 }
 
-bool is_device(const std::string& uri) {
-  return uri.starts_with("v4l2:") || uri.starts_with("aravis:");
-}
-
 // Cameras that a set wants, which need not be there while it is written.
 std::vector<std::string> devices_of(const Set& set) {
   std::vector<std::string> sources{set.camera.source};
@@ -74,7 +71,7 @@ std::vector<std::string> devices_of(const Set& set) {
   for (const PersonSettings& person : set.persons) {
     for (const PersonCamera& camera : person.cameras) sources.push_back(camera.source);
   }
-  std::erase_if(sources, [](const std::string& uri) { return !is_device(uri); });
+  std::erase_if(sources, [](const std::string& uri) { return !capture::is_device(uri); });
   return sources;
 }
 

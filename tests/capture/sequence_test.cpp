@@ -180,6 +180,30 @@ TEST(OpenCamera, NamesTheSchemesItKnows) {
                   testing::AllOf(HasSubstr("v4l3:"), HasSubstr("file:"), HasSubstr("replay:"))));
 }
 
+TEST(CheckCameraUri, TellsWhatIsWrongWithoutOpeningAnything) {
+  const auto refusal = [](const std::string& uri) -> std::string {
+    try {
+      check_camera_uri(uri);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  for (const char* good :
+       {"v4l2:/dev/none?format=MJPG&size=64x48&rate=30000/1001&gain=3", "v4l2:usb-0000:00:14.0-1",
+        "aravis:", "aravis:none?format=Mono12p&Gain=1", "file:/no/such.png", "replay:/no/such",
+        "/no/such.png"}) {
+    EXPECT_EQ(refusal(good), "") << good;
+  }
+  EXPECT_THAT(refusal("v4l2:"), HasSubstr("no device is named"));
+  EXPECT_THAT(refusal("v4l2:/dev/none?rate=fast"), HasSubstr("rate=fast"));
+  EXPECT_THAT(refusal("v4l2:/dev/none?formt=MJPG"), HasSubstr("formt takes a whole number"));
+  EXPECT_THAT(refusal("v4l2:/dev/none?format=H264"), HasSubstr("H264 is not read"));
+  EXPECT_THAT(refusal("aravis:none?exposre=1"), HasSubstr("no setting exposre"));
+  EXPECT_THAT(refusal("aravis:none?format=Mono11"), HasSubstr("Mono11 is not read"));
+  EXPECT_THAT(refusal("v4l3:/dev/none"), HasSubstr("no camera is called v4l3:"));
+}
+
 TEST(RegisterCamera, AddsAScheme) {
   register_camera("twice", [](std::string_view rest, const CameraOptions& options) {
     return open_camera(std::string("file:") + std::string(rest), options);

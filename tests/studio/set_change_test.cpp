@@ -387,7 +387,7 @@ TEST_F(SetChangeTest, NoFrameOrCommandWaitsForAnEditAndTheNewestIsNext) {
     return set.effort;
   };
   const Set first = person_set("held:0");
-  const Set passed_over = person_set("nowhere:");
+  const Set passed_over = person_set("made.toml");
   const Set last = person_set("held:0", placed, "[[object]]\nname = \"more\"\nmade = \"desk\"\n");
   ASSERT_EQ(cube_x(), 0);
   opening.shut();

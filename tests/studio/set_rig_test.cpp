@@ -64,7 +64,7 @@ class SetRig : public testing::Test {
                      const std::string& camera,
                      const std::string& probe) const {
     return write("set.toml", "[show]\nwidth = 64\nheight = 48\n" + rig +
-                                 "[camera]\nsource = \"made:grey\"\n" + camera +
+                                 "[camera]\nsource = \"map.exr\"\n" + camera +
                                  "[probe]\nsource = \"map.exr\"\n" + probe +
                                  "[[stand_in]]\nsize = [4, 4]\n");
   }

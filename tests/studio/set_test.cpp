@@ -7,10 +7,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "calibrate/angles.h"
+#include "capture/camera.h"
 
 namespace studio::set_test {
 namespace {
@@ -18,6 +20,16 @@ namespace {
 namespace fs = std::filesystem;
 
 using calibrate::degree;
+
+std::unique_ptr<capture::Camera> open_nothing(std::string_view, const capture::CameraOptions&) {
+  throw std::runtime_error("is not to be opened here");
+}
+
+// Schemes of the sets here.
+const bool made_are_registered = [] {
+  for (const char* scheme : {"made", "made_walker"}) capture::register_camera(scheme, open_nothing);
+  return true;
+}();
 
 // A directory of this test's own, removed at its end.
 class SetFile : public testing::Test {

@@ -140,7 +140,7 @@ TEST_F(VideoSetTest, RefusesAVideoThatNothingShowsAtItsPlace) {
 }
 
 TEST_F(VideoSetTest, RefusesASourceThatCannotBeOpenedAtItsPlace) {
-  const Set set = made_set("[[video]]\nsource = \"none:1\"\nobject = \"tv\"\n");
+  const Set set = made_set("[[video]]\nsource = \"made.toml\"\nobject = \"tv\"\n");
   try {
     FrameMaker maker(set);
     FAIL();
