@@ -270,7 +270,8 @@ inline constexpr int largest_picture_side = 16384;
 inline constexpr int most_instances = 100000;
 
 // Reads and checks a set file. Throws SetError with every fault: of syntax, keys, types, ranges,
-// files that are missing, lens and track files that cannot be read.
+// files that are missing, lens, track and response files that cannot be read, devices' URIs whose
+// settings could never be (capture::check_camera_uri).
 Set read_set(const std::string& path);
 
 }  // namespace studio

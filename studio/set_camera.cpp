@@ -254,6 +254,15 @@ bool read_source_key(Section& section,
 
 namespace {
 
+void read_response_key(Section& section, const fs::path& base, std::string& response) {
+  if (!section.file("response", base, response)) return;
+  try {
+    static_cast<void>(capture::read_response(response));
+  } catch (const std::runtime_error& error) {
+    section.fault("response", fmt::format("cannot be used: {}", error.what()));
+  }
+}
+
 // The lens, the pose and the response of a camera that is of no rig.
 void read_own_camera(Section& section,
                      const SetContext& context,
@@ -267,7 +276,7 @@ void read_own_camera(Section& section,
   } else if (context.has_scene && !section.has("lens") && !section.has("model")) {
     section.need("lens", "objects are seen through it: a file, or model and focal_px");
   }
-  section.file("response", context.base, camera.response);
+  read_response_key(section, context.base, camera.response);
   camera.pose_place = section.place_of("pose");
   if (context.has_scene) section.need("pose", "where the camera is in the set");
   if (auto table = section.table("pose")) read_camera_pose(*table, context.base, camera.pose);
@@ -285,7 +294,7 @@ void read_own_probe(Section& section, const SetContext& context, ProbeSettings& 
   }
   if (auto table = section.table("pose")) read_probe_pose(*table, probe.probe_from_set);
   if (!is_map && !latlong) section.need("pose", "how the probe is turned");
-  section.file("response", context.base, probe.response);
+  read_response_key(section, context.base, probe.response);
 }
 
 // Of two cameras of one rig, clocks and all.

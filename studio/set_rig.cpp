@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "capture/camera_response.h"
 #include "studio/set_sections.h"
 
 namespace studio {
@@ -69,6 +70,14 @@ std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& con
     section.fault("rig_camera", fmt::format("has the response {} in the rig's file, which does "
                                             "not exist",
                                             camera.response));
+  } else if (!camera.response.empty()) {
+    try {
+      static_cast<void>(capture::read_response(camera.response));
+    } catch (const std::runtime_error& wrong) {
+      section.fault("rig_camera", fmt::format("has a response in the rig's file that cannot be "
+                                              "used: {}",
+                                              wrong.what()));
+    }
   }
   for (const std::string& named : {member->lens, member->response}) {
     if (!named.empty()) section.names("rig_camera", named);

@@ -22,6 +22,8 @@ namespace fs = std::filesystem;
 using calibrate::Pose;
 using testing::HasSubstr;
 
+constexpr const char* linear_response = "1 1 0\n1 1 0\n1 1 0\n";
+
 const calibrate::Lens plate_lens{"pinhole", 64, 48, {60, 60, 31.5, 23.5}};
 const calibrate::Lens probe_lens{"equisolid", 40, 40, {14, 19.5, 19.5}, 1.6};
 
@@ -44,7 +46,8 @@ class SetRig : public testing::Test {
     fs::create_directories(dir_ / "rig");
     calibrate::write_lens(path("rig/plate.toml"), plate_lens);
     calibrate::write_lens(path("rig/probe.toml"), probe_lens);
-    for (const char* name : {"rig/plate.rsp", "rig/probe.rsp", "map.exr"}) write(name, "x");
+    for (const char* name : {"rig/plate.rsp", "rig/probe.rsp"}) write(name, linear_response);
+    write("map.exr", "x");
     calibrate::write_rig(
         path("rig/rig.toml"),
         std::vector<calibrate::RigMember>{
