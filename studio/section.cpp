@@ -283,7 +283,7 @@ bool Section::file(std::string_view key, const std::filesystem::path& base, std:
 }
 
 void Section::of_use_only(bool useful, std::string_view key, std::string_view with) {
-  if (has(key) && !useful) fault(key, fmt::format("is of use only with {}", with));
+  if (take(key) != nullptr && !useful) fault(key, fmt::format("is of use only with {}", with));
 }
 
 void Section::names(std::string_view key, const std::string& path) {

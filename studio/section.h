@@ -110,7 +110,8 @@ class Section {
   void fault(std::string_view key, const std::string& message);
   // Adds a fault unless the key is there.
   void need(std::string_view key, std::string_view what_for);
-  // Adds a fault if the key is there and would do nothing, `useful` being false.
+  // Adds a fault if the key is there and would do nothing, `useful` being false. Counts as reading
+  // it: keys that belong to something else are no unknown ones.
   void of_use_only(bool useful, std::string_view key, std::string_view with);
   // Faults for keys that nothing asked for.
   void finish();

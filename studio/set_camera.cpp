@@ -208,6 +208,7 @@ calibrate::Pose read_fixed_pose(Section table) {
     table.fault("", "must have either look_at = [x, y, z] or rotation = [nine numbers]");
   }
   table.need("position", "where it stands, in metres");
+  table.of_use_only(false, "track", "the show's camera: this one stays where it is");
   const calibrate::Pose pose = read_way(table);
   table.finish();
   return pose;
@@ -288,6 +289,7 @@ void read_own_probe(Section& section, const SetContext& context, ProbeSettings& 
   const TomlValue* lens = section.value("lens");
   const bool latlong =
       lens != nullptr && lens->kind == TomlValue::Kind::text && lens->text == "latlong";
+  if (latlong) refuse_lens_keys(section, "is of another lens: leave out either it or lens");
   if (!latlong) probe.lens = read_lens_key(section, {0, 0}, context.base);
   if (!is_map && lens == nullptr && !section.has("model")) {
     section.need("lens", "how the probe sees: a file, a table, or \"latlong\"");

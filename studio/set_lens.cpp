@@ -47,7 +47,18 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
     table.need("size", "[width, height] of the picture that the lens makes, before any crop");
   }
 
-  if (lens.model.starts_with("LENSMODEL_")) {
+  const bool of_mrcal = lens.model.starts_with("LENSMODEL_");
+  const bool decentred = lens.model == "decentred_kannala_brandt";
+  const bool has_terms = decentred || lens.model == "kannala_brandt";
+  const bool any = !has_model;  // a fault already
+  table.of_use_only(any || of_mrcal, "parameters", "mrcal's models, LENSMODEL_...");
+  for (const std::string_view key : {"focal_px", "centre"}) {
+    table.of_use_only(any || !of_mrcal, key, "models other than mrcal's, which have parameters");
+  }
+  table.of_use_only(any || has_terms, "k",
+                    "model = \"kannala_brandt\" or \"decentred_kannala_brandt\"");
+  table.of_use_only(any || decentred, "p", "model = \"decentred_kannala_brandt\"");
+  if (of_mrcal) {
     table.need("parameters", "the list of numbers that mrcal's model takes");
     if (table.numbers("parameters", lens.parameters, {}, {-1e9, 1e9}) && lens.parameters.empty()) {
       table.fault("parameters", "is an empty list: every lens has parameters");
@@ -57,12 +68,9 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
     std::vector<double> terms;
     const std::vector<double> focal = read_focal(table);
     table.numbers("centre", centre, {2}, centre_range);
-    const bool decentred = lens.model == "decentred_kannala_brandt";
     std::vector<double> decentring(decentred ? 2 : 0);
     if (decentred) table.numbers("p", decentring, {2}, term_range);
-    if (decentred || lens.model == "kannala_brandt") {
-      table.numbers("k", terms, {0, 1, 2, 3, 4}, term_range);
-    }
+    if (has_terms) table.numbers("k", terms, {0, 1, 2, 3, 4}, term_range);
     if (focal.empty()) return std::nullopt;
     lens.parameters = focal;
     if (lens.model == "equisolid") {
@@ -85,12 +93,20 @@ std::optional<calibrate::Lens> read_lens_keys(Section& table, std::array<int, 2>
 
 }  // namespace
 
+void refuse_lens_keys(Section& section, const std::string& why) {
+  for (const std::string_view key :
+       {"model", "focal_px", "centre", "k", "p", "max_angle", "error_px", "parameters", "size"}) {
+    if (section.value(key) != nullptr) section.fault(key, why);
+  }
+}
+
 std::optional<calibrate::Lens> read_lens_key(Section& section,
                                              std::array<int, 2> size,
                                              const std::filesystem::path& base) {
-  if (!section.has("lens")) {
-    return section.has("model") ? read_lens_keys(section, size) : std::nullopt;
-  }
+  if (!section.has("lens") && section.has("model")) return read_lens_keys(section, size);
+  refuse_lens_keys(section, section.has("lens") ? "is of another lens: leave out either it or lens"
+                                                : "is of use only with model");
+  if (!section.has("lens")) return std::nullopt;
   const TomlValue* given = section.value("lens");
   if (given->kind == TomlValue::Kind::table) {
     auto table = section.table("lens");

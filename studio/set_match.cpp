@@ -75,9 +75,15 @@ void read_match(Section& section, std::array<int, 2> picture, MatchSettings& mat
                    "must have exactly one of gain = [r, g, b], matrix = [nine numbers], "
                    "patch = [x, y, width, height] of a painted spot in the picture");
     }
-    if (table->has("patch")) read_patch(*table, picture, match);
-    if (!table->has("patch") || table->has("gain") || table->has("matrix")) {
-      read_given(*table, match);
+    const bool patch = table->has("patch");
+    const bool given_too = !patch || table->has("gain") || table->has("matrix");
+    if (patch) read_patch(*table, picture, match);
+    if (given_too) read_given(*table, match);
+    for (const std::string_view key : {"albedo", "normal"}) {
+      table->of_use_only(patch, key, "patch");
+    }
+    for (const std::string_view key : {"follow", "exposure_s"}) {
+      table->of_use_only(given_too, key, "gain or matrix");
     }
     table->finish();
   } else {

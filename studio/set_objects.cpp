@@ -136,6 +136,8 @@ StandInSettings read_stand_in_section(Section section, const SetContext& context
     section.need("mesh", "the file of the mesh");
     section.file("mesh", context.base, stand_in.mesh);
   }
+  section.of_use_only(shape == "mesh", "mesh", "shape = \"mesh\"");
+  section.of_use_only(shape != "mesh", "size", "planes and boxes: a mesh has its own size");
   if (size.size() >= 2) stand_in.size = {size[0], size[1], size.size() == 3 ? size[2] : 0};
   if (auto table = section.table("pose")) stand_in.pose = read_placement(*table);
 

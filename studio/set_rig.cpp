@@ -21,10 +21,11 @@ std::string names_of(const std::vector<calibrate::RigMember>& cameras) {
 
 // Faults at the keys that the rig's camera stands for.
 void refuse_written_out(Section& section) {
-  for (const std::string_view key : {"lens", "model", "pose", "response"}) {
-    if (section.value(key) == nullptr) continue;
-    section.fault(key, "is the rig's already: leave out either it or rig_camera");
+  const std::string why = "is the rig's already: leave out either it or rig_camera";
+  for (const std::string_view key : {"lens", "pose", "response"}) {
+    if (section.value(key) != nullptr) section.fault(key, why);
   }
+  refuse_lens_keys(section, why);
 }
 
 }  // namespace

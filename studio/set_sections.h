@@ -60,6 +60,10 @@ std::optional<calibrate::Lens> read_lens_key(Section& section,
                                              std::array<int, 2> size,
                                              const std::filesystem::path& base);
 
+// Faults for the keys of a lens that stand beside the section's others, where its lens is not one
+// of them.
+void refuse_lens_keys(Section& section, const std::string& why);
+
 // How the probe is matched to the plate: `match`.
 void read_match(Section& section, std::array<int, 2> picture, MatchSettings& match);
 

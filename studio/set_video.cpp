@@ -96,6 +96,9 @@ VideoSettings read_video_section(Section section, const SetContext& context, boo
     section.integers("samples", video.samples, 1, render::most_area_samples);
     section.number("ambient", video.ambient, {0, 1});
   }
+  for (const std::string_view key : {"samples", "ambient"}) {
+    section.of_use_only(lights, key, "[[video_light]]");
+  }
   section.finish();
   return video;
 }

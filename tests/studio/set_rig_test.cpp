@@ -193,5 +193,24 @@ TEST_F(SetRig, RefusesFilesOfTheRigThatCannotBeUsed) {
                                 path("rig/probe.toml")));
 }
 
+TEST_F(SetRig, NamesTheKeyWhoseResponseCannotBeUsed) {
+  write("rig/plate.rsp", "1 1 0\n1 1 0\n");
+  write("rig/probe.rsp", "x");
+  const std::string faults =
+      faults_of(set_of(rig(""), "rig_camera = \"left\"\n", "rig_camera = \"up\"\n"));
+  EXPECT_THAT(faults, HasSubstr("set.toml:8:14: camera.rig_camera has a response in the rig's file "
+                                "that cannot be used: " +
+                                path("rig/plate.rsp")));
+  EXPECT_THAT(faults, HasSubstr("set.toml:11:14: probe.rig_camera has a response"));
+  EXPECT_EQ(std::ranges::count(faults, '\n'), 1) << faults;
+}
+
+TEST_F(SetRig, RefusesTheLensThatTheRigHas) {
+  const std::string faults =
+      faults_of(set_of(rig(""), "rig_camera = \"left\"\n", "rig_camera = \"up\"\nfocal_px = 14\n"));
+  EXPECT_THAT(faults, HasSubstr("set.toml:12:12: probe.focal_px is the rig's already"));
+  EXPECT_EQ(std::ranges::count(faults, '\n'), 0) << faults;
+}
+
 }  // namespace
 }  // namespace studio::set_rig_test
