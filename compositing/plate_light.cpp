@@ -16,6 +16,9 @@ namespace {
 constexpr float least_excess = 0.004F;  // of display white: below it a plate shows no screen
 int cells_along(int side, int step) { return (side + step - 1) / step; }
 
+// The first row that is looked at of a row of the gain's cells: their second, if they have one.
+int first_row(int row, int height) { return std::min(row * PlateLight::cell + 1, height - 1); }
+
 float excess_of(const float* c, ScreenColour colour) {
   return has_two_primaries(colour) ? screen_excess<true>(c[0], c[1], c[2])
                                    : screen_excess<false>(c[0], c[1], c[2]);
@@ -165,7 +168,8 @@ void PlateLight::prepare() {
     for (int column = 0; column < filler_.columns(); ++column, ++i) {
       const int count = std::min(cell, bare_.width - column * cell);
       float all = 0, known = 0;
-      for (int y = row * cell + 1; y < std::min(bare_.height, (row + 1) * cell); y += rows_apart_) {
+      for (int y = first_row(row, bare_.height); y < std::min(bare_.height, (row + 1) * cell);
+           y += rows_apart_) {
         all += static_cast<float>(count);
         for (int x = column * cell; x < column * cell + count; ++x) {
           known += ratios_[4 * (static_cast<std::size_t>(y / bare_.step) *
@@ -228,7 +232,7 @@ template <class Rows>
   const int count = std::min(cell, bare_.width - column * cell);
   const I8 inside = count == cell ? ~I8{} : lanes_below(count) > 0.0F;
   CellSums sums;
-  for (int y = row * cell + 1; y < bottom; y += rows_apart_) {
+  for (int y = first_row(row, bare_.height); y < bottom; y += rows_apart_) {
     std::array<F8, 3> c;
     source.load(y, column * cell, count, c);
     sums.add(c, ratios_at(y, column * cell), inside, tolerance_);

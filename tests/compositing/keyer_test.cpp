@@ -395,6 +395,17 @@ TEST(KeyTable, IsWhatItsMakerLearnsFromTheSameClips) {
   }
 }
 
+TEST(Keyer, SeesTheScreenInTheSmallestPictures) {
+  for (const int height : {1, 2, 3, 9}) {
+    for (const int width : {1, 2, 3, 9}) {
+      Keyer keyer(even_plate(height, width), {});
+      HalfImage keyed;
+      EXPECT_EQ(keyer.key(even_picture(height, width, green), keyed).status, KeyStatus::good)
+          << width << "x" << height;
+    }
+  }
+}
+
 TEST(Keyer, RefusesWhatDoesNotFitNamingBoth) {
   Keyer keyer(even_plate(16, 24), {});
   HalfImage keyed;
