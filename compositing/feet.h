@@ -57,9 +57,11 @@ class FeetTracker {
   FeetTracker(const calibrate::Lens& lens, const calibrate::Pose& cam_from_set, double floor_z);
 
   // feet.q in pixels of the lens's picture; time in seconds. Nothing until feet were first seen.
-  // Where time returns, the place is held and then taken up anew. Never throws, and all results are
-  // finite.
+  // Where time returns, as after restart(), the place is held and then taken up anew. Never throws,
+  // and all results are finite.
   std::optional<Standing> update(double time_s, const Feet& feet);
+  // A clip begins again: what was seen before tells nothing about the next place.
+  void restart();
 
  private:
   struct Seen {

@@ -144,14 +144,15 @@ Standing FeetTracker::standing(FeetStatus status) const {
   return {{state_[0], state_[1], floor_z_}, std::sqrt(std::max(mean + half, 0.0)), status, false};
 }
 
+void FeetTracker::restart() { seen_s_ = time_s_ - 2 * longest_gap_s; }
+
 std::optional<Standing> FeetTracker::update(double time_s, const Feet& feet) {
   const bool timed = std::isfinite(time_s);
   const auto seen = timed ? see(feet) : std::nullopt;
   // Feet that were seen, but of which this camera cannot tell where on the floor they are.
   FeetStatus status =
       feet.status == FeetStatus::seen && !seen ? FeetStatus::uncertain : feet.status;
-  // A clip that begins again: what was seen before tells nothing about the next place.
-  if (timed && started_ && time_s < time_s_) seen_s_ = time_s - 2 * longest_gap_s;
+  if (timed && started_ && time_s < time_s_) time_s_ = time_s, restart();
   if (!started_) {
     if (!seen) return std::nullopt;
     start(*seen);

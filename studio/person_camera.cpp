@@ -183,7 +183,8 @@ void PersonCameraFeed::advance(capture::Time time) {
   const std::optional<capture::Frame> frame = source_->at(time);
   const capture::Frame& newest = frame && frame->image ? *frame : source_->newest();
   if (newest.image == image_ || !newest.image) return;
-  skipped_ = image_ != shown_;
+  skipped_ = image_ != shown_ || newest.pass_first != pass_;
+  pass_ = newest.pass_first;
   image_ = newest.image;
   time_ = newest.time;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -60,6 +61,8 @@ class PersonCameraFeed {
   bool has_picture() const { return image_ != nullptr; }
   // Of the newest frame.
   capture::Time time() const { return time_; }
+  // In which pass of a clip that loops: another one, another number.
+  std::int64_t pass() const { return pass_; }
   // How old its picture is at the time that was asked for last, and how long a frame lasts.
   capture::Time age() const { return source_->age(); }
   capture::Time period() const { return period_; }
@@ -99,7 +102,8 @@ class PersonCameraFeed {
   float aspect_ = 1;
   capture::Time period_{}, time_{};
   std::shared_ptr<const capture::Image> image_, shown_;  // newest; that the picture was made from
-  bool skipped_ = false;                                 // frames between these two
+  bool skipped_ = false;  // frames between these two, or they are of two passes
+  std::int64_t pass_ = 0;
   std::shared_ptr<const render::LivePicture> picture_;
   compositing::Window window_;
   capture::Pool<compositing::KeyedTexture> textures_;

@@ -68,6 +68,7 @@ struct PersonFeed::Person {
   PersonSettings settings;
   std::vector<Camera> cameras;
   std::optional<compositing::FeetTracker> tracker;
+  std::int64_t tracked_pass = 0;  // of the clip
   std::optional<compositing::Standing> standing;
   std::optional<compositing::ShapeChoice> choice;
   std::optional<compositing::PersonBox> box;  // of the hull that is chosen
@@ -213,6 +214,7 @@ void PersonFeed::take_over() {
     Person& person = *persons_[i];
     if (const Person* before = coming_[i]->person.get()) {
       person.tracker = before->tracker;
+      person.tracked_pass = before->tracked_pass;
       person.standing = before->standing;
       person.unplaced = before->unplaced;
       person.frame.status.feet = before->frame.status.feet;
@@ -257,6 +259,7 @@ void PersonFeed::stand(Person& person) {
   if (!person.tracker) return;
   PersonStatus& status = person.frame.status;
   const PersonCameraFeed& feed = person.cameras.front().feed;
+  if (std::exchange(person.tracked_pass, feed.pass()) != feed.pass()) person.tracker->restart();
   person.standing =
       person.tracker->update(std::chrono::duration<double>(feed.time()).count(), feed.feet());
   // What the matte shows as feet need not stand on the floor: the tracker tells.

@@ -42,10 +42,11 @@ bool is_body(double aside, double up) {
   return up < 1.42 ? aside < 0.23 : aside < 0.10;
 }
 
-// An upright board of 1.7 m that walks before a green screen, as its camera sees it.
+// An upright board of 1.7 m that walks before a green screen, as its camera sees it, again and
+// again.
 class Walker final : public capture::Camera {
  public:
-  explicit Walker(std::int64_t frames) : frames_(frames) {
+  Walker(std::int64_t frames, std::int64_t pass) : frames_(frames), pass_(pass) {
     info_.width = video_width;
     info_.height = video_height;
     info_.rate = {25, 1};
@@ -58,7 +59,7 @@ class Walker final : public capture::Camera {
     if (number_ == frames_) return std::nullopt;
     const calibrate::Pose cam_from_set = calibrate::look_at(video_position, {0, 0, 1}, 0);
     const calibrate::Pose set_from_cam = inverse(cam_from_set);
-    const calibrate::Vec3 feet = feet_at(number_);
+    const calibrate::Vec3 feet = feet_at(number_ % pass_);
     auto image = std::make_shared<capture::Image>(capture::make_image(video_height, video_width));
     constexpr int parts = 3;
     for (int y = 0; y < video_height; ++y) {
@@ -81,6 +82,7 @@ class Walker final : public capture::Camera {
     }
     capture::Frame frame;
     frame.number = number_;
+    frame.pass_first = number_ - number_ % pass_;
     frame.time = capture::time_of_frame(number_, info_.rate);
     frame.image = std::move(image);
     ++number_;
@@ -89,7 +91,7 @@ class Walker final : public capture::Camera {
 
  private:
   capture::CameraInfo info_;
-  std::int64_t frames_, number_ = 0;
+  std::int64_t frames_, pass_, number_ = 0;
 };
 
 // Nobody before a green cloth between grey panels; a picture that is pushed from frame 8 on.
@@ -146,8 +148,13 @@ class PersonSetTest : public MadeShowTest {
  protected:
   static void SetUpTestSuite() {
     MadeShowTest::SetUpTestSuite();
+    // walker:FRAMES, or walker:FRAMES/THOSE OF A PASS
     capture::register_camera("walker", [](std::string_view rest, const capture::CameraOptions&) {
-      return std::make_unique<Walker>(std::stol(std::string(rest)));
+      const std::int64_t frames = std::stol(std::string(rest));
+      const auto slash = rest.find('/');
+      const bool loops = slash != std::string_view::npos;
+      return std::make_unique<Walker>(
+          frames, loops ? std::stol(std::string(rest.substr(slash + 1))) : frames);
     });
     capture::register_camera("pushed", [](std::string_view, const capture::CameraOptions&) {
       return std::make_unique<PushedCamera>();
@@ -192,6 +199,22 @@ TEST_F(PersonSetTest, StandsWhereItsFeetAreAndIsSeenThere) {
   });
   EXPECT_EQ(frame, 20);
   EXPECT_TRUE(show.status()->notes.empty()) << show.status()->notes.front();
+}
+
+// From one frame to the next it is .8 m away.
+TEST_F(PersonSetTest, StandsAtOnceWhereItsFeetAreWhenItsClipBeginsAgain) {
+  std::string looped = walker;
+  looped.replace(looped.find("walker:20"), 9, "walker:24/20");
+  Show show(made_set("grey:24,25,0", looped));
+  int frame = 0;
+  show.run([&](const ShownFrame& shown) {
+    const PersonStatus& person = shown.prepared.persons.at(0);
+    EXPECT_EQ(person.feet, "seen") << frame;
+    EXPECT_FALSE(person.held) << frame;
+    EXPECT_NEAR(person.position.y, feet_at(frame % 20).y, 0.04) << frame;
+    ++frame;
+  });
+  EXPECT_EQ(frame, 24);
 }
 
 // Its camera looks up, by the set: whatever it shows is above the horizon.
