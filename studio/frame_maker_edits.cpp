@@ -241,7 +241,7 @@ void FrameMaker::begin_light(Change& change) const {
     const PoseSettings& pose = change.set.camera.pose;
     change.light->begin({now->time, now->plate.get(), change.directions.get(),
                          pose.track.empty() ? pose.cam_from_set : now->cam_from_set,
-                         now->exposure_s, change.set.effort.light_samples});
+                         now->exposure_s, change.set.effort.light_samples, plate_->is_live()});
   }
 }
 

@@ -239,7 +239,7 @@ bool LightFeed::follow_match(const LightRequest& request) {
 }
 
 void LightFeed::update_environment(const LightRequest& request) {
-  const ProbeSource::Radiance newest = source_->at(request.time);
+  const ProbeSource::Radiance newest = source_->at(request.time, request.on_clock);
   const bool fresh = newest.image != radiance_;
   radiance_ = newest.image;
   const bool new_floor = follow_floor(request);
@@ -264,7 +264,7 @@ Light LightFeed::at(const LightRequest& request) {
   if (settings_) {
     plate_ = even_plate(request);
     update_environment(request);
-    light.time = source_->at(request.time).time;
+    light.time = source_->at(request.time, request.on_clock).time;
     light.probe = source_->status();
     if (settings_->albedo_patch && request.plate != nullptr) {
       const auto [x, y, width, height] = *settings_->albedo_patch;

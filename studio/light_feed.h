@@ -39,6 +39,7 @@ struct LightRequest {
   calibrate::Pose cam_from_set;
   double exposure_s = 0;  // of the plate, 0 = not told
   int light_samples = 64;
+  bool on_clock = true;  // as of ProbeSource::at
 };
 
 // One thread uses it. Memory across frames (the followed light, the match) lives here.

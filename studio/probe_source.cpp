@@ -394,9 +394,11 @@ void ProbeSource::take(const std::vector<capture::Frame>& frames) {
   }
 }
 
-ProbeSource::Radiance ProbeSource::at(capture::Time time) {
+ProbeSource::Radiance ProbeSource::at(capture::Time time, bool on_clock) {
   if (camera_) {
-    const capture::Time on_its_clock = time + offset_ - passed_;
+    const bool by_itself = camera_->is_live() && !on_clock;
+    const capture::Time on_its_clock =
+        by_itself ? capture::monotonic_now() : time + offset_ - passed_;
     take(camera_->advance(on_its_clock));
     if (camera_->has_ended(on_its_clock)) status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;

@@ -62,8 +62,9 @@ class ProbeSource {
   // The newest at a time of the show, which must not fall: what was taken by then, not what is
   // stamped by then. The same pointer as before if there is
   // nothing newer; when the camera has ended, its last. Where the newest shots tell nothing, since
-  // all is saturated or all is black, the last good one stays.
-  Radiance at(capture::Time time);
+  // all is saturated or all is black, the last good one stays. Where the show's time is not the
+  // monotonic clock, for its plate is a file, a live camera gives its newest.
+  Radiance at(capture::Time time, bool on_clock = true);
   const ProbeStatus& status() const { return status_; }
 
  private:

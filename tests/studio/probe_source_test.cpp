@@ -379,6 +379,22 @@ TEST_F(LiveProbeTest, ItsExposuresFollowTheLight) {
   }
 }
 
+// Whose time begins at 0.
+TEST_F(LiveProbeTest, FollowsTheLightUnderAPlateFromAFile) {
+  std::atomic<double> gain = 1;
+  script_->gain = [&](std::int64_t) { return gain.load(); };
+  script_->scene = made::make_light(2, 60, 300, 4);
+  ProbeSource source = open(true);
+  gain = 3;
+  capture::Time time{};
+  const auto error = [&] {
+    const auto image = source.at(time += 40ms, false).image;
+    return std::abs(image->pixels.front() / (3 * script_->scene.pixels.front()) - 1);
+  };
+  EXPECT_TRUE(comes_true([&] { return error() < 0.05; }));
+  EXPECT_LT(source.status().age, 10s);
+}
+
 TEST_F(LiveProbeTest, TakesACameraAsItIsUnlessToldOtherwise) {
   script_->settable = false;
   ProbeSource source = open(false);
