@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -18,8 +19,9 @@
 namespace studio {
 namespace {
 
-constexpr std::size_t longest_cycle = 16;                            // exposures of a bracket
-constexpr double same_exposure = 0.02;                               // relative
+constexpr std::size_t longest_cycle = 16;  // exposures of a bracket
+constexpr std::size_t most_untold = 4;     // pictures without an exposure, for one to be waited for
+constexpr double same_exposure = 0.02;     // relative
 constexpr capture::Time bracket_patience = std::chrono::seconds(5);  // for a live camera's first
 constexpr capture::Time next_patience = std::chrono::seconds(2);  // for a live camera's next frame
 // From these shares of pixels on, of those that the lens sees, the shots tell nothing.
@@ -228,10 +230,6 @@ void ProbeSource::open_camera(const Set& set,
     return;
   }
   prime();
-  if (!bracket_ && !camera_->is_live()) {
-    camera_ = std::make_unique<Source>(capture::open_camera(probe.source, options));
-    begin_unmerged();
-  }
   if (newest_.image == nullptr) throw std::runtime_error("its first frames are all lost");
 }
 
@@ -251,13 +249,17 @@ capture::Frame ProbeSource::wait_for_next() {
 
 // The first cycle is taken at once, so that no frame is lit by half a bracket. It ends with an
 // exposure that was known and is not the last one's, which may have been sent again. Frames that
-// tell no exposure are passed over, but a live camera is not waited for.
+// tell no exposure are passed over, but a live camera is not waited for. A recording that does not
+// bracket is shown from its first picture on, each at its time.
 void ProbeSource::prime() {
   std::vector<double> exposures_s;
   double last_s = 0;
   std::optional<capture::Time> fresh;
+  std::vector<capture::Frame> read;
+  std::size_t untold = 0;
   capture::Frame frame = camera_->first();
-  for (std::size_t read = 1;; ++read) {
+  while (true) {
+    read.push_back(frame);
     if (add(frame)) fresh = frame.time;
     const bool tells = tells_exposure(frame);
     const double exposure_s = tells ? exposure_s_of(frame) : 0;
@@ -268,30 +270,35 @@ void ProbeSource::prime() {
     const bool cycle_ends =
         camera_->is_live() ? known || !tells : known && !about_equal(exposure_s, last_s);
     if (tells) last_s = exposure_s;
-    if (cycle_ends || read == longest_cycle) break;
+    if (frame.image != nullptr && !tells) ++untold;
+    const bool gives_up = exposures_s.empty() && untold == most_untold;
+    if (cycle_ends || gives_up || read.size() == longest_cycle) break;
     frame = wait_for_next();
     if (frame.image == nullptr && frame.status != capture::FrameStatus::lost) break;
   }
   if (bracket_) {
     bracket_->set_cycle(exposures_s.size());
     if (fresh) merge(*fresh);
+  } else if (!camera_->is_live()) {
+    status_ = {};
+    status_.live = true;
+    single_ = {};
+    newest_ = {};
+    auto next = read.begin();
+    while (next != read.end() && newest_.image == nullptr) take({*next++});
+    ahead_.assign(next, read.end());
   }
   note_camera();
 }
 
-// Of a recording that does not bracket: from its first picture on, each at its time. It was opened
-// anew.
-void ProbeSource::begin_unmerged() {
-  status_ = {};
-  status_.live = true;
-  single_ = {};
-  newest_ = {};
-  take({camera_->first()});
-  for (std::size_t read = 1; newest_.image == nullptr && read < longest_cycle; ++read) {
-    const capture::Frame frame = wait_for_next();
-    if (frame.image == nullptr && frame.status != capture::FrameStatus::lost) break;
-    take({frame});
-  }
+// What came by then, after those that were read ahead.
+std::vector<capture::Frame> ProbeSource::frames_until(capture::Time time) {
+  const auto due = std::ranges::find_if(
+      ahead_, [&](const capture::Frame& frame) { return frame.time > time + camera_->early(); });
+  std::vector<capture::Frame> frames(ahead_.begin(), due);
+  ahead_.erase(ahead_.begin(), due);
+  if (ahead_.empty()) std::ranges::move(camera_->advance(time), std::back_inserter(frames));
+  return frames;
 }
 
 // Waits for a whole bracket, or what comes of it in time.
@@ -399,8 +406,9 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time, bool on_clock) {
     const bool by_itself = camera_->is_live() && !on_clock;
     const capture::Time on_its_clock =
         by_itself ? capture::monotonic_now() : time + offset_ - passed_;
-    take(camera_->advance(on_its_clock));
-    if (camera_->has_ended(on_its_clock)) status_.kept_because = "the probe has ended";
+    take(frames_until(on_its_clock));
+    if (ahead_.empty() && camera_->has_ended(on_its_clock))
+      status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;
   }
   return {newest_.image, newest_.time + passed_};

@@ -71,7 +71,7 @@ class ProbeSource {
   void open(const Set& set, std::optional<capture::Time> from);
   void open_camera(const Set& set, const ProbeSettings& probe, std::optional<capture::Time> from);
   void prime();
-  void begin_unmerged();
+  std::vector<capture::Frame> frames_until(capture::Time time);
   void prime_live(std::size_t cycle);
   void note_camera();
   capture::Frame wait_for_next();
@@ -93,6 +93,7 @@ class ProbeSource {
   std::unique_ptr<Source> camera_;           // null = the radiance stays
   std::unique_ptr<RollingBracket> bracket_;  // null while no two exposures are known
   capture::Frame single_;                    // the newest of the one exposure that is known
+  std::vector<capture::Frame> ahead_;        // read already, and not due yet
   Radiance newest_;
   ProbeStatus status_;
 };

@@ -38,6 +38,8 @@ class Source {
   const capture::Frame& current() const { return current_.frame; }
   // Whether it has no more frames, and its last was due for longer than a frame lasts.
   bool has_ended(capture::Time time) const;
+  // By how much after a time a frame may be stamped and still counts as of that time.
+  capture::Time early() const;
   // Of the frame that comes next; nothing at the end, and before a live one has come.
   std::optional<capture::Time> next_time() const;
 
@@ -56,7 +58,6 @@ class Source {
  private:
   void read_ahead();
   void fetch(capture::Time until);
-  capture::Time early() const;
   const capture::Frame& newest() const;
 
   std::unique_ptr<capture::Camera> camera_;    // null = a live one

@@ -61,8 +61,10 @@ Set set_of(float radiance, double max_angle_rad = std::numbers::pi / 2) {
 // What a camera films of even radiance: down at the floor, or up.
 class Plate {
  public:
-  explicit Plate(double looks_at_z)
-      : cam_from_set_(calibrate::look_at({0, -4, 1}, {0, 0, looks_at_z}, 0)) {}
+  explicit Plate(double looks_at_z, double focal_px = 60)
+      : directions_(
+            calibrate::make_direction_table({"pinhole", 64, 64, {focal_px, focal_px, 31.5, 31.5}})),
+        cam_from_set_(calibrate::look_at({0, -4, 1}, {0, 0, looks_at_z}, 0)) {}
   LightRequest request(float radiance) {
     pictures_.push_back(std::make_unique<capture::Image>(capture::make_image(64, 64)));
     for (float& value : pictures_.back()->pixels) value = radiance;
@@ -74,8 +76,7 @@ class Plate {
   }
 
  private:
-  calibrate::DirectionTable directions_ =
-      calibrate::make_direction_table({"pinhole", 64, 64, {60, 60, 31.5, 31.5}});
+  calibrate::DirectionTable directions_;
   calibrate::Pose cam_from_set_;
   std::vector<std::unique_ptr<capture::Image>> pictures_;  // each has an address of its own
 };
@@ -124,7 +125,7 @@ TEST(LightFeed, GivesAPatchItsAlbedoWhereverItFaces) {
 TEST(LightFeed, SaysThatTheLastGainIsHeldWhileThePlateIsDark) {
   Set set = set_of(100);
   set.probe->match = {};
-  Plate plate(4);
+  Plate plate(4, 220);  // some pixels to a texel
   LightFeed feed(set);
   EXPECT_THAT(feed.at(plate.request(0)).match.note, HasSubstr("gain left at 1"));
   const Light found = feed.at(plate.request(0.5F));

@@ -600,7 +600,7 @@ TEST_F(SetChangeTest, AnEditThatIsReadyInAPauseIsTakenOverAndToldThen) {
   Show show(made_set("grey:1,25,0"), options);
   bool taken = false, told = false;
   opening.shut();
-  std::jthread operating([&, edit = person_set("late:9"), wrong = person_set("nowhere:")] {
+  std::jthread operating([&, edit = person_set("late:9"), wrong = person_set("made.toml")] {
     const auto wait_until = [&](const auto& is_so) {
       const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
       while (!is_so(*show.status()) && std::chrono::steady_clock::now() < end) {
