@@ -27,21 +27,26 @@ constexpr std::array understood_extensions{
     "KHR_materials_volume",       "KHR_mesh_quantization",
     "KHR_texture_transform",      "KHR_materials_ior",
     "KHR_materials_specular",     "KHR_materials_unlit",
+    "EXT_mesh_gpu_instancing",    "KHR_node_visibility",
 };
-// What a model may use without need, and we leave out.
-constexpr std::array left_out_extensions{
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_iridescence",
-    "KHR_materials_specular",
-    "KHR_materials_unlit",
-    "KHR_materials_variants",
-    "KHR_texture_basisu",
-    "EXT_texture_webp",
-    "MSFT_lod",
+// What is shown, tells nothing of how a model looks, or is told of elsewhere: all else that a model
+// may use without need is left out.
+constexpr std::array quiet_extensions{
+    "EXT_mesh_gpu_instancing", "KHR_animation_pointer",      "KHR_draco_mesh_compression",
+    "KHR_materials_clearcoat", "KHR_materials_ior",          "KHR_materials_sheen",
+    "KHR_materials_volume",    "KHR_materials_transmission", "KHR_mesh_quantization",
+    "KHR_node_visibility",     "KHR_texture_transform",      "KHR_xmp_json_ld",
 };
+
+template <std::size_t size>
+bool is_in(const std::array<const char*, size>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+bool is_hidden(const json& node) {
+  static const json::json_pointer visible("/extensions/KHR_node_visibility/visible");
+  return node.contains(visible) && node[visible] == false;
+}
 
 std::uint32_t little_endian(const std::byte* bytes) {
   std::uint32_t value = 0;
@@ -129,17 +134,26 @@ class Checker {
   void check_extensions() {
     for (const json& name : array("extensionsRequired")) {
       const auto text = name.get<std::string>();
-      if (std::find(understood_extensions.begin(), understood_extensions.end(), text) ==
-          understood_extensions.end())
+      if (!is_in(understood_extensions, text))
         refuse("it needs the extension " + text +
                ", which is not understood; export the model without it");
     }
     for (const json& name : array("extensionsUsed")) {
       const auto text = name.get<std::string>();
-      if (std::find(left_out_extensions.begin(), left_out_extensions.end(), text) !=
-          left_out_extensions.end())
-        facts_.notes.push_back(text + " is left out");
+      if (!is_in(quiet_extensions, text)) facts_.notes.push_back(text + " is left out");
     }
+    for (const json& material : array("materials")) note_index(material);
+  }
+
+  // The index of refraction is only known to solid glass.
+  void note_index(const json& material) {
+    const json extensions = material.value("extensions", json::object());
+    const bool solid = extensions.contains("KHR_materials_volume") &&
+                       extensions.contains("KHR_materials_transmission");
+    if (solid || !extensions.contains("KHR_materials_ior")) return;
+    if (extensions["KHR_materials_ior"].value("ior", 1.5) == 1.5) return;
+    const std::string note = "KHR_materials_ior is left out, but for solid glass";
+    if (facts_.notes.empty() || facts_.notes.back() != note) facts_.notes.push_back(note);
   }
 
   void check_buffers() const {
@@ -261,6 +275,7 @@ class Checker {
         if (!index.is_number_unsigned()) refuse("a node of the scene is no index");
         check_index(index.get<std::uint64_t>(), "nodes", place("scene", shown));
         const json& node = array("nodes")[index.get<std::size_t>()];
+        if (is_hidden(node)) continue;
         if (node.contains("mesh")) used[node["mesh"].get<std::size_t>()] = true;
         if (node.contains("children")) pending.push_back(node["children"]);
       }

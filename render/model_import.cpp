@@ -15,11 +15,14 @@
 #include <exception>
 #include <limits>
 #include <new>
+#include <optional>
 #include <span>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "render/gltf_check.h"
+#include "render/gltf_mend.h"
 #include "render/model_check.h"
 #include "render/model_format.h"
 #include "render/model_material.h"
@@ -37,7 +40,9 @@ bool is_near(float x) { return std::abs(x) <= farthest; }  // nor what is no num
 // A file in memory, for assimp.
 class MemoryStream : public Assimp::IOStream {
  public:
-  explicit MemoryStream(std::vector<std::byte> bytes) : bytes_(std::move(bytes)) {}
+  explicit MemoryStream(std::vector<std::byte> bytes) : kept_(std::move(bytes)), bytes_(kept_) {}
+  // The bytes must outlive it.
+  explicit MemoryStream(std::span<const std::byte> bytes) : bytes_(bytes) {}
   std::size_t Read(void* target, std::size_t size, std::size_t count) override {
     if (size == 0) return 0;
     count = std::min(count, (bytes_.size() - at_) / size);
@@ -60,19 +65,29 @@ class MemoryStream : public Assimp::IOStream {
   void Flush() override {}
 
  private:
-  std::vector<std::byte> bytes_;
+  std::vector<std::byte> kept_;
+  std::span<const std::byte> bytes_;
   std::size_t at_ = 0;
 };
 
 // Lets assimp see nothing but what it is given.
 class GivenFiles : public Assimp::IOSystem {
  public:
-  GivenFiles(ModelFiles& files, bool x3d, std::vector<std::string>& missing)
-      : files_(files), x3d_(x3d), missing_(missing) {}
+  // `mended` stands for the file of that name, where it is.
+  GivenFiles(ModelFiles& files,
+             const std::string& name,
+             const std::optional<MendedGltf>& mended,
+             bool x3d,
+             std::vector<std::string>& missing)
+      : files_(files), name_(name), mended_(mended), x3d_(x3d), missing_(missing) {}
   bool Exists(const char* file) const override { return files_.exists(file); }
   char getOsSeparator() const override { return '/'; }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
     if (std::strchr(mode, 'w') != nullptr || std::strchr(mode, 'a') != nullptr) return nullptr;
+    const std::string_view name(file);
+    if (mended_ && name == name_) return new MemoryStream(std::span(mended_->file));
+    if (mended_ && name.ends_with(mended_vertices))
+      return new MemoryStream(std::span(mended_->vertices));
     if (auto bytes = files_.read(file))
       return new MemoryStream(x3d_ ? mend_x3d(*bytes) : std::move(*bytes));
     missing_.emplace_back(file);
@@ -82,6 +97,8 @@ class GivenFiles : public Assimp::IOSystem {
 
  private:
   ModelFiles& files_;
+  const std::string& name_;
+  const std::optional<MendedGltf>& mended_;
   bool x3d_;
   std::vector<std::string>& missing_;
 };
@@ -284,10 +301,18 @@ void translate(const std::exception_ptr& error) {
 
 RawModel import_model(ModelFiles& files, const std::string& file, const LoadOptions& options) {
   ModelFormat format = model_format(file).value();
-  const GltfFacts facts = check_first(files.read(file).value_or(std::vector<std::byte>{}), format);
+  std::optional<MendedGltf> mended;
+  const GltfFacts facts = [&] {
+    const std::vector<std::byte> bytes = files.read(file).value_or(std::vector<std::byte>{});
+    const GltfFacts checked = check_first(bytes, format);
+    if (format.gltf)
+      mended = mend_gltf(bytes, [&](const std::string& name) { return files.read(name); });
+    return checked;
+  }();
   std::vector<std::string> missing;
   Assimp::Importer importer;
-  importer.SetIOHandler(new GivenFiles(files, format.x3d, missing));  // the importer deletes it
+  importer.SetIOHandler(
+      new GivenFiles(files, file, mended, format.x3d, missing));  // the importer deletes it
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(
@@ -309,7 +334,13 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
            : aiMatrix4x4(s, 0, 0, 0, 0, s, 0, 0, 0, 0, s, 0, 0, 0, 0, 1);
   if (format.gltf) check_faces(*scene, facts);
   RawModel model = ModelBuilder(*scene, options, format.smooth_normals).build(set_from_root);
-  model.report.notes.insert(model.report.notes.end(), facts.notes.begin(), facts.notes.end());
+  auto& notes = model.report.notes;
+  std::vector<std::string> more = facts.notes;
+  if (mended) more.insert(more.end(), mended->notes.begin(), mended->notes.end());
+  for (std::string& note : more) {
+    if (std::find(notes.begin(), notes.end(), note) == notes.end())
+      notes.push_back(std::move(note));
+  }
   for (const std::string& name : missing)
     model.report.notes.push_back("'" + name + "' is not there");
   return model;
