@@ -7,6 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render/join_vertices.h"
@@ -46,19 +47,54 @@ void copy_normals(const aiMesh& source, Mesh& mesh) {
   }
 }
 
+// Twice a triangle's area in texture coordinates: below 0 where the picture is mirrored, 0 where
+// that cannot be told.
+float uv_determinant(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
+  const auto &a = mesh.uvs[triangle[0]], &b = mesh.uvs[triangle[1]], &c = mesh.uvs[triangle[2]];
+  const float determinant = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+  return std::isfinite(determinant) ? determinant : 0;
+}
+
+// Vertices that mirrored triangles share with others get a twin, so that each has one sense of
+// rotation (as in Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008, section 3.1).
+void part_mirrored(Mesh& mesh) {
+  constexpr std::uint32_t none = ~0U;
+  std::vector<bool> upright(mesh.positions.size(), false);
+  for (const auto& triangle : mesh.triangles) {
+    if (uv_determinant(mesh, triangle) <= 0) continue;
+    for (const std::uint32_t corner : triangle) upright[corner] = true;
+  }
+  std::vector<std::uint32_t> twin(mesh.positions.size(), none);
+  for (auto& triangle : mesh.triangles) {
+    if (uv_determinant(mesh, triangle) >= 0) continue;
+    for (std::uint32_t& corner : triangle) {
+      if (!upright[corner]) continue;
+      if (twin[corner] == none) {
+        twin[corner] = static_cast<std::uint32_t>(mesh.positions.size());
+        mesh.positions.push_back(Vec3f(mesh.positions[corner]));
+        mesh.normals.push_back(Vec3f(mesh.normals[corner]));
+        mesh.uvs.push_back(std::array(mesh.uvs[corner]));
+      }
+      corner = twin[corner];
+    }
+  }
+}
+
 // Tangents along u, with the sign that makes cross(normal, tangent) * sign point up the texture.
 void compute_tangents(Mesh& mesh) {
+  part_mirrored(mesh);
   std::vector<Vec3f> along_u(mesh.positions.size());
   std::vector<Vec3f> along_v(mesh.positions.size());
-  for (const auto& [a, b, c] : mesh.triangles) {
+  for (const auto& triangle : mesh.triangles) {
+    const float determinant = uv_determinant(mesh, triangle);
+    if (determinant == 0) continue;
+    const auto [a, b, c] = triangle;
     const Vec3f e1 = mesh.positions[b] - mesh.positions[a];
     const Vec3f e2 = mesh.positions[c] - mesh.positions[a];
     const float u1 = mesh.uvs[b][0] - mesh.uvs[a][0];
     const float v1 = mesh.uvs[b][1] - mesh.uvs[a][1];
     const float u2 = mesh.uvs[c][0] - mesh.uvs[a][0];
     const float v2 = mesh.uvs[c][1] - mesh.uvs[a][1];
-    const float determinant = u1 * v2 - u2 * v1;
-    if (!std::isfinite(determinant) || determinant == 0) continue;
     const float sign = determinant > 0 ? 1.0F : -1.0F;
     const Vec3f u = normalize((e1 * v2 - e2 * v1) * sign);
     const Vec3f v = normalize((e2 * u1 - e1 * u2) * sign);
@@ -77,6 +113,24 @@ void compute_tangents(Mesh& mesh) {
     const float sign = dot(cross(n, t), along_v[i]) > 0 ? -1.0F : 1.0F;
     mesh.tangents[i] = {t.x, t.y, t.z, sign};
   }
+}
+
+// Each triangle with vertices and a normal of its own.
+void make_flat(Mesh& mesh) {
+  Mesh flat;
+  flat.triangles.reserve(mesh.triangles.size());
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const auto first = static_cast<std::uint32_t>(flat.positions.size());
+    const Vec3f p = mesh.positions[a];
+    const Vec3f face = normalize(cross(mesh.positions[b] - p, mesh.positions[c] - p));
+    for (const std::uint32_t corner : {a, b, c}) {
+      flat.positions.push_back(mesh.positions[corner]);
+      flat.normals.push_back(dot(face, face) > 0.5F ? face : Vec3f{0, 0, 1});
+      flat.uvs.push_back(mesh.uvs[corner]);
+    }
+    flat.triangles.push_back({first, first + 1, first + 2});
+  }
+  mesh = std::move(flat);
 }
 
 void copy_tangents(const aiMesh& source, Mesh& mesh) {
@@ -139,10 +193,11 @@ Mesh convert_mesh(const aiMesh& source,
     }
   }
   if (join) join_vertices(mesh);
-  if (material.parameters.normal_texture >= 0 && !mesh.normals.empty()) {
-    if (source.HasTangentsAndBitangents() && !join)
+  if (material.parameters.normal_texture >= 0) {
+    if (mesh.normals.empty() && !mesh.uvs.empty()) make_flat(mesh);
+    if (source.HasNormals() && source.HasTangentsAndBitangents() && !join)
       copy_tangents(source, mesh);
-    else if (!mesh.uvs.empty())
+    else if (!mesh.uvs.empty() && !mesh.normals.empty())
       compute_tangents(mesh);
   }
   return mesh;

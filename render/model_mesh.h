@@ -12,7 +12,8 @@ namespace render {
 
 // A mesh with the texture coordinates that its material wants and, where that has a normal map,
 // tangents. With `join`, equal vertices become one, and missing normals are made (join_vertices.h);
-// without, a mesh without normals stays flat. Triangles whose positions are not finite, or beyond
+// without, a mesh without normals stays flat; where it has a normal map, each of its triangles gets
+// vertices of its own. Triangles whose positions are not finite, or beyond
 // `farthest_position`, are left out and counted in `left_out`; texture coordinates that are not
 // finite, or beyond a million, become 0. Throws std::runtime_error if a triangle names a vertex
 // that is not there.

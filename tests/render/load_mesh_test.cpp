@@ -13,6 +13,7 @@
 #include "render/glass.h"
 #include "render/standard.h"
 #include "tests/made_files.h"
+#include "tests/made_gltf.h"
 
 namespace render::load_mesh_test {
 namespace {
@@ -179,6 +180,50 @@ TEST(LoadModel, TakesClearVolumesForSolidGlass) {
 "KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_volume":{"thicknessFactor":0.01}})")
                 .shader,
             "standard");
+}
+
+// A sheet of a left and a right half, u being the distance from the seam between them, with a
+// normal map.
+LoadedModel load_mirrored_sheet(bool normals) {
+  const fs::path folder = made::make_temporary_directory();
+  fs::copy_file(good("one_texel.png"), folder / "one.png");
+  made::GltfMaker maker;
+  const int position =
+                maker.values<float>(3, {-1, -1, 0, 0, -1, 0, 1, -1, 0, 1, 1, 0, 0, 1, 0, -1, 1, 0}),
+            normal = maker.values<float>(3, {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}),
+            uv = maker.values<float>(2, {1, 1, 0, 1, 1, 1, 1, 0, 0, 0, 1, 0}),
+            corners = maker.values<std::uint16_t>(1, {0, 1, 4, 0, 4, 5, 1, 2, 3, 1, 3, 4});
+  const std::string path = folder / "sheet.glb";
+  std::ofstream(path, std::ios::binary)
+      << maker.glb(R"("nodes":[{"mesh":0}],"meshes":[{"primitives":[{"material":0,"indices":)" +
+                   std::to_string(corners) + R"(,"attributes":{"POSITION":)" +
+                   std::to_string(position) + ",\"TEXCOORD_0\":" + std::to_string(uv) +
+                   (normals ? ",\"NORMAL\":" + std::to_string(normal) : "") +
+                   R"(}}]}],"materials":[{"normalTexture":{"index":0}}],"textures":[{"source":0}],
+"images":[{"uri":"one.png"}])");
+  return load_model(path);
+}
+
+TEST(LoadModel, KeepsNormalMapsUprightAlongAMirroredSeam) {
+  for (const bool normals : {true, false}) {
+    const LoadedModel model = load_mirrored_sheet(normals);
+    const render::Mesh& mesh = *model.scene.meshes[0];
+    ASSERT_EQ(mesh.triangles.size(), 4U);
+    ASSERT_EQ(mesh.tangents.size(), mesh.positions.size());
+    ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
+    EXPECT_EQ(mesh.positions.size(), normals ? 8U : 12U);
+    for (const auto& triangle : mesh.triangles) {
+      float side = 0;
+      for (const std::uint32_t corner : triangle) side += mesh.positions[corner].x;
+      side = side > 0 ? 1.0F : -1.0F;
+      for (const std::uint32_t corner : triangle) {
+        const auto& t = mesh.tangents[corner];
+        EXPECT_NEAR(t[0], side, 1e-5);
+        EXPECT_EQ(t[3], side) << "v runs down on both sides";
+        EXPECT_EQ(mesh.normals[corner], (render::Vec3f{0, 0, 1}));
+      }
+    }
+  }
 }
 
 TEST(LoadModel, ReadsTheToyCar) {
