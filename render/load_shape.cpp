@@ -32,7 +32,10 @@ MeshShape shape_of(const Mesh& mesh, const Placement& placed) {
                   by_corners(mesh, mesh.normals, mirrored),
                   by_corners(mesh, mesh.tangents, mirrored)};
   for (Vec3f& p : shape.positions) p = transform_point(placed, p);
-  for (Vec3f& n : shape.normals) n = transform_normal(for_normals, n);
+  for (Vec3f& n : shape.normals) {
+    n = transform_normal(for_normals, n);
+    if (mirrored) n = -n;  // out of the corners as they run now
+  }
   for (auto& tangent : shape.tangents) {
     const Vec3f t = normalize(transform_vector(placed, {tangent[0], tangent[1], tangent[2]}));
     tangent = {t.x, t.y, t.z, mirrored ? -tangent[3] : tangent[3]};

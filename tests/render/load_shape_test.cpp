@@ -11,6 +11,7 @@
 #include <string>
 
 #include "tests/made_files.h"
+#include "tests/made_gltf.h"
 
 namespace render::load_shape_test {
 namespace {
@@ -55,7 +56,7 @@ class LoadShapeTest : public testing::Test {
 
   std::string write(const std::string& name, const std::string& text) const {
     const std::string path = (dir_ / name).string();
-    std::ofstream(path) << text;
+    std::ofstream(path, std::ios::binary) << text;
     return path;
   }
 
@@ -119,6 +120,29 @@ TEST_F(LoadShapeTest, IsSmoothWhereVerticesAreApartThoughFilesHaveNoNormals) {
         ASSERT_EQ(mesh.normals[i], mesh.normals[k]) << i << " " << k;
       }
     }
+  }
+}
+
+TEST_F(LoadShapeTest, KeepsTheNormalMapOfAMirroredPart) {
+  std::filesystem::copy_file(made::bad_files().parent_path() / "one_texel.png", dir_ / "one.png");
+  made::GltfMaker maker;
+  const int position = maker.values<float>(3, {0, 0, 0, 1, 0, 0, 0, 1, 0}),
+            normal = maker.values<float>(3, {0, 0, 1, 0, 0, 1, 0, 0, 1}),
+            uv = maker.values<float>(2, {0, 0, 1, 0, 0, 1});
+  const LoadedModel model = load_deforming_model(
+      write("1.glb", maker.glb(R"("nodes":[{"mesh":0,"scale":[-1,1,1]}],"meshes":[{"primitives":[
+{"material":0,"attributes":{"POSITION":)" +
+                               std::to_string(position) + ",\"NORMAL\":" + std::to_string(normal) +
+                               ",\"TEXCOORD_0\":" + std::to_string(uv) +
+                               R"(}}]}],"materials":[{"normalTexture":{"index":0}}],
+"textures":[{"source":0}],"images":[{"uri":"one.png"}])")));
+  const Mesh& mesh = *model.scene.meshes[0];
+  ASSERT_EQ(mesh.tangents.size(), 3U);
+  // Mirrored, u runs to the set's -x, v to z, and the sheet looks to -y.
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_LT(length(mesh.normals[i] - Vec3f{0, -1, 0}), 1e-5F);
+    EXPECT_NEAR(mesh.tangents[i][0], -1, 1e-5);
+    EXPECT_EQ(mesh.tangents[i][3], 1);
   }
 }
 
