@@ -103,17 +103,57 @@ class GivenFiles : public Assimp::IOSystem {
   std::vector<std::string>& missing_;
 };
 
-// Metres per unit and the up axis that an FBX file states.
-double unit_of(const aiScene& scene, ModelFormat& format) {
+// Metres per unit that an FBX file states.
+double unit_of(const aiScene& scene) {
   double centimetres = 100;
   if (scene.mMetaData == nullptr) return 1;
-  std::int32_t up = 1;
-  if (scene.mMetaData->Get("UpAxis", up)) format.y_up = up != 2;
   float single = 0;
   if (!scene.mMetaData->Get("UnitScaleFactor", centimetres) &&
       scene.mMetaData->Get("UnitScaleFactor", single))
     centimetres = single;
   return std::isfinite(centimetres) && centimetres > 0 ? centimetres / 100 : 1;
+}
+
+using Axes = std::array<std::array<int, 3>, 3>;  // of the set, x, y and z, in those of the file
+
+constexpr Axes from_y_up{{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}};
+constexpr Axes from_z_up{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
+int determinant_of(const Axes& rows) {
+  int sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    sum += rows[0][k] * (rows[1][(k + 1) % 3] * rows[2][(k + 2) % 3] -
+                         rows[1][(k + 2) % 3] * rows[2][(k + 1) % 3]);
+  }
+  return sum;
+}
+
+// The axes that an FBX file states: its right, front and up are the set's x, -y and z. Where they
+// are no right-handed three, only the one that is up counts.
+Axes stated_axes(const aiScene& scene, const Axes& otherwise) {
+  const auto stated = [&](const char* key, std::int32_t fallback) {
+    std::int32_t value = fallback;
+    return scene.mMetaData != nullptr && scene.mMetaData->Get(key, value) ? value : fallback;
+  };
+  const std::int32_t up = stated("UpAxis", -1), front = stated("FrontAxis", -1),
+                     right = stated("CoordAxis", -1);
+  if (up < 0 || up > 2) return otherwise;
+  const int up_sign = stated("UpAxisSign", 1) < 0 ? -1 : 1;
+  const auto of = [](std::int32_t axis, int sign) {
+    std::array<int, 3> row{};
+    if (axis >= 0 && axis < 3) row[static_cast<std::size_t>(axis)] = sign;
+    return row;
+  };
+  const Axes all{of(right, stated("CoordAxisSign", 1) < 0 ? -1 : 1),
+                 of(front, stated("FrontAxisSign", 1) < 0 ? 1 : -1), of(up, up_sign)};
+  if (determinant_of(all) == 1) return all;
+  Axes axes = up == 1 ? from_y_up : up == 2 ? from_z_up : Axes{of(1, 1), of(2, 1), of(0, 1)};
+  if (up_sign < 0) {  // turned over about the set's x
+    for (const std::size_t row : {1U, 2U}) {
+      for (int& x : axes[row]) x = -x;
+    }
+  }
+  return axes;
 }
 
 // Walks the nodes and gathers what is shown.
@@ -300,7 +340,7 @@ void translate(const std::exception_ptr& error) {
 }  // namespace
 
 RawModel import_model(ModelFiles& files, const std::string& file, const LoadOptions& options) {
-  ModelFormat format = model_format(file).value();
+  const ModelFormat format = model_format(file).value();
   std::optional<MendedGltf> mended;
   const GltfFacts facts = [&] {
     const std::vector<std::byte> bytes = files.read(file).value_or(std::vector<std::byte>{});
@@ -326,12 +366,15 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
   }
   if (scene->mRootNode == nullptr) throw std::runtime_error("it has no nodes");
 
-  const double unit = unit_of(*scene, format);
-  const bool y_up = options.up == UpAxis::by_format ? format.y_up : options.up == UpAxis::y;
-  const auto s = static_cast<float>(options.scale * unit);
-  const aiMatrix4x4 set_from_root =
-      y_up ? aiMatrix4x4(s, 0, 0, 0, 0, 0, -s, 0, 0, s, 0, 0, 0, 0, 0, 1)
-           : aiMatrix4x4(s, 0, 0, 0, 0, s, 0, 0, 0, 0, s, 0, 0, 0, 0, 1);
+  const Axes axes = options.up == UpAxis::y ? from_y_up
+                    : options.up == UpAxis::z
+                        ? from_z_up
+                        : stated_axes(*scene, format.y_up ? from_y_up : from_z_up);
+  aiMatrix4x4 set_from_root;
+  for (unsigned r = 0; r < 3; ++r) {
+    for (unsigned c = 0; c < 3; ++c)
+      set_from_root[r][c] = static_cast<float>(options.scale * unit_of(*scene) * axes[r][c]);
+  }
   if (format.gltf) check_faces(*scene, facts);
   RawModel model = ModelBuilder(*scene, options, format.smooth_normals).build(set_from_root);
   auto& notes = model.report.notes;

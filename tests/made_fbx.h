@@ -73,6 +73,7 @@ struct FbxPart {
   render::Mesh mesh;  // with normals and texture coordinates, v down
   std::vector<double> colour;
   std::string picture;  // file; "" = none
+  double visibility = 1;
 };
 
 inline FbxNode fbx_geometry(const FbxPart& part, std::int64_t id) {
@@ -122,11 +123,14 @@ inline std::string made_fbx(const std::vector<FbxPart>& parts) {
   for (const FbxPart& part : parts) {
     const std::int64_t geometry = ++id, model = ++id, material = ++id, texture = ++id;
     objects.with(fbx_geometry(part, geometry));
+    FbxNode visibility{"P"};
+    visibility.text("Visibility").text("Visibility").text("").text("A").real(part.visibility);
     objects.with(FbxNode{"Model"}
                      .id(model)
                      .text(part.name + mark + "Model")
                      .text("Mesh")
-                     .with(FbxNode{"Version"}.number(232)));
+                     .with(FbxNode{"Version"}.number(232))
+                     .with(FbxNode{"Properties70"}.with(visibility)));
     FbxNode colour{"P"};
     colour.text("DiffuseColor").text("Color").text("").text("A");
     for (const double value : part.colour) colour.real(value);
@@ -157,6 +161,23 @@ inline std::string made_fbx(const std::vector<FbxPart>& parts) {
   objects.write(file);
   connections.write(file);
   return file + std::string(13, '\0');
+}
+
+// An ascii file of one triangle with the corners (0, 0, 0), (1, 0, 0), (1, 2, 3), its unit a metre.
+inline std::string ascii_fbx(const std::string& settings,
+                             const std::string& of_model = "",
+                             const std::string& objects = "",
+                             const std::string& connections = "") {
+  return "; FBX 7.3.0 project file\nFBXHeaderExtension:  {\nFBXVersion: 7300\n}\n"
+         "GlobalSettings:  {\nVersion: 1000\nProperties70:  {\n"
+         "P: \"UnitScaleFactor\", \"double\", \"Number\", \"\",100\n" +
+         settings +
+         "}\n}\nObjects:  {\nGeometry: 1, \"Geometry::\", \"Mesh\" {\n"
+         "Vertices: *9 {\na: 0,0,0,1,0,0,1,2,3\n}\nPolygonVertexIndex: *3 {\na: 0,1,-3\n}\n"
+         "GeometryVersion: 124\n}\nModel: 2, \"Model::part\", \"Mesh\" {\nVersion: 232\n"
+         "Properties70:  {\n" +
+         of_model + "}\n}\n" + objects + "}\nConnections:  {\nC: \"OO\",2,0\nC: \"OO\",1,2\n" +
+         connections + "}\n";
 }
 
 }  // namespace made

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <assimp/Exporter.hpp>
 #include <cmath>
@@ -21,6 +22,7 @@
 #include "render/standard.h"
 #include "tests/made_fbx.h"
 #include "tests/made_files.h"
+#include "tests/made_model_bytes.h"
 
 namespace render::model_formats_test {
 namespace {
@@ -266,6 +268,55 @@ TEST(LoadModel, ReadsTheMadeHeadlightBackFromPly) {
   write_ply(path, headlight);
   const LoadReport report = load_model(path).report;
   EXPECT_EQ(report.triangles, triangle_count(headlight));
+}
+
+class FormatNotes : public testing::Test {
+ protected:
+  void SetUp() override { folder_ = made::make_temporary_directory(); }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  LoadedModel load(const std::string& name, const std::string& bytes) const {
+    const std::string path = folder_ / name;
+    std::ofstream(path, std::ios::binary) << bytes;
+    return load_model(path);
+  }
+  std::vector<std::string> notes(const std::string& name, const std::string& bytes) const {
+    return load(name, bytes).report.notes;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(FormatNotes, TurnsFbxByTheAxesThatItStates) {
+  struct Case {
+    int up, up_sign, front, front_sign, right, right_sign;
+    Vec3f corner;  // where (1, 2, 3) comes to stand
+  };
+  for (const Case& c : {Case{1, 1, 2, 1, 0, 1, {1, -3, 2}},
+                        {2, 1, 1, -1, 0, 1, {1, 2, 3}},
+                        {1, 1, 2, -1, 0, -1, {-1, 3, 2}},
+                        {0, 1, 2, 1, 1, -1, {-2, -3, 1}},
+                        // Left-handed: only what is up counts.
+                        {0, 1, 2, 1, 1, 1, {2, 3, 1}},
+                        {1, -1, 2, 1, 0, 1, {1, 3, -2}},
+                        {2, -1, 1, -1, 0, 1, {1, -2, -3}},
+                        {1, 1, 1, 1, 7, 1, {1, -3, 2}}}) {
+    std::string settings;
+    const auto state = [&](const std::string& name, int value) {
+      settings += "P: \"" + name + "\", \"int\", \"Integer\", \"\"," + std::to_string(value) + "\n";
+    };
+    state("UpAxis", c.up), state("UpAxisSign", c.up_sign);
+    state("FrontAxis", c.front), state("FrontAxisSign", c.front_sign);
+    state("CoordAxis", c.right), state("CoordAxisSign", c.right_sign);
+    SCOPED_TRACE(settings);
+    const LoadedModel model = load("a.fbx", made::ascii_fbx(settings));
+    const Instance& instance = model.scene.instances.at(0);
+    float nearest = 1;
+    for (const Vec3f p : model.scene.meshes[0]->positions) {
+      nearest = std::min(nearest, length(placed(instance, p) - c.corner));
+    }
+    EXPECT_LT(nearest, 1e-5F);
+  }
 }
 
 }  // namespace
