@@ -159,10 +159,10 @@ Axes stated_axes(const aiScene& scene, const Axes& otherwise) {
 // Walks the nodes and gathers what is shown.
 class ModelBuilder {
  public:
-  ModelBuilder(const aiScene& source, const LoadOptions& options, bool smooth_normals)
+  ModelBuilder(const aiScene& source, const LoadOptions& options, const ModelFormat& format)
       : source_(source),
         options_(options),
-        smooth_normals_(smooth_normals),
+        format_(format),
         materials_(source, model_.report.notes),
         meshes_(source.mNumMeshes, -1),
         material_of_(source.mNumMaterials, -1),
@@ -258,7 +258,8 @@ class ModelBuilder {
     const std::uint32_t material = material_for(source.mMaterialIndex);
     if (source.HasVertexColors(0)) add_note("vertex colours are left out");
     if (source.HasBones()) add_note("skins are left out: the model stands in its bind pose");
-    Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], smooth_normals_, left_out_);
+    Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], format_.smooth_normals,
+                             format_.stl, left_out_);
     if (mesh.triangles.empty()) return -1;
     mesh.materials = {material};
     model_.report.vertices += mesh.positions.size();
@@ -295,7 +296,7 @@ class ModelBuilder {
 
   const aiScene& source_;
   const LoadOptions& options_;
-  bool smooth_normals_;
+  const ModelFormat& format_;
   RawModel model_;
   MaterialImport materials_;
   std::vector<std::int64_t> meshes_;
@@ -376,7 +377,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
       set_from_root[r][c] = static_cast<float>(options.scale * unit_of(*scene) * axes[r][c]);
   }
   if (format.gltf) check_faces(*scene, facts);
-  RawModel model = ModelBuilder(*scene, options, format.smooth_normals).build(set_from_root);
+  RawModel model = ModelBuilder(*scene, options, format).build(set_from_root);
   auto& notes = model.report.notes;
   std::vector<std::string> more = facts.notes;
   if (mended) more.insert(more.end(), mended->notes.begin(), mended->notes.end());

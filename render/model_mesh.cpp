@@ -47,6 +47,19 @@ void copy_normals(const aiMesh& source, Mesh& mesh) {
   }
 }
 
+// Normals of facets that are not those of the corners' order give way to them.
+void mend_facets(Mesh& mesh) {
+  constexpr float least_cosine = 0.9F;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3f p = mesh.positions[a];
+    const Vec3f face = normalize(cross(mesh.positions[b] - p, mesh.positions[c] - p));
+    if (!(dot(face, face) > 0.5F)) continue;
+    for (const std::uint32_t corner : {a, b, c}) {
+      if (dot(mesh.normals[corner], face) < least_cosine) mesh.normals[corner] = face;
+    }
+  }
+}
+
 // Twice a triangle's area in texture coordinates: below 0 where the picture is mirrored, 0 where
 // that cannot be told.
 float uv_determinant(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
@@ -152,6 +165,7 @@ void copy_tangents(const aiMesh& source, Mesh& mesh) {
 Mesh convert_mesh(const aiMesh& source,
                   const ImportedMaterial& material,
                   bool join,
+                  bool facets,
                   std::size_t& left_out) {
   Mesh mesh;
   mesh.positions.reserve(source.mNumVertices);
@@ -176,6 +190,7 @@ Mesh convert_mesh(const aiMesh& source,
       ++left_out;
   }
   if (source.HasNormals()) copy_normals(source, mesh);
+  if (source.HasNormals() && facets) mend_facets(mesh);
   const unsigned channel = material.uv.channel < AI_MAX_NUMBER_OF_TEXTURECOORDS &&
                                    source.HasTextureCoords(material.uv.channel)
                                ? material.uv.channel

@@ -17,9 +17,12 @@ namespace render {
 // `farthest_position`, are left out and counted in `left_out`; texture coordinates that are not
 // finite, or beyond a million, become 0. Throws std::runtime_error if a triangle names a vertex
 // that is not there.
+//
+// With `facets`, which STL has, a normal that is not its triangle's (by over 25 degrees) is that.
 Mesh convert_mesh(const aiMesh& source,
                   const ImportedMaterial& material,
                   bool join,
+                  bool facets,
                   std::size_t& left_out);
 
 inline constexpr float farthest_position = 1e12F;

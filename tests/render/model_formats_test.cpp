@@ -319,5 +319,11 @@ TEST_F(FormatNotes, TurnsFbxByTheAxesThatItStates) {
   }
 }
 
+TEST_F(FormatNotes, StlLooksTheWayItsCornersRun) {
+  // The file says +z, the order of its corners -y.
+  const LoadedModel model = load("a.stl", made::stl({0, 0, 1}));
+  EXPECT_THAT(model.scene.meshes[0]->normals, testing::Each(Vec3f{0, -1, 0}));
+}
+
 }  // namespace
 }  // namespace render::model_formats_test
