@@ -50,7 +50,8 @@ struct LoadedModel {
 // wall; a volume of it as solid glass, glass.h, if it is hardly rough), emission, alpha cut-outs
 // (blended alpha is cut at a half). Not handled, and noted in the report: occlusion maps (the light
 // is traced), sheen, volumes that are not clear, transmission roughness maps, vertex
-// colours, animation, skins. Materials of other formats: colour, opacity, shininess, emission.
+// colours, animation. Morph targets and skins of glTF show as they rest (models.md); those of FBX
+// are noted. Materials of other formats: colour, opacity, shininess, emission.
 //
 // A texture that is not there or cannot be decoded is told in the notes and replaced: base colour
 // by magenta, linear (1, 0, 1), emission and transmission by 0; other maps are left out. Normals

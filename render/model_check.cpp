@@ -1,11 +1,13 @@
-// PLY and STL files, checked.
+// PLY, STL and FBX files, checked.
 #include "render/model_check.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <charconv>
 #include <cstdint>
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -39,6 +41,7 @@ std::uint64_t count_of(std::string_view word, const std::string& of) {
 }
 
 struct Property {
+  std::string name = {};
   std::size_t bytes = 0;  // of a value
   std::size_t list = 0;   // of its count, if it is a list
 };
@@ -79,11 +82,16 @@ std::size_t bytes_of(std::string_view type) {
 }
 
 Property take_property(std::string_view& line) {
-  const std::string_view type = take_word(line);
-  if (type != "list") return {bytes_of(type), 0};
-  const std::size_t list = bytes_of(take_word(line));
-  if (list > 4) refuse("its header counts a list in fractions");
-  return {bytes_of(take_word(line)), list};
+  Property property;
+  std::string_view type = take_word(line);
+  if (type == "list") {
+    property.list = bytes_of(take_word(line));
+    if (property.list > 4) refuse("its header counts a list in fractions");
+    type = take_word(line);
+  }
+  property.bytes = bytes_of(type);
+  property.name = std::string(take_word(line).substr(0, 40));
+  return property;
 }
 
 PlyHead parse_head(std::string_view text) {
@@ -161,9 +169,56 @@ bool skip_words(const Element& element, std::string_view& body) {
   return true;
 }
 
+std::vector<std::string> notes_of(const PlyHead& head) {
+  std::vector<std::string> notes;
+  for (const Element& element : head.elements) {
+    if (element.rows == 0) continue;
+    if (element.name == "tristrips") {
+      refuse("it has triangle strips, which are not read; export its faces as polygons");
+    }
+    if (element.name != "face") continue;
+    const auto has = [&](std::string_view name) {
+      return std::ranges::any_of(element.properties, [&](const Property& p) {
+        return p.name == name || p.name == "diffuse_" + std::string(name);
+      });
+    };
+    if (has("texcoord")) {
+      notes.emplace_back(
+          "texture coordinates of faces are taken for their vertices: where faces differ, the last "
+          "one's count for all");
+    }
+    if (has("red") || has("green") || has("blue")) {
+      notes.emplace_back("colours of faces are left out");
+    }
+  }
+  return notes;
+}
+
+// What follows a name in a binary FBX record, up to its first number; nothing if there is none.
+std::optional<double> number_after(std::string_view text) {
+  const auto take = [&]<class T>(T& value) {
+    if (text.size() < sizeof value) return false;
+    std::memcpy(&value, text.data(), sizeof value);
+    text.remove_prefix(sizeof value);
+    return true;
+  };
+  for (int values = 0; values < 5 && !text.empty(); ++values) {
+    const char type = text[0];
+    text.remove_prefix(1);
+    std::uint32_t length = 0;
+    std::int32_t number = 0;
+    double real = 0;
+    if (type == 'D') return take(real) ? std::optional(real) : std::nullopt;
+    if (type == 'I') return take(number) ? std::optional<double>(number) : std::nullopt;
+    if (type != 'S' || !take(length) || length > text.size()) return std::nullopt;
+    text.remove_prefix(length);
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
-void check_ply(std::span<const std::byte> file_bytes) {
+std::vector<std::string> check_ply(std::span<const std::byte> file_bytes) {
   PlyHead head = parse_head({reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size()});
   const bool ascii = head.format == PlyHead::Format::ascii;
   const bool big = head.format == PlyHead::Format::big;
@@ -177,6 +232,7 @@ void check_ply(std::span<const std::byte> file_bytes) {
       }
     }
   }
+  return notes_of(head);
 }
 
 void check_stl(std::span<const std::byte> file_bytes) {
@@ -189,6 +245,30 @@ void check_stl(std::span<const std::byte> file_bytes) {
     refuse("it is cut short: its header says " + std::to_string(count) +
            " triangles, but there are " + std::to_string((text.size() - header - 4) / triangle));
   }
+}
+
+bool hides_by_visibility(std::span<const std::byte> file_bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
+  using namespace std::string_view_literals;
+  const bool binary = text.starts_with("Kaydara FBX Binary");
+  const std::string_view name = binary ? "S\x0a\0\0\0Visibility"sv : "\"Visibility\""sv;
+  for (std::size_t at = text.find(name); at != std::string_view::npos;) {
+    std::string_view rest = text.substr(at + name.size());
+    at = text.find(name, at + name.size());
+    if (binary) {
+      if (number_after(rest) == 0.0) return true;
+      continue;
+    }
+    rest = rest.substr(0, rest.find('\n'));
+    const std::size_t comma = rest.rfind(',');
+    if (comma == std::string_view::npos) continue;
+    rest.remove_prefix(comma + 1);
+    const std::string_view word = take_word(rest);
+    double value = 1;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error == std::errc{} && end == word.data() + word.size() && value == 0) return true;
+  }
+  return false;
 }
 
 }  // namespace render

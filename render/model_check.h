@@ -1,18 +1,25 @@
-// PLY and STL files, checked before anything is built from them.
+// PLY, STL and FBX files, checked before anything is built from them.
 #pragma once
 
 #include <cstddef>
 #include <span>
+#include <string>
+#include <vector>
 
 namespace render {
 
-// Walks all rows of a PLY file, ascii or binary. Throws std::runtime_error, naming the element and
-// where it ends, if its header is damaged or promises more than there is.
+// Walks all rows of a PLY file, ascii or binary; returns what will not be shown as it is, in words.
+// Throws std::runtime_error, naming the element and where it ends, if its header is damaged or
+// promises more than there is, or if it has triangle strips, which are not read.
 //
 // Turk, "The PLY Polygon File Format", 1994.
-void check_ply(std::span<const std::byte> file_bytes);
+std::vector<std::string> check_ply(std::span<const std::byte> file_bytes);
 
 // Throws std::runtime_error if a binary STL file is not as long as its count of triangles says.
 void check_stl(std::span<const std::byte> file_bytes);
+
+// Whether an FBX file, binary or ascii, hides anything by a Visibility of 0, which assimp does not
+// tell. Anything may stand in the file.
+bool hides_by_visibility(std::span<const std::byte> file_bytes);
 
 }  // namespace render

@@ -1,7 +1,6 @@
 // Models through assimp.
 #include "render/model_import.h"
 
-#include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
@@ -174,6 +173,7 @@ class ModelBuilder {
     for (std::size_t i = 0; i < found.size(); ++i)
       if (!found[i]) refuse_hide(options_.hide[i]);
     LoadReport& report = model_.report;
+    if (source_.mNumAnimations > 0) add_note("animations are left out");
     if (left_out_ > 0) {
       const std::string count = std::to_string(left_out_);
       const char* what =
@@ -201,8 +201,11 @@ class ModelBuilder {
       found[i] = true;
       hidden = true;
     }
+    bool shows = true;
+    if (format_.fbx && node.mMetaData != nullptr && node.mMetaData->Get("Show", shows) && !shows)
+      add_note("node '" + name + "': the file hides it, but it is shown");
     const aiMatrix4x4 set_from_node = set_from_parent * node.mTransformation;
-    if (node.mNumMeshes > 0) model_.report.nodes.push_back(name);
+    if (has_triangles(node)) model_.report.nodes.push_back(name);
     for (unsigned i = 0; i < node.mNumMeshes && !hidden; ++i) {
       if (node.mMeshes[i] >= source_.mNumMeshes)
         throw std::runtime_error("node '" + name + "' names a mesh that is not there");
@@ -210,6 +213,13 @@ class ModelBuilder {
     }
     for (unsigned i = 0; i < node.mNumChildren; ++i)
       visit(*node.mChildren[i], set_from_node, hidden, depth + 1, found);
+  }
+
+  bool has_triangles(const aiNode& node) const {
+    return std::any_of(node.mMeshes, node.mMeshes + node.mNumMeshes, [&](unsigned mesh) {
+      return mesh < source_.mNumMeshes &&
+             (source_.mMeshes[mesh]->mPrimitiveTypes & aiPrimitiveType_TRIANGLE) != 0;
+    });
   }
 
   void place(unsigned mesh_index, const std::string& name, const aiMatrix4x4& m) {
@@ -254,10 +264,14 @@ class ModelBuilder {
   std::int64_t mesh_of(unsigned index) {
     if (meshes_[index] >= 0) return meshes_[index];
     const aiMesh& source = *source_.mMeshes[index];
-    if ((source.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) return -1;
+    if ((source.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) {
+      add_note("points and lines are left out");
+      return -1;
+    }
     const std::uint32_t material = material_for(source.mMaterialIndex);
     if (source.HasVertexColors(0)) add_note("vertex colours are left out");
-    if (source.HasBones()) add_note("skins are left out: the model stands in its bind pose");
+    if (source.HasBones()) add_note("skins are left out: parts stand as the file stores them");
+    if (source.mNumAnimMeshes > 0) add_note("morph targets are left out");
     Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], format_.smooth_normals,
                              format_.stl, left_out_);
     if (mesh.triangles.empty()) return -1;
@@ -321,9 +335,13 @@ void check_faces(const aiScene& scene, const GltfFacts& facts) {
 GltfFacts check_first(std::span<const std::byte> bytes, const ModelFormat& format) {
   if (bytes.empty()) throw std::runtime_error("the file is empty");
   if (format.gltf) return check_gltf(bytes);
-  if (format.ply) check_ply(bytes);
+  GltfFacts facts;
+  if (format.ply) facts.notes = check_ply(bytes);
   if (format.stl) check_stl(bytes);
-  return {};
+  if (format.x3d) facts.notes = left_out_of_x3d(bytes);
+  if (format.fbx && hides_by_visibility(bytes))
+    facts.notes.emplace_back("what the file hides by its Visibility is shown");
+  return facts;
 }
 
 // What assimp caught: sizes that no memory holds are the file's fault.
@@ -354,8 +372,6 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
   Assimp::Importer importer;
   importer.SetIOHandler(
       new GivenFiles(files, file, mended, format.x3d, missing));  // the importer deletes it
-  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
-                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   const aiScene* scene = importer.ReadFile(
       file, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
   if (scene == nullptr) {

@@ -36,11 +36,68 @@ std::string_view url_of(std::string_view tag) {
   return {};
 }
 
+// Where the next tag of that name begins, from `at` on, comments left aside.
+std::size_t find_tag(std::string_view text, std::string_view name, std::size_t at = 0) {
+  for (at = text.find('<', at); at != std::string_view::npos; at = text.find('<', at + 1)) {
+    const std::string_view rest = text.substr(at);
+    if (rest.starts_with("<!--")) {
+      at = text.find("-->", at);
+      if (at == std::string_view::npos) break;
+    } else if (rest.substr(1).starts_with(name)) {
+      constexpr std::string_view ends = " \t\r\n/>";
+      const std::string_view after = rest.substr(1 + name.size());
+      if (!after.empty() && ends.find(after[0]) != std::string_view::npos) return at;
+    }
+  }
+  return std::string_view::npos;
+}
+
+// With blanks in the place of Inline nodes.
+std::string without_inlines(std::string_view text) {
+  std::string result(text);
+  constexpr std::string_view closing = "</Inline>";
+  for (std::size_t at = find_tag(text, "Inline"); at != std::string_view::npos;
+       at = find_tag(text, "Inline", at + 1)) {
+    std::size_t end = at;  // of its tag; '>' may stand in quotes
+    for (char quote = 0; end < text.size() && (quote != 0 || text[end] != '>'); ++end) {
+      if (quote == 0 && (text[end] == '"' || text[end] == '\'')) {
+        quote = text[end];
+      } else if (text[end] == quote) {
+        quote = 0;
+      }
+    }
+    if (end >= text.size()) break;
+    if (text[end - 1] != '/') {
+      const std::size_t close = text.find(closing, end);
+      if (close == std::string_view::npos) break;
+      end = close + closing.size() - 1;
+    }
+    std::fill(result.begin() + static_cast<std::ptrdiff_t>(at),
+              result.begin() + static_cast<std::ptrdiff_t>(end + 1), ' ');
+    at = end;
+  }
+  return result;
+}
+
 }  // namespace
+
+std::vector<std::string> left_out_of_x3d(std::span<const std::byte> file_bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
+  std::vector<std::string> notes;
+  if (find_tag(text, "Inline") != std::string_view::npos) {
+    notes.emplace_back("Inline nodes, files that it shows within it, are left out");
+  }
+  if (find_tag(text, "ProtoInstance") != std::string_view::npos) {
+    notes.emplace_back("instances of prototypes (ProtoInstance) are left out");
+  }
+  return notes;
+}
 
 std::vector<std::byte> mend_x3d(std::span<const std::byte> file_bytes) {
   constexpr std::string_view opening = "<ImageTexture";
-  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
+  const std::string whole =
+      without_inlines({reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size()});
+  const std::string_view text = whole;
   std::string mended;
   mended.reserve(text.size());
   std::size_t copied = 0;

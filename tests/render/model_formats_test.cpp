@@ -319,6 +319,123 @@ TEST_F(FormatNotes, TurnsFbxByTheAxesThatItStates) {
   }
 }
 
+TEST_F(FormatNotes, TellWhatOfAnFbxIsNotShownAsItSays) {
+  EXPECT_THAT(notes("a.fbx", made::ascii_fbx("")), testing::IsEmpty());
+  const std::string visible = R"(P: "Visibility", "Visibility", "", "A",)",
+                    show = R"(P: "Show", "bool", "", "",)";
+  EXPECT_THAT(notes("a.fbx", made::ascii_fbx("", visible + "1\n" + show + "1\n")),
+              testing::IsEmpty());
+  EXPECT_THAT(notes("a.fbx", made::ascii_fbx("", visible + "0\n")),
+              Contains(HasSubstr("Visibility is shown")));
+  EXPECT_THAT(notes("a.fbx", made::ascii_fbx("", show + "0\n")),
+              Contains(HasSubstr("node 'part': the file hides it")));
+  for (const double visibility : {0., 1.}) {
+    EXPECT_THAT(notes("a.fbx", made::made_fbx({{"box", made_box(), {1, 1, 1}, "", visibility}})),
+                testing::Contains(HasSubstr("Visibility is shown")).Times(visibility == 0 ? 1 : 0));
+  }
+  EXPECT_THAT(notes("a.fbx", made::ascii_fbx("", "", R"(Geometry: 60, "Geometry::sh", "Shape" {
+Version: 100
+Indexes: *1 {
+a: 2
+}
+Vertices: *3 {
+a: 0,1,0
+}
+Normals: *3 {
+a: 0,0,0
+}
+}
+Deformer: 61, "Deformer::bs", "BlendShape" {
+Version: 100
+}
+Deformer: 62, "SubDeformer::ch", "BlendShapeChannel" {
+Version: 100
+DeformPercent: 100
+FullWeights: *1 {
+a: 100
+}
+}
+)",
+                                             R"(C: "OO",60,62
+C: "OO",62,61
+C: "OO",61,1
+)")),
+              Contains(HasSubstr("morph targets are left out")));
+  EXPECT_THAT(notes("a.fbx", made::ascii_fbx("", "", R"(AnimationStack: 70, "AnimStack::Take", "" {
+}
+AnimationLayer: 71, "AnimLayer::Base", "" {
+}
+AnimationCurveNode: 72, "AnimCurveNode::T", "" {
+Properties70:  {
+P: "d|X", "Number", "", "A",1
+}
+}
+AnimationCurve: 73, "AnimCurve::", "" {
+KeyVer: 4008
+KeyTime: *2 {
+a: 0,46186158000
+}
+KeyValueFloat: *2 {
+a: 1,1
+}
+}
+)",
+                                             R"(C: "OO",71,70
+C: "OO",72,71
+C: "OP",72,2, "Lcl Translation"
+C: "OP",73,72, "d|X"
+)")),
+              Contains("animations are left out"));
+}
+
+TEST_F(FormatNotes, TellWhatOfAPlyIsNotShownAsItSays) {
+  const auto ply = [](const std::string& faces, const std::string& rows) {
+    return "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+           "property float z\nelement " +
+           faces + "\nend_header\n0 0 0\n1 0 0\n0 1 0\n" + rows;
+  };
+  const std::string corners = "face 1\nproperty list uchar int vertex_indices";
+  EXPECT_THAT(notes("a.ply", ply(corners, "3 0 1 2\n")), testing::IsEmpty());
+  EXPECT_THAT(notes("a.ply", ply(corners + "\nproperty list uchar float texcoord",
+                                 "3 0 1 2 6 0 0 1 0 0 1\n")),
+              Contains(HasSubstr("texture coordinates of faces")));
+  EXPECT_THAT(notes("a.ply", ply(corners + "\nproperty uchar red\nproperty uchar green\n"
+                                           "property uchar blue",
+                                 "3 0 1 2 255 0 0\n")),
+              Contains("colours of faces are left out"));
+  try {
+    load("a.ply", ply("tristrips 1\nproperty list int int vertex_indices", "3 0 1 2\n"));
+    FAIL() << "strips were taken for polygons";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("triangle strips, which are not read"));
+  }
+}
+
+TEST_F(FormatNotes, TellWhatOfAnX3dIsLeftOut) {
+  const std::string shape =
+      "<Shape><IndexedFaceSet coordIndex='0 1 2 -1'><Coordinate point='0 0 0 1 0 0 0 1 0'/>"
+      "</IndexedFaceSet></Shape>";
+  EXPECT_THAT(notes("a.x3d", made::x3d("<!-- <Inline/> -->" + shape)), testing::IsEmpty());
+  for (const std::string inlined :
+       {"<Inline url='\"b.x3d\" \"c>.x3d\"'/>", "<Inline url='b.x3d'><MetadataSet/></Inline>"}) {
+    const LoadedModel model = load("a.x3d", made::x3d(inlined + shape));
+    EXPECT_EQ(model.report.triangles, 1U);
+    EXPECT_THAT(model.report.notes, testing::ElementsAre(HasSubstr("Inline nodes")));
+  }
+  EXPECT_THAT(
+      notes("a.x3d", made::x3d("<ProtoDeclare name='P'><ProtoBody>" + shape +
+                               "</ProtoBody></ProtoDeclare><ProtoInstance name='P'/>" + shape)),
+      testing::ElementsAre(HasSubstr("(ProtoInstance) are left out")));
+}
+
+TEST_F(FormatNotes, TellOfPointsAndLines) {
+  const LoadedModel model =
+      load("a.obj", "o sheet\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no rod\nl 1 2\n");
+  EXPECT_EQ(model.report.triangles, 1U);
+  EXPECT_THAT(model.report.nodes, testing::ElementsAre("sheet"));
+  EXPECT_THAT(model.report.notes, testing::ElementsAre("points and lines are left out"));
+}
+
 TEST_F(FormatNotes, StlLooksTheWayItsCornersRun) {
   // The file says +z, the order of its corners -y.
   const LoadedModel model = load("a.stl", made::stl({0, 0, 1}));
