@@ -115,7 +115,7 @@ void make_normals(std::span<const Wedge> wedges, std::vector<Vec3f>& normals) {
 
 }  // namespace
 
-void join_vertices(Mesh& mesh) {
+void join_vertices(Mesh& mesh, std::span<const Vec3f> made) {
   const Places places = places_of(mesh.positions);
   const CornersByPlace by_place(mesh, places);
   const bool has_normals = !mesh.normals.empty();
@@ -135,6 +135,8 @@ void join_vertices(Mesh& mesh) {
     if (has_normals) {
       for (const std::uint32_t c : corners)
         normals.push_back(mesh.normals[mesh.triangles[c / 3][c % 3]]);
+    } else if (!made.empty()) {
+      for (const std::uint32_t c : corners) normals.push_back(made[c]);
     } else {
       for (const std::uint32_t c : corners) wedges.push_back(wedge_at(mesh, c));
       make_normals(wedges, normals);
@@ -157,6 +159,37 @@ void join_vertices(Mesh& mesh) {
     }
   }
   mesh = std::move(joined);
+}
+
+std::vector<std::vector<Vec3f>> normals_across(std::span<const Mesh> meshes) {
+  Mesh all;
+  for (const Mesh& mesh : meshes) {
+    const auto first = static_cast<std::uint32_t>(all.positions.size());
+    all.positions.insert(all.positions.end(), mesh.positions.begin(), mesh.positions.end());
+    for (const auto& [a, b, c] : mesh.triangles) {
+      all.triangles.push_back({first + a, first + b, first + c});
+    }
+  }
+  const Places places = places_of(all.positions);
+  const CornersByPlace by_place(all, places);
+  std::vector<Vec3f> of_corners(3 * all.triangles.size());
+  std::vector<Wedge> wedges;
+  std::vector<Vec3f> normals;
+  for (std::uint32_t place = 0; place < places.count; ++place) {
+    const auto corners = by_place.at(place);
+    wedges.clear();
+    for (const std::uint32_t c : corners) wedges.push_back(wedge_at(all, c));
+    make_normals(wedges, normals);
+    for (std::size_t k = 0; k < corners.size(); ++k) of_corners[corners[k]] = normals[k];
+  }
+  std::vector<std::vector<Vec3f>> by_mesh;
+  auto begin = of_corners.begin();
+  for (const Mesh& mesh : meshes) {
+    const auto end = begin + 3 * static_cast<std::ptrdiff_t>(mesh.triangles.size());
+    by_mesh.emplace_back(begin, end);
+    begin = end;
+  }
+  return by_mesh;
 }
 
 }  // namespace render

@@ -22,6 +22,7 @@
 
 #include "render/gltf_check.h"
 #include "render/gltf_mend.h"
+#include "render/join_vertices.h"
 #include "render/model_check.h"
 #include "render/model_format.h"
 #include "render/model_material.h"
@@ -165,7 +166,8 @@ class ModelBuilder {
         materials_(source, model_.report.notes),
         meshes_(source.mNumMeshes, -1),
         material_of_(source.mNumMaterials, -1),
-        imported_(source.mNumMaterials) {}
+        imported_(source.mNumMaterials),
+        corner_normals_(source.mNumMeshes) {}
 
   RawModel build(const aiMatrix4x4& set_from_root) {
     std::vector<bool> found(options_.hide.size());
@@ -206,6 +208,7 @@ class ModelBuilder {
       add_note("node '" + name + "': the file hides it, but it is shown");
     const aiMatrix4x4 set_from_node = set_from_parent * node.mTransformation;
     if (has_triangles(node)) model_.report.nodes.push_back(name);
+    if (format_.smooth_normals && node.mNumMeshes > 1 && !hidden) smooth_across(node);
     for (unsigned i = 0; i < node.mNumMeshes && !hidden; ++i) {
       if (node.mMeshes[i] >= source_.mNumMeshes)
         throw std::runtime_error("node '" + name + "' names a mesh that is not there");
@@ -213,6 +216,25 @@ class ModelBuilder {
     }
     for (unsigned i = 0; i < node.mNumChildren; ++i)
       visit(*node.mChildren[i], set_from_node, hidden, depth + 1, found);
+  }
+
+  // The meshes of a node are one surface in several materials: so are the normals that they lack.
+  void smooth_across(const aiNode& node) {
+    std::vector<unsigned> indices;
+    std::vector<Mesh> meshes;
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+      const unsigned index = node.mMeshes[i];
+      if (index >= source_.mNumMeshes || meshes_[index] >= 0) continue;
+      const aiMesh& source = *source_.mMeshes[index];
+      if (source.HasNormals() || (source.mPrimitiveTypes & aiPrimitiveType_TRIANGLE) == 0) continue;
+      std::size_t left_out = 0;  // counted when it is converted
+      indices.push_back(index);
+      meshes.push_back(convert_shape(source, left_out));
+    }
+    if (meshes.size() < 2) return;
+    std::vector<std::vector<Vec3f>> normals = normals_across(meshes);
+    for (std::size_t i = 0; i < indices.size(); ++i)
+      corner_normals_[indices[i]] = std::move(normals[i]);
   }
 
   bool has_triangles(const aiNode& node) const {
@@ -273,7 +295,8 @@ class ModelBuilder {
     if (source.HasBones()) add_note("skins are left out: parts stand as the file stores them");
     if (source.mNumAnimMeshes > 0) add_note("morph targets are left out");
     Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], format_.smooth_normals,
-                             format_.stl, left_out_);
+                             format_.stl, corner_normals_[index], left_out_);
+    corner_normals_[index] = {};
     if (mesh.triangles.empty()) return -1;
     mesh.materials = {material};
     model_.report.vertices += mesh.positions.size();
@@ -316,6 +339,7 @@ class ModelBuilder {
   std::vector<std::int64_t> meshes_;
   std::vector<std::int64_t> material_of_;
   std::vector<ImportedMaterial> imported_;
+  std::vector<std::vector<Vec3f>> corner_normals_;  // by mesh; empty where they are its own
   std::size_t left_out_ = 0;
 };
 

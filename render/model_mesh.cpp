@@ -162,11 +162,7 @@ void copy_tangents(const aiMesh& source, Mesh& mesh) {
 
 }  // namespace
 
-Mesh convert_mesh(const aiMesh& source,
-                  const ImportedMaterial& material,
-                  bool join,
-                  bool facets,
-                  std::size_t& left_out) {
+Mesh convert_shape(const aiMesh& source, std::size_t& left_out) {
   Mesh mesh;
   mesh.positions.reserve(source.mNumVertices);
   for (unsigned i = 0; i < source.mNumVertices; ++i)
@@ -189,6 +185,16 @@ Mesh convert_mesh(const aiMesh& source,
     else
       ++left_out;
   }
+  return mesh;
+}
+
+Mesh convert_mesh(const aiMesh& source,
+                  const ImportedMaterial& material,
+                  bool join,
+                  bool facets,
+                  std::span<const Vec3f> corner_normals,
+                  std::size_t& left_out) {
+  Mesh mesh = convert_shape(source, left_out);
   if (source.HasNormals()) copy_normals(source, mesh);
   if (source.HasNormals() && facets) mend_facets(mesh);
   const unsigned channel = material.uv.channel < AI_MAX_NUMBER_OF_TEXTURECOORDS &&
@@ -207,7 +213,7 @@ Mesh convert_mesh(const aiMesh& source,
       mesh.uvs.push_back(sound ? std::array<float, 2>{u, v} : std::array<float, 2>{});
     }
   }
-  if (join) join_vertices(mesh);
+  if (join) join_vertices(mesh, corner_normals);
   if (material.parameters.normal_texture >= 0) {
     if (mesh.normals.empty() && !mesh.uvs.empty()) make_flat(mesh);
     if (source.HasNormals() && source.HasTangentsAndBitangents() && !join)

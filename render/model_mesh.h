@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 #include "render/mesh.h"
 #include "render/model_material.h"
@@ -16,14 +17,19 @@ namespace render {
 // vertices of its own. Triangles whose positions are not finite, or beyond
 // `farthest_position`, are left out and counted in `left_out`; texture coordinates that are not
 // finite, or beyond a million, become 0. Throws std::runtime_error if a triangle names a vertex
-// that is not there.
+// that is not there. Normals that are missing are `corner_normals`, unless that is empty
+// (normals_across).
 //
 // With `facets`, which STL has, a normal that is not its triangle's (by over 25 degrees) is that.
 Mesh convert_mesh(const aiMesh& source,
                   const ImportedMaterial& material,
                   bool join,
                   bool facets,
+                  std::span<const Vec3f> corner_normals,
                   std::size_t& left_out);
+
+// The triangles of a mesh and their positions, nothing else; as in convert_mesh.
+Mesh convert_shape(const aiMesh& source, std::size_t& left_out);
 
 inline constexpr float farthest_position = 1e12F;
 

@@ -270,7 +270,7 @@ TEST(LoadModel, ReadsTheMadeHeadlightBackFromPly) {
   EXPECT_EQ(report.triangles, triangle_count(headlight));
 }
 
-class FormatNotes : public testing::Test {
+class FormatsTest : public testing::Test {
  protected:
   void SetUp() override { folder_ = made::make_temporary_directory(); }
   void TearDown() override { fs::remove_all(folder_); }
@@ -287,7 +287,7 @@ class FormatNotes : public testing::Test {
   fs::path folder_;
 };
 
-TEST_F(FormatNotes, TurnsFbxByTheAxesThatItStates) {
+TEST_F(FormatsTest, TurnsFbxByTheAxesThatItStates) {
   struct Case {
     int up, up_sign, front, front_sign, right, right_sign;
     Vec3f corner;  // where (1, 2, 3) comes to stand
@@ -319,7 +319,7 @@ TEST_F(FormatNotes, TurnsFbxByTheAxesThatItStates) {
   }
 }
 
-TEST_F(FormatNotes, TellWhatOfAnFbxIsNotShownAsItSays) {
+TEST_F(FormatsTest, TellsWhatOfAnFbxIsNotShownAsItSays) {
   EXPECT_THAT(notes("a.fbx", made::ascii_fbx("")), testing::IsEmpty());
   const std::string visible = R"(P: "Visibility", "Visibility", "", "A",)",
                     show = R"(P: "Show", "bool", "", "",)";
@@ -388,7 +388,7 @@ C: "OP",73,72, "d|X"
               Contains("animations are left out"));
 }
 
-TEST_F(FormatNotes, TellWhatOfAPlyIsNotShownAsItSays) {
+TEST_F(FormatsTest, TellsWhatOfAPlyIsNotShownAsItSays) {
   const auto ply = [](const std::string& faces, const std::string& rows) {
     return "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
            "property float z\nelement " +
@@ -411,7 +411,7 @@ TEST_F(FormatNotes, TellWhatOfAPlyIsNotShownAsItSays) {
   }
 }
 
-TEST_F(FormatNotes, TellWhatOfAnX3dIsLeftOut) {
+TEST_F(FormatsTest, TellsWhatOfAnX3dIsLeftOut) {
   const std::string shape =
       "<Shape><IndexedFaceSet coordIndex='0 1 2 -1'><Coordinate point='0 0 0 1 0 0 0 1 0'/>"
       "</IndexedFaceSet></Shape>";
@@ -428,7 +428,7 @@ TEST_F(FormatNotes, TellWhatOfAnX3dIsLeftOut) {
       testing::ElementsAre(HasSubstr("(ProtoInstance) are left out")));
 }
 
-TEST_F(FormatNotes, TellOfPointsAndLines) {
+TEST_F(FormatsTest, TellsOfPointsAndLines) {
   const LoadedModel model =
       load("a.obj", "o sheet\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no rod\nl 1 2\n");
   EXPECT_EQ(model.report.triangles, 1U);
@@ -436,7 +436,24 @@ TEST_F(FormatNotes, TellOfPointsAndLines) {
   EXPECT_THAT(model.report.notes, testing::ElementsAre("points and lines are left out"));
 }
 
-TEST_F(FormatNotes, StlLooksTheWayItsCornersRun) {
+TEST_F(FormatsTest, StaysSmoothWhereTheMaterialChanges) {
+  const std::string corners =
+      "v 0 0 0\nv 1 0 0\nv 2 0.3 0\nv 0 0 1\nv 1 0 1\nv 2 0.3 1\n"
+      "usemtl red\nf 1 4 5 2\nusemtl blue\nf 2 5 6 3\n";
+  const LoadedModel model = load("a.obj", corners);
+  ASSERT_EQ(model.scene.meshes.size(), 2U);
+  std::vector<Vec3f> met;
+  for (const auto& mesh : model.scene.meshes) {
+    for (std::size_t i = 0; i < mesh->positions.size(); ++i) {
+      if (mesh->positions[i].x == 1) met.push_back(mesh->normals[i]);
+    }
+  }
+  ASSERT_EQ(met.size(), 4U);
+  EXPECT_GT(std::abs(met[0].x), 0.05F);
+  for (const Vec3f n : met) EXPECT_LT(length(n - met[0]), 1e-5F);
+}
+
+TEST_F(FormatsTest, TurnsStlFacetsAsTheirCornersRun) {
   // The file says +z, the order of its corners -y.
   const LoadedModel model = load("a.stl", made::stl({0, 0, 1}));
   EXPECT_THAT(model.scene.meshes[0]->normals, testing::Each(Vec3f{0, -1, 0}));
