@@ -56,7 +56,7 @@ void join(SceneDescription& whole, const SceneDescription& part, const Placement
          {&parameters.base_color_texture, &parameters.metallic_roughness_texture,
           &parameters.normal_texture, &parameters.clearcoat_texture,
           &parameters.transmission_texture, &parameters.emission_texture,
-          &parameters.clearcoat_roughness_texture}) {
+          &parameters.clearcoat_roughness_texture, &parameters.alpha_texture}) {
       if (*texture >= 0) *texture += first_texture;
     }
     if (parameters.emission_video >= 0) parameters.emission_video += first_video;

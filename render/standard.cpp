@@ -16,11 +16,14 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 100, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 108, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
 }
+
+// Of what sample() gives of a texture that is nothing but alpha.
+std::size_t alpha_channel(const Texture& texture) { return texture.channels % 2 == 0 ? 3 : 0; }
 
 float unit(float value) { return std::clamp(value, 0.0F, 1.0F); }
 
@@ -113,12 +116,13 @@ StandardParameters standard_parameters(const Material& material,
         parameters.clearcoat_roughness, parameters.transmission, parameters.emission[0],
         parameters.emission[1], parameters.emission[2], parameters.emission_gain,
         parameters.normal_scale, parameters.alpha_cutoff, parameters.base_color_alpha,
-        parameters.specular})
+        parameters.specular, parameters.opacity})
     if (!std::isfinite(value)) refuse("a number of its block is not finite");
   for (const std::int32_t index :
        {parameters.base_color_texture, parameters.metallic_roughness_texture,
         parameters.normal_texture, parameters.clearcoat_texture, parameters.transmission_texture,
-        parameters.emission_texture, parameters.clearcoat_roughness_texture})
+        parameters.emission_texture, parameters.clearcoat_roughness_texture,
+        parameters.alpha_texture})
     if (index < -1 || (index >= 0 && static_cast<std::size_t>(index) >= texture_count))
       refuse("it names texture " + std::to_string(index) + " of " + std::to_string(texture_count));
   const std::int32_t video = parameters.emission_video;
@@ -145,12 +149,16 @@ StandardSurface standard_surface(const StandardParameters& parameters,
     return texture == nullptr ? std::array<float, 4>{1, 1, 1, 1}
                               : sample(*texture, hit.u, hit.v, area, filter);
   };
+  const auto alpha_of = [&](std::int32_t index) {
+    return look_up(index)[alpha_channel(*texture_at(scene, index))];
+  };
   StandardSurface surface;
   const auto base = look_up(parameters.base_color_texture);
   surface.base = {unit(parameters.base_color[0] * base[0]),
                   unit(parameters.base_color[1] * base[1]),
                   unit(parameters.base_color[2] * base[2])};
-  surface.alpha = parameters.base_color_alpha * base[3];
+  surface.alpha = parameters.base_color_alpha *
+                  (parameters.alpha_texture < 0 ? base[3] : alpha_of(parameters.alpha_texture));
   const auto metallic_roughness = look_up(parameters.metallic_roughness_texture);
   surface.metallic = unit(parameters.metallic * metallic_roughness[2]);
   surface.roughness = unit(parameters.roughness * metallic_roughness[1]);
@@ -161,6 +169,7 @@ StandardSurface standard_surface(const StandardParameters& parameters,
     surface.clearcoat_roughness *= look_up(parameters.clearcoat_roughness_texture)[1];
   }
   surface.specular = unit(parameters.specular);
+  surface.opacity = unit(parameters.opacity);
   surface.transmission = unit(parameters.transmission);
   if (surface.transmission > 0) surface.transmission *= look_up(parameters.transmission_texture)[0];
   surface.emission = Vec3f{parameters.emission[0], parameters.emission[1], parameters.emission[2]} *
@@ -184,9 +193,11 @@ StandardSurface standard_surface(const StandardParameters& parameters,
 float standard_alpha(const StandardParameters& parameters,
                      const SceneDescription& scene,
                      const HitPoint& hit) {
-  const Texture* texture = texture_at(scene, parameters.base_color_texture);
+  const Texture* own = texture_at(scene, parameters.alpha_texture);
+  const Texture* texture = own ? own : texture_at(scene, parameters.base_color_texture);
   if (texture == nullptr) return parameters.base_color_alpha;
-  return parameters.base_color_alpha * sample(*texture, hit.u, hit.v, {})[3];
+  const std::size_t channel = own ? alpha_channel(*own) : 3;
+  return parameters.base_color_alpha * sample(*texture, hit.u, hit.v, {})[channel];
 }
 
 Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random) {

@@ -7,6 +7,8 @@
 //   diffuse      (1 - Fc)(1 - metallic)(1 - Fd)(1 - transmission) base facing / pi
 //   transmission (1 - Fc)(1 - metallic)(1 - Fd) transmission * base, straight through (thin wall)
 //   emission     added
+// Opacity below 1 takes that share of diffuse, of transmission and of what metal mirrors; the rest
+// goes straight through untinted.
 // The lobes are GGX's distribution of visible normals (Heitz, "Sampling the GGX Distribution of
 // Visible Normals", JCGT 2018), mirrored once more where they would go below the surface, and not
 // weakened by masking: each keeps all its energy, so that a white furnace stays white.
@@ -38,6 +40,7 @@ struct StandardParameters {
   float emission_gain = 1;
   float normal_scale = 1;
   float alpha_cutoff = 0;  // texels of base alpha below this are holes; 0 = opaque
+  float opacity = 1;       // 1 - the share that passes untinted, beside what a dielectric mirrors
   std::int32_t base_color_texture = -1;
   std::int32_t metallic_roughness_texture = -1;  // green roughness, blue metallic
   std::int32_t normal_texture = -1;
@@ -49,6 +52,8 @@ struct StandardParameters {
   std::uint32_t two_sided = 1;
   std::int32_t emission_video = -1;  // of SceneDescription::videos: emission is times its light
   std::int32_t clearcoat_roughness_texture = -1;  // green
+  // In the place of the base texture's alpha: its alpha if it has one, else red.
+  std::int32_t alpha_texture = -1;
 };
 
 // The block in a material of the shader "standard", and back. Throws std::invalid_argument, naming
@@ -70,6 +75,7 @@ struct StandardSurface {
   float specular = 1;
   float facing =
       1;  // of diffuse light, what the normals within the footprint get beside their mean
+  float opacity = 1;
 };
 
 struct HitPoint;          // scene.h
@@ -115,11 +121,15 @@ inline StandardWeights standard_weights(const StandardSurface& surface, Vec3f vi
   const float dielectric = 1 - surface.metallic;
   const float sheen = surface.specular * schlick(0.04F, cosine);
   const float below = under * dielectric * (1 - sheen);
-  const float matte = below * (1 - surface.transmission) * surface.facing;
+  const float opacity = surface.opacity;
+  const float matte = below * (1 - surface.transmission) * surface.facing * opacity;
+  const float tinted = below * surface.transmission * opacity;
+  const float untinted = (below + under * surface.metallic) * (1 - opacity);
+  const float metal = surface.metallic * opacity;
   const auto channel = [&](float base, float& specular, float& diffuse, float& transmission) {
-    specular = under * (dielectric * sheen + surface.metallic * schlick(base, cosine));
+    specular = under * (dielectric * sheen + metal * schlick(base, cosine));
     diffuse = matte * base;
-    transmission = below * surface.transmission * base;
+    transmission = tinted * base + untinted;
   };
   channel(surface.base.x, weights.specular.x, weights.diffuse.x, weights.transmission.x);
   channel(surface.base.y, weights.specular.y, weights.diffuse.y, weights.transmission.y);

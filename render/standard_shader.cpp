@@ -72,7 +72,7 @@ class StandardShader final : public Shader {
 
   bool lets_light_through(const Material& material) const override {
     const StandardParameters parameters = block_of(material);
-    return parameters.transmission > 0 || parameters.alpha_cutoff > 0;
+    return passes(parameters) || parameters.alpha_cutoff > 0;
   }
 
   Vec3f transmittance(const ShadeContext& context,
@@ -86,12 +86,13 @@ class StandardShader final : public Shader {
         standard_alpha(parameters, *context.scene, hit) < parameters.alpha_cutoff) {
       return {1, 1, 1};
     }
-    if (kind != RayKind::shadow || !(parameters.transmission > 0)) return {};
+    if (kind != RayKind::shadow || !passes(parameters)) return {};
     const StandardSurface surface = standard_surface(parameters, *context.scene, hit);
     return standard_weights(surface, -incoming).transmission;
   }
 
  private:
+  static bool passes(const StandardParameters& p) { return p.transmission > 0 || p.opacity < 1; }
   // A step across what a sample sees, of all that a rough lobe sees there, which rays that stand
   // for a part of one have in their steps already.
   static Vec3f as_wide(Vec3f step, float blur_m) {

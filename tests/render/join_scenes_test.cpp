@@ -18,7 +18,7 @@ SceneDescription scene_of(std::uint8_t grey, const std::string& name) {
   scene.meshes.push_back(std::make_shared<const Mesh>(mesh));
   scene.textures.push_back(std::make_shared<const Texture>(Texture{1, 1, 1, false, {grey}}));
   StandardParameters parameters;
-  parameters.base_color_texture = 0;
+  parameters.base_color_texture = parameters.alpha_texture = 0;
   scene.materials.push_back(make_standard_material(name, parameters));
   Instance instance;
   instance.name = name;
@@ -42,6 +42,7 @@ TEST(Join, KeepsEveryInstanceItsOwnMeshMaterialAndTexture) {
     const auto parameters = standard_parameters(material, whole.textures.size());
     const auto texture = static_cast<std::size_t>(parameters.base_color_texture);
     EXPECT_EQ(whole.textures.at(texture)->texels.at(0), i + 1);
+    EXPECT_EQ(parameters.alpha_texture, parameters.base_color_texture);
   }
   EXPECT_EQ(whole.materials.back().shader, "stand_in");
 }

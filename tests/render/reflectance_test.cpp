@@ -128,13 +128,15 @@ TEST(StandardSurface, SendsOnAllLightWhereItIsWhiteAndNeverMore) {
       for (const float metallic : {0.0F, 0.5F, 1.0F}) {
         for (const float coat : {0.0F, 0.5F, 1.0F}) {
           for (const float specular : {0.0F, 1.0F}) {
-            for (const float transmission : {0.0F, 0.5F, 1.0F}) {
+            for (const auto& [transmission, opacity] :
+                 {std::pair(0.0F, 1.0F), {0.5F, 1.0F}, {1.0F, 1.0F}, {0.0F, 0.25F}, {0.5F, 0.5F}}) {
               StandardSurface surface{};
               surface.normal = surface.coat_normal = up;
               surface.metallic = metallic;
               surface.clearcoat = coat;
               surface.specular = specular;
               surface.transmission = transmission;
+              surface.opacity = opacity;
               surface.base = {1, 0.5F, 0};
               // The coat's own lobe: a mirror, or as rough as the ground.
               for (const double coat_lobe : {1.0, lobe}) {
@@ -204,6 +206,7 @@ TEST(StandardSurface, IsReciprocalWhereMatteOrAMirrorOrAThinWall) {
     StandardSurface surface = made_surface(random(engine), random(engine), random(engine), 0);
     surface.clearcoat = random(engine);
     surface.transmission = random(engine);
+    surface.opacity = random(engine);
     const Vec3f view = view_at(random(engine));
     const StandardWeights there = standard_weights(surface, view);
     for (const Vec3f other : {mirrored(view, up), -view}) {

@@ -179,8 +179,31 @@ TEST(Scene, LetsTintedLightThroughGlassAndNoneThroughPaint) {
   const Vec3f share = transmittance(through, {0.3F, 0.1F, 0}, {0, 0, 1}, 0, ray_far, ~0U);
   EXPECT_NEAR(share.x, 0.96F * 0.5F, 1e-4F) << "4 % are reflected, half of the red is absorbed";
   EXPECT_NEAR(share.y, 0.96F, 1e-4F);
+  StandardParameters dark;
+  std::fill_n(dark.base_color, 3, 0.0F);
+  dark.opacity = 0.25F;
+  const Scene dim(one_square(dark));
+  const Vec3f passed = transmittance(dim, {0.3F, 0.1F, 0}, {0, 0, 1}, 0, ray_far, ~0U);
+  EXPECT_NEAR(passed.x, 0.96F * 0.75F, 1e-4F);
   const Scene blocked(one_square());
   EXPECT_EQ(transmittance(blocked, {0.3F, 0.1F, 0}, {0, 0, 1}, 0, ray_far, ~0U), Vec3f{});
+}
+
+// Grey, or the alpha of a picture that has one; the base colour's counts for nothing then.
+TEST(Scene, HasHolesWhereAMapOfAlphaSays) {
+  StandardParameters p;
+  p.alpha_cutoff = 0.5F;
+  p.base_color_texture = 0;
+  p.alpha_texture = 1;
+  SceneDescription description = one_square(p);
+  const auto clear = std::make_shared<const Texture>(Texture{1, 1, 4, true, {255, 255, 255, 0}});
+  for (const auto& [map, solid] : {std::pair(Texture{1, 1, 1, false, {255}}, true),
+                                   {Texture{1, 1, 3, false, {0, 255, 255}}, false},
+                                   {Texture{1, 1, 4, false, {0, 0, 0, 255}}, true},
+                                   {Texture{1, 1, 2, false, {255, 0}}, false}}) {
+    description.textures = {clear, std::make_shared<const Texture>(map)};
+    EXPECT_EQ(look_down(Scene(description), {0.5F, -0.25F, 5}).has_value(), solid) << map.channels;
+  }
 }
 
 // A large square through the origin, however it leans: there coordinates are small, its own are

@@ -53,6 +53,7 @@ TEST(StandardWeights, PassOnAllLightOfAWhiteSurface) {
     surface.clearcoat = random();
     surface.transmission = random();
     surface.specular = random();
+    surface.opacity = random();
     Vec3f view = random.direction();
     if (dot(view, normal) < 0) view = -view;
     const auto w = render::standard_weights(surface, view);
@@ -74,6 +75,20 @@ TEST(StandardWeights, MirrorTheShareThatSpecularStatesUnlessOfMetal) {
   }
 }
 
+TEST(StandardWeights, PassLightUntintedByOpacity) {
+  StandardSurface surface = white_surface({0, 0, 1});
+  surface.base = {0, 0, 0};
+  surface.opacity = 0.25F;
+  const auto dark_glass = render::standard_weights(surface, {0, 0, 1});
+  EXPECT_NEAR(dark_glass.transmission.x, 0.96 * 0.75, 1e-5);
+  EXPECT_EQ(dark_glass.diffuse.x, 0);
+  EXPECT_NEAR(dark_glass.specular.x, 0.04, 1e-6) << "it mirrors as before";
+  surface.base = {1, 0.5F, 0};
+  const auto tinted = render::standard_weights(surface, {0, 0, 1});
+  EXPECT_EQ(tinted.transmission, dark_glass.transmission);
+  EXPECT_NEAR(tinted.diffuse.y, 0.96 * 0.25 * 0.5, 1e-5);
+}
+
 TEST(StandardWeights, NeverPassOnMoreThanArrives) {
   Random random(2);
   for (int trial = 0; trial < 1000; ++trial) {
@@ -83,6 +98,7 @@ TEST(StandardWeights, NeverPassOnMoreThanArrives) {
     surface.metallic = random();
     surface.clearcoat = random();
     surface.transmission = random();
+    surface.opacity = random();
     const auto w = render::standard_weights(surface, random.direction());
     const Vec3f sum = w.specular + w.diffuse + w.transmission;
     for (const float channel : {sum.x, sum.y, sum.z}) {
