@@ -27,13 +27,17 @@ struct Mesh {
   std::shared_ptr<const std::vector<Vec3f>> rest;
 };
 
-// 8-bit texels, 1 to 4 channels, repeated in both directions, with mip levels.
+// How a texture goes on beyond its edges: again, its last texels drawn out, or again mirrored.
+enum class Wrap : std::uint8_t { repeat, clamp, mirror };
+
+// 8-bit texels, 1 to 4 channels, with mip levels.
 struct Texture {
   int width = 0;
   int height = 0;
   int channels = 0;
   bool srgb = false;                 // colour: the first three channels are decoded to linear light
   std::vector<std::uint8_t> texels;  // every level after the other, level 0 first
+  std::array<Wrap, 2> wrap{};        // to the sides, up and down
 
   friend bool operator==(const Texture&, const Texture&) = default;
 };

@@ -56,11 +56,11 @@ void decode(const RawTexture& raw, Source& source) {
     if (raw.width > 0) {
       const auto* texels = reinterpret_cast<const std::uint8_t*>(source.file.data());
       source.texture = std::make_shared<const Texture>(
-          make_texture(raw.width, raw.height, 4, raw.srgb, {texels, source.file.size()}));
+          make_texture(raw.width, raw.height, 4, raw.srgb, {texels, source.file.size()}, raw.wrap));
     } else {
       const capture::Still8 still = capture::decode_still8(source.file, "it");
-      source.texture = std::make_shared<const Texture>(
-          make_texture(still.width, still.height, still.channels, raw.srgb, still.texels));
+      source.texture = std::make_shared<const Texture>(make_texture(
+          still.width, still.height, still.channels, raw.srgb, still.texels, raw.wrap));
     }
   } catch (const std::runtime_error& error) {
     source.why = error.what();
@@ -95,6 +95,7 @@ class Substitution {
     lost(p.normal_texture, left_out);
     lost(p.clearcoat_texture, left_out);
     lost(p.clearcoat_roughness_texture, left_out);
+    if (lost(p.alpha_texture, left_out)) p.alpha_cutoff = 0;
   }
 
   // What became of a lost texture, in words.

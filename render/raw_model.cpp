@@ -114,6 +114,7 @@ std::vector<std::byte> write_head(const RawModel& model) {
     out.put_text(texture.name);
     out.put(static_cast<std::uint8_t>(texture.srgb));
     out.put(static_cast<std::uint8_t>(texture.embedded));
+    for (const Wrap wrap : texture.wrap) out.put(wrap);
     out.put(texture.width);
     out.put(texture.height);
     out.put(static_cast<std::uint64_t>(texture.bytes.size()));
@@ -148,6 +149,10 @@ RawSizes parse_head(std::span<const std::byte> bytes, RawModel& model) {
     texture.name = in.get_text();
     texture.srgb = in.get<std::uint8_t>() != 0;
     texture.embedded = in.get<std::uint8_t>() != 0;
+    for (Wrap& wrap : texture.wrap) {
+      wrap = in.get<Wrap>();
+      if (wrap > Wrap::mirror) in.fail("has a texture that goes on in no known way");
+    }
     in.get(texture.width);
     in.get(texture.height);
     sizes.textures.push_back(in.get<std::uint64_t>());

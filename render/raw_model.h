@@ -1,6 +1,7 @@
 // A model as its file says it, before its textures are decoded. Private to the import.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -24,6 +25,7 @@ struct RawTexture {
   std::string name;  // a file's, relative to the model, or for people if it is embedded
   bool srgb = false;
   bool embedded = false;
+  std::array<Wrap, 2> wrap{};
   std::vector<std::byte>
       bytes;  // an embedded file, or, if it has a size, (height, width, 4) texels
   std::int32_t width = 0, height = 0;

@@ -5,7 +5,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x34435350;  // "PSC4"
+constexpr std::uint32_t scene_magic = 0x35435350;  // "PSC5"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);
@@ -53,6 +53,10 @@ Texture get_texture(ByteReader& in) {
   in.get(texture.height);
   in.get(texture.channels);
   texture.srgb = in.get<std::uint8_t>() != 0;
+  for (Wrap& wrap : texture.wrap) {
+    wrap = in.get<Wrap>();
+    if (wrap > Wrap::mirror) in.fail("has a texture that goes on in no known way");
+  }
   in.get_all(texture.texels);
   constexpr int limit = 1 << 15;
   if (texture.width < 1 || texture.height < 1 || texture.width > limit || texture.height > limit ||
@@ -77,6 +81,7 @@ std::vector<std::byte> serialize(const SceneDescription& scene) {
   for (const auto& texture : scene.textures) {
     out.put(texture->width), out.put(texture->height), out.put(texture->channels);
     out.put(static_cast<std::uint8_t>(texture->srgb));
+    for (const Wrap wrap : texture->wrap) out.put(wrap);
     out.put_all(texture->texels);
   }
   out.put(static_cast<std::uint64_t>(scene.videos.size()));

@@ -103,10 +103,27 @@ struct Level {
   int width, height;
 };
 
-// Bilinear, repeated; u and v in 0..1.
-template <int channels>
-std::array<float, channels> sample_level(
-    const Level& level, float u, float v, const float* colour, const float* alpha) {
+// Neighbours in a row or column of so many texels, the first -1 to `size`, brought into it.
+void repeat_texels(int& first, int& second, int size) {
+  if (first < 0) first += size;
+  if (first >= size) first -= size;
+  second = first + 1 == size ? 0 : first + 1;
+}
+void wrap_texels(Wrap wrap, int& first, int& second, int size) {
+  if (wrap == Wrap::repeat) return repeat_texels(first, second, size);
+  second = std::clamp(second, 0, size - 1);
+  first = std::clamp(first, 0, size - 1);
+}
+
+// Bilinear; u and v in 0..1. Where the texture does not repeat, whether it is clamped or mirrored,
+// the texel beyond an edge is the edge's own.
+template <int channels, bool repeats>
+std::array<float, channels> sample_level(const Level& level,
+                                         const std::array<Wrap, 2>& wrap,
+                                         float u,
+                                         float v,
+                                         const float* colour,
+                                         const float* alpha) {
   const float x = u * static_cast<float>(level.width) - 0.5F;
   const float y = v * static_cast<float>(level.height) - 0.5F;
   const float floor_x = std::floor(x);
@@ -115,12 +132,14 @@ std::array<float, channels> sample_level(
   const float fy = y - floor_y;
   int x0 = static_cast<int>(floor_x);
   int y0 = static_cast<int>(floor_y);
-  if (x0 < 0) x0 += level.width;
-  if (y0 < 0) y0 += level.height;
-  if (x0 >= level.width) x0 -= level.width;
-  if (y0 >= level.height) y0 -= level.height;
-  const int x1 = x0 + 1 == level.width ? 0 : x0 + 1;
-  const int y1 = y0 + 1 == level.height ? 0 : y0 + 1;
+  int x1 = x0 + 1, y1 = y0 + 1;
+  if constexpr (repeats) {
+    repeat_texels(x0, x1, level.width);
+    repeat_texels(y0, y1, level.height);
+  } else {
+    wrap_texels(wrap[0], x0, x1, level.width);
+    wrap_texels(wrap[1], y0, y1, level.height);
+  }
   const auto texel = [&](int column, int row) {
     return level.texels + (static_cast<std::size_t>(row) * static_cast<std::size_t>(level.width) +
                            static_cast<std::size_t>(column)) *
@@ -147,8 +166,15 @@ std::array<float, channels> sample_level(
 float wrapped(float coordinate) {
   return std::abs(coordinate) <= 1e6F ? coordinate - std::floor(coordinate) : 0;
 }
+float wrapped(float coordinate, Wrap wrap) {
+  if (wrap == Wrap::repeat) return wrapped(coordinate);
+  if (!(std::abs(coordinate) <= 1e6F)) return 0;
+  if (wrap == Wrap::clamp) return std::clamp(coordinate, 0.0F, 1.0F);
+  const float twice = 2 * wrapped(coordinate / 2);
+  return twice > 1 ? 2 - twice : twice;
+}
 
-template <int channels>
+template <int channels, bool repeats>
 std::array<float, channels> sample_levels(
     const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
   const LightTables& tables = light_tables();
@@ -162,9 +188,12 @@ std::array<float, channels> sample_levels(
   Level level{texture.texels.data(), texture.width, texture.height};
   const int longer = std::max(texture.width, texture.height);
   const int last = std::bit_width(static_cast<unsigned>(longer)) - 1;
+  const auto inside = [&](float coordinate, std::size_t axis) {
+    return repeats ? wrapped(coordinate) : wrapped(coordinate, texture.wrap[axis]);
+  };
   std::array<float, channels> sum{};
   const auto add = [&](const Level& from, float at_u, float at_v, float weight) {
-    const auto one = sample_level<channels>(from, at_u, at_v, colour, alpha);
+    const auto one = sample_level<channels, repeats>(from, texture.wrap, at_u, at_v, colour, alpha);
     for (std::size_t c = 0; c < channels; ++c) sum[c] += weight * one[c];
   };
   if (filter == TextureFilter::quick) {
@@ -175,7 +204,7 @@ std::array<float, channels> sample_levels(
     const float share = 1 / static_cast<float>(grid.count());
     for (int i = 0; i < grid.count(); ++i) {
       const auto [du, dv] = grid.offset(i);
-      const float at_u = wrapped(u + du), at_v = wrapped(v + dv);
+      const float at_u = inside(u + du, 0), at_v = inside(v + dv, 1);
       add(level, at_u, at_v, share * (1 - grid.fraction));
       if (grid.fraction > 0) add(next, at_u, at_v, share * grid.fraction);
     }
@@ -186,13 +215,34 @@ std::array<float, channels> sample_levels(
     const float share = weight / static_cast<float>(grid.count());
     for (int i = 0; i < grid.count(); ++i) {
       const auto [du, dv] = grid.offset(i);
-      add(from, wrapped(u + du), wrapped(v + dv), share);
+      add(from, inside(u + du, 0), inside(v + dv, 1), share);
     }
   };
   for (int k = 0; k < dense.grid.fine; ++k) level = coarser(level);
   add_all(level, dense.grid, 1 - dense.share_of_next);
   if (dense.share_of_next > 0) add_all(coarser(level), dense.next, dense.share_of_next);
   return sum;
+}
+
+template <bool repeats>
+std::array<float, 4> sample_wrapped(
+    const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
+  switch (texture.channels) {
+    case 1: {
+      const auto [grey] = sample_levels<1, repeats>(texture, u, v, footprint, filter);
+      return {grey, grey, grey, 1};
+    }
+    case 2: {
+      const auto [grey, alpha] = sample_levels<2, repeats>(texture, u, v, footprint, filter);
+      return {grey, grey, grey, alpha};
+    }
+    case 3: {
+      const auto [red, green, blue] = sample_levels<3, repeats>(texture, u, v, footprint, filter);
+      return {red, green, blue, 1};
+    }
+    default:
+      return sample_levels<4, repeats>(texture, u, v, footprint, filter);
+  }
 }
 
 }  // namespace
@@ -208,8 +258,12 @@ std::size_t texture_bytes(int width, int height, int channels) {
   }
 }
 
-Texture make_texture(
-    int width, int height, int channels, bool srgb, std::span<const std::uint8_t> texels) {
+Texture make_texture(int width,
+                     int height,
+                     int channels,
+                     bool srgb,
+                     std::span<const std::uint8_t> texels,
+                     std::array<Wrap, 2> wrap) {
   if (width < 1 || height < 1 || width > max_texture_size || height > max_texture_size ||
       channels < 1 || channels > 4)
     throw std::invalid_argument("a texture of " + std::to_string(width) + "x" +
@@ -221,7 +275,7 @@ Texture make_texture(
   if (texels.size() != level_bytes)
     throw std::invalid_argument("a texture needs " + std::to_string(level_bytes) +
                                 " bytes of texels, not " + std::to_string(texels.size()));
-  Texture texture{width, height, channels, srgb, {}};
+  Texture texture{width, height, channels, srgb, {}, wrap};
   texture.texels.resize(texture_bytes(width, height, channels));
   std::copy(texels.begin(), texels.end(), texture.texels.begin());
   std::uint8_t* source = texture.texels.data();
@@ -241,22 +295,9 @@ Texture make_texture(
 
 std::array<float, 4> sample(
     const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
-  switch (texture.channels) {
-    case 1: {
-      const auto [grey] = sample_levels<1>(texture, u, v, footprint, filter);
-      return {grey, grey, grey, 1};
-    }
-    case 2: {
-      const auto [grey, alpha] = sample_levels<2>(texture, u, v, footprint, filter);
-      return {grey, grey, grey, alpha};
-    }
-    case 3: {
-      const auto [red, green, blue] = sample_levels<3>(texture, u, v, footprint, filter);
-      return {red, green, blue, 1};
-    }
-    default:
-      return sample_levels<4>(texture, u, v, footprint, filter);
-  }
+  const bool repeats = texture.wrap == std::array<Wrap, 2>{};
+  return repeats ? sample_wrapped<true>(texture, u, v, footprint, filter)
+                 : sample_wrapped<false>(texture, u, v, footprint, filter);
 }
 
 }  // namespace render

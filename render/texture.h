@@ -19,13 +19,18 @@ std::size_t texture_bytes(int width, int height, int channels);
 
 // A texture with its mip levels, from the texels of level 0, (height, width, channels), row 0 on
 // top. Levels are area averages; colour (`srgb`) is averaged in linear light, alpha as it is.
+// `wrap`: beyond the edges to the sides, and up and down.
 // Throws std::invalid_argument if sizes are not 1..max_texture_size, channels not 1..4, or the
 // number of texels does not fit.
-Texture make_texture(
-    int width, int height, int channels, bool srgb, std::span<const std::uint8_t> texels);
+Texture make_texture(int width,
+                     int height,
+                     int channels,
+                     bool srgb,
+                     std::span<const std::uint8_t> texels,
+                     std::array<Wrap, 2> wrap = {});
 
 // Red, green, blue, alpha at (u, v), 0..1, colour in linear light; u to the right, v down from the
-// texture's top edge, repeated in both directions. One channel is grey, two are grey and alpha;
+// texture's top edge, beyond its edges by its modes. One channel is grey, two are grey and alpha;
 // alpha is 1 where there is none. What is wanted is the mean of the footprint: by dense_grids(),
 // or, where few camera rays are taken, whose own errors hide the difference, by footprint_grid()
 // with up to so many look-ups along the longer side. Coordinates that are not finite, or beyond a

@@ -48,7 +48,8 @@ SceneDescription made_scene() {
   mesh->triangles = {{0, 1, 2}};
   mesh->materials = {0};
   scene.meshes.push_back(mesh);
-  scene.textures.push_back(std::make_shared<Texture>(Texture{1, 1, 3, true, {1, 2, 3}}));
+  scene.textures.push_back(
+      std::make_shared<Texture>(Texture{1, 1, 3, true, {1, 2, 3}, {Wrap::clamp, Wrap::mirror}}));
   scene.materials.push_back({"m", "standard", std::vector<std::byte>(88)});
   Instance instance;
   instance.name = "thing";

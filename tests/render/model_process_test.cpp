@@ -28,7 +28,7 @@ RawModel made_model() {
   mesh.triangles = {{0, 1, 2}};
   mesh.materials = {0};
   model.materials.push_back({"paint", {}, std::nullopt});
-  model.textures.push_back({"paint.png", true, false, {}, 0, 0});
+  model.textures.push_back({"paint.png", true, false, {Wrap::clamp, Wrap::mirror}, {}, 0, 0});
   Instance& instance = model.instances.emplace_back();
   instance.name = "part";
   model.report.nodes = {"part"};
@@ -43,6 +43,7 @@ TEST(ParseHead, GivesBackWhatWasWritten) {
   EXPECT_EQ(sizes.meshes.at(0).triangles, 1U);
   EXPECT_EQ(back.materials.at(0).name, "paint");
   EXPECT_EQ(back.textures.at(0).name, "paint.png");
+  EXPECT_EQ(back.textures.at(0).wrap, made_model().textures.at(0).wrap);
   EXPECT_EQ(back.instances, made_model().instances);
   EXPECT_EQ(back.report.nodes, made_model().report.nodes);
 }

@@ -72,6 +72,52 @@ TEST(Texture, IsContinuousInTheFootprintAndAcrossItsEdge) {
   EXPECT_NEAR(sample(texture, 0.0F, 0.5F, {})[0], sample(texture, 0.99999F, 0.5F, {})[0], 2e-3);
 }
 
+// Against a texture of three by three tiles laid out so.
+TEST(Texture, GoesOnBeyondItsEdgesAsItSays) {
+  constexpr int w = 8, h = 4;
+  const auto texels = random_texels(w * h * 3, 3);
+  const auto source = [](Wrap wrap, int i, int size) {
+    if (wrap == Wrap::repeat) return (i + size) % size;
+    if (wrap == Wrap::clamp) return std::clamp(i, 0, size - 1);
+    return i < 0 ? -1 - i : i >= size ? 2 * size - 1 - i : i;
+  };
+  for (const Wrap along : {Wrap::repeat, Wrap::clamp, Wrap::mirror}) {
+    for (const Wrap down : {Wrap::repeat, Wrap::clamp, Wrap::mirror}) {
+      const Texture one = make_texture(w, h, 3, false, texels, {along, down});
+      std::vector<std::uint8_t> tiles;
+      for (int y = -h; y < 2 * h; ++y) {
+        for (int x = -w; x < 2 * w; ++x) {
+          const int at = source(down, y, h) * w + source(along, x, w);
+          for (int c = 0; c < 3; ++c) tiles.push_back(texels[static_cast<std::size_t>(3 * at + c)]);
+        }
+      }
+      const Texture all = make_texture(3 * w, 3 * h, 3, false, tiles);
+      for (int i = 0; i < 400; ++i) {
+        const float u = 2.7F * static_cast<float>(i % 20) / 20 - 0.85F;
+        const float v = 2.7F * static_cast<float>(i / 20) / 20 - 0.85F;
+        const auto there = sample(one, u, v, {}),
+                   expected = sample(all, (u + 1) / 3, (v + 1) / 3, {});
+        for (std::size_t c = 0; c < 3; ++c)
+          ASSERT_NEAR(there[c], expected[c], 1e-4) << u << " " << v;
+      }
+    }
+  }
+}
+
+// At every level: a clamped gradient's ends do not run into one another.
+TEST(Texture, KeepsClampedEdgesApartAtEveryLevel) {
+  std::vector<std::uint8_t> texels(64);
+  for (std::size_t i = 0; i < 64; ++i) texels[i] = i < 32 ? 0 : 255;
+  const Texture texture = make_texture(64, 1, 1, false, texels, {Wrap::clamp, Wrap::repeat});
+  for (const TextureFilter filter : {TextureFilter::dense, TextureFilter::quick}) {
+    for (float width = 0; width < 0.3F; width += 0.05F) {
+      EXPECT_EQ(sample(texture, 0, 0.5F, square_footprint(width), filter)[0], 0) << width;
+      EXPECT_NEAR(sample(texture, 1.5F, 0.5F, square_footprint(width), filter)[0], 1, 1e-5)
+          << width;
+    }
+  }
+}
+
 // An edge, as squares of any size cross it.
 TEST(Texture, IsNearTheMeanOfASquare) {
   constexpr int edge = 31;
