@@ -13,7 +13,7 @@ std::optional<ModelFormat> model_format(const std::string& file) {
   });
   if (extension == ".gltf" || extension == ".glb")
     return ModelFormat{.gltf = true, .smooth_normals = false};
-  if (extension == ".obj") return ModelFormat{};
+  if (extension == ".obj") return ModelFormat{.obj = true};
   if (extension == ".fbx") return ModelFormat{.fbx = true};
   if (extension == ".x3d") return ModelFormat{.x3d = true};
   if (extension == ".ply") return ModelFormat{.ply = true, .y_up = false};

@@ -7,7 +7,7 @@
 namespace render {
 
 struct ModelFormat {
-  bool gltf = false, ply = false, stl = false, x3d = false, fbx = false;
+  bool gltf = false, ply = false, stl = false, x3d = false, obj = false, fbx = false;
   bool smooth_normals = true;  // glTF asks for flat faces where normals are missing
   bool y_up = true;
 };

@@ -163,7 +163,7 @@ class ModelBuilder {
       : source_(source),
         options_(options),
         format_(format),
-        materials_(source, model_.report.notes),
+        materials_(source, format, model_.report.notes),
         meshes_(source.mNumMeshes, -1),
         material_of_(source.mNumMaterials, -1),
         imported_(source.mNumMaterials),

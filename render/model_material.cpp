@@ -61,6 +61,25 @@ void MaterialImport::note(const std::string& text) {
   if (std::find(notes_.begin(), notes_.end(), text) == notes_.end()) notes_.push_back(text);
 }
 
+Wrap MaterialImport::wrap_of(const aiMaterial& material,
+                             const char* key,
+                             unsigned type,
+                             unsigned slot) const {
+  int mode = 0;
+  if (material.Get(key, type, slot, mode) != aiReturn_SUCCESS) return Wrap::repeat;
+  // Of X3D, assimp keeps whether it repeats.
+  if (format_.x3d) return mode != 0 ? Wrap::repeat : Wrap::clamp;
+  switch (mode) {
+    case aiTextureMapMode_Clamp:
+    case aiTextureMapMode_Decal:
+      return Wrap::clamp;
+    case aiTextureMapMode_Mirror:
+      return Wrap::mirror;
+    default:
+      return Wrap::repeat;
+  }
+}
+
 std::int32_t MaterialImport::texture(const aiMaterial& material,
                                      unsigned type,
                                      unsigned slot,
@@ -68,6 +87,9 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
                                      ImportedMaterial& result,
                                      bool& uv_known) {
   const auto ai_type = static_cast<aiTextureType>(type);
+  const auto say = [&](const std::string& text) {
+    note("material '" + name_of(material) + "': " + text);
+  };
   aiString path;
   unsigned channel = 0;
   if (material.GetTexture(ai_type, slot, &path, nullptr, &channel) != aiReturn_SUCCESS) return -1;
@@ -78,24 +100,31 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
     uv.scale = {transform.mScaling.x, transform.mScaling.y};
     // assimp counts v upwards: v_up' = s v_up + t, so v' = s v + 1 - s - t.
     uv.offset = {transform.mTranslation.x, 1 - transform.mScaling.y - transform.mTranslation.y};
-    if (transform.mRotation != 0)
-      note("material '" + name_of(material) + "': the rotation of a texture is left out");
+    if (transform.mRotation != 0) say("the rotation of a texture is left out");
   }
   if (!uv_known) {
     result.uv = uv;
     uv_known = true;
   } else if (result.uv != uv) {
-    note("material '" + name_of(material) +
-         "': its textures have coordinates of their own; all take those of the first");
+    say("its textures have coordinates of their own; all take those of the first");
   }
-  RawTexture source{path.C_Str(), srgb, false, {}, 0, 0};
+  int filter = 0;
+  constexpr int nearest = 9728;  // glTF's
+  if (material.Get(AI_MATKEY_GLTF_MAPPINGFILTER_MAG(ai_type, slot), filter) == aiReturn_SUCCESS &&
+      filter == nearest)
+    say("a texture that asks for its nearest texel is smoothed");
+  RawTexture source;
+  source.name = path.C_Str();
+  source.srgb = srgb;
+  source.wrap = {wrap_of(material, _AI_MATKEY_MAPPINGMODE_U_BASE, type, slot),
+                 wrap_of(material, _AI_MATKEY_MAPPINGMODE_V_BASE, type, slot)};
   const auto [embedded, index] = scene_.GetEmbeddedTextureAndIndex(path.C_Str());
   if (embedded != nullptr) {
     source.name = "its embedded texture " + std::to_string(index);
     source.embedded = true;
   }
-  const auto [found, added] =
-      indices_.emplace(std::pair(source.name, srgb), static_cast<std::int32_t>(textures_.size()));
+  const auto [found, added] = indices_.emplace(TextureKey{source.name, srgb, source.wrap},
+                                               static_cast<std::int32_t>(textures_.size()));
   if (added) {
     textures_.push_back(std::move(source));
     embedded_.push_back(embedded);
@@ -104,18 +133,29 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
 }
 
 void MaterialImport::note_unhandled(const aiMaterial& material, const std::string& name) {
-  const auto has = [&](aiTextureType type, unsigned slot) {
-    aiString path;
-    return material.GetTexture(type, slot, &path) == aiReturn_SUCCESS;
-  };
   const auto leave_out = [&](const std::string& what) {
     note("material '" + name + "': " + what + " left out");
   };
   float sheen[3];
   if (colour(material, AI_MATKEY_SHEEN_COLOR_FACTOR, sheen) && sheen[0] + sheen[1] + sheen[2] > 0)
     leave_out("sheen is");
+  const auto has = [&](aiTextureType type, unsigned slot) {
+    aiString path;
+    return material.GetTexture(type, slot, &path) == aiReturn_SUCCESS;
+  };
   if (has(AI_MATKEY_CLEARCOAT_NORMAL_TEXTURE)) leave_out("the coat's normal map is");
   if (has(aiTextureType_HEIGHT, 0)) leave_out("the height map is");
+}
+
+void MaterialImport::take_base(const aiMaterial& material, StandardParameters& p) {
+  aiColor4D base;
+  if (material.Get(AI_MATKEY_BASE_COLOR, base) != aiReturn_SUCCESS &&
+      material.Get(AI_MATKEY_COLOR_DIFFUSE, base) != aiReturn_SUCCESS)
+    return;
+  const float rgba[4] = {base.r, base.g, base.b, base.a};
+  for (int c = 0; c < 3; ++c)
+    p.base_color[c] = std::isfinite(rgba[c]) ? std::clamp(rgba[c], 0.0F, 1.0F) : 1;
+  p.base_color_alpha = std::isfinite(rgba[3]) ? std::clamp(rgba[3], 0.0F, 1.0F) : 1;
 }
 
 ImportedMaterial MaterialImport::import(const aiMaterial& material) {
@@ -128,12 +168,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   };
   aiColor4D base;
   const bool metallic_roughness = material.Get(AI_MATKEY_BASE_COLOR, base) == aiReturn_SUCCESS;
-  if (metallic_roughness || material.Get(AI_MATKEY_COLOR_DIFFUSE, base) == aiReturn_SUCCESS) {
-    const float rgba[4] = {base.r, base.g, base.b, base.a};
-    for (int c = 0; c < 3; ++c)
-      p.base_color[c] = std::isfinite(rgba[c]) ? std::clamp(rgba[c], 0.0F, 1.0F) : 1;
-    p.base_color_alpha = std::isfinite(rgba[3]) ? std::clamp(rgba[3], 0.0F, 1.0F) : 1;
-  }
+  take_base(material, p);
   p.base_color_texture = textured(aiTextureType_BASE_COLOR, 0, true);
   if (p.base_color_texture < 0) p.base_color_texture = textured(aiTextureType_DIFFUSE, 0, true);
   p.metallic_roughness_texture =
@@ -159,7 +194,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
       std::clamp(number(material, AI_MATKEY_CLEARCOAT_ROUGHNESS_FACTOR, 0), 0.0F, 1.0F);
   p.transmission = std::clamp(number(material, AI_MATKEY_TRANSMISSION_FACTOR, 0), 0.0F, 1.0F);
   if (!metallic_roughness)
-    p.transmission = 1 - std::clamp(number(material, AI_MATKEY_OPACITY, 1), 0.0F, 1.0F);
+    p.opacity = std::clamp(number(material, AI_MATKEY_OPACITY, 1), 0.0F, 1.0F);
   colour(material, AI_MATKEY_COLOR_EMISSIVE, p.emission);
   p.emission_gain = std::max(0.0F, number(material, AI_MATKEY_EMISSIVE_INTENSITY, 1));
   p.normal_scale = number(material, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1);

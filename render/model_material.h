@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "render/glass.h"
+#include "render/model_format.h"
 #include "render/raw_model.h"
 #include "render/standard.h"
 
@@ -36,9 +38,9 @@ struct ImportedMaterial {
 // Takes materials, and collects the textures that they ask for.
 class MaterialImport {
  public:
-  // Both must outlive this. `notes` receives what is not understood.
-  MaterialImport(const aiScene& scene, std::vector<std::string>& notes)
-      : scene_(scene), notes_(notes) {}
+  // Scene and notes must outlive this. `notes` receives what is not understood.
+  MaterialImport(const aiScene& scene, const ModelFormat& format, std::vector<std::string>& notes)
+      : scene_(scene), format_(format), notes_(notes) {}
 
   ImportedMaterial import(const aiMaterial& material);
 
@@ -46,18 +48,29 @@ class MaterialImport {
   std::vector<RawTexture> take_textures();
 
  private:
+  // What textures are shared by.
+  struct TextureKey {
+    std::string name;
+    bool srgb = false;
+    std::array<Wrap, 2> wrap{};
+    friend auto operator<=>(const TextureKey&, const TextureKey&) = default;
+  };
+
   std::int32_t texture(const aiMaterial& material,
                        unsigned type,
                        unsigned slot,
                        bool srgb,
                        ImportedMaterial& result,
                        bool& uv_known);
+  Wrap wrap_of(const aiMaterial& material, const char* key, unsigned type, unsigned slot) const;
+  void take_base(const aiMaterial& material, StandardParameters& p);
   void note_unhandled(const aiMaterial& material, const std::string& name);
   void note(const std::string& text);
 
   const aiScene& scene_;
+  ModelFormat format_;
   std::vector<std::string>& notes_;
-  std::map<std::pair<std::string, bool>, std::int32_t> indices_;
+  std::map<TextureKey, std::int32_t> indices_;
   std::vector<RawTexture> textures_;
   std::vector<const aiTexture*> embedded_;  // of each, or null
 };

@@ -1,0 +1,197 @@
+// Materials and textures of models: what is taken, what is noted.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/load_mesh.h"
+#include "render/standard.h"
+#include "tests/made_files.h"
+#include "tests/made_model_bytes.h"
+
+namespace render::model_material_test {
+namespace {
+
+namespace fs = std::filesystem;
+using made::GlbParts, made::make_glb;
+using testing::AllOf, testing::Contains, testing::ElementsAre, testing::HasSubstr, testing::Not;
+using namespace std::string_literals;
+
+// A folder with pictures a.png, b.png and so on.
+fs::path made_folder(const std::string& pictures = "") {
+  fs::path folder = made::make_temporary_directory();
+  for (const char name : pictures) {
+    fs::copy_file(made::bad_files().parent_path() / "one_texel.png",
+                  folder / (std::string(1, name) + ".png"));
+  }
+  return folder;
+}
+
+std::string write(const fs::path& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+  return path.string();
+}
+
+StandardParameters parameters_of(const LoadedModel& model, std::size_t material = 0) {
+  return standard_parameters(model.scene.materials.at(material), model.scene.textures.size());
+}
+
+// Of one triangle, with pictures a to d as textures 0 to 3.
+LoadedModel load_glb(const std::string& material, const std::string& samplers = "") {
+  GlbParts parts;
+  parts.material = material;
+  parts.more = R"(,"extensionsUsed":["KHR_materials_pbrSpecularGlossiness",
+"KHR_materials_transmission","KHR_materials_volume"],
+"images":[{"uri":"a.png"},{"uri":"b.png"},{"uri":"c.png"},{"uri":"d.png"}],
+"textures":[{"source":0)" +
+               (samplers.empty() ? ""s : R"(,"sampler":0)") +
+               R"(},{"source":1},{"source":2},{"source":3}])" +
+               (samplers.empty() ? ""s : R"(,"samplers":[)" + samplers + "]");
+  return load_model(write(made_folder("abcd") / "a.glb", make_glb(parts)));
+}
+
+const std::string textured_triangle =
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n";
+
+LoadedModel load_obj(const std::string& library) {
+  const fs::path folder = made_folder("ab");
+  write(folder / "a.mtl", library);
+  return load_model(write(folder / "a.obj", "mtllib a.mtl\n" + textured_triangle));
+}
+
+// Ascii: a triangle with one material of properties `material`, and textures on its properties.
+std::string made_fbx(const std::string& material,
+                     const std::vector<std::pair<std::string, std::string>>& textures,
+                     const std::string& of_texture = "",
+                     const std::string& objects = "",
+                     const std::string& connections = "") {
+  std::string file = R"(; FBX 7.3.0 project file
+FBXHeaderExtension:  {
+FBXHeaderVersion: 1003
+FBXVersion: 7300
+}
+Objects:  {
+Geometry: 1, "Geometry::", "Mesh" {
+Vertices: *9 {
+a: 0,0,0,1,0,0,0,1,0
+}
+PolygonVertexIndex: *3 {
+a: 0,1,-3
+}
+GeometryVersion: 124
+LayerElementUV: 0 {
+Version: 101
+Name: "UVMap"
+MappingInformationType: "ByPolygonVertex"
+ReferenceInformationType: "Direct"
+UV: *6 {
+a: 0,0,1,0,0,1
+}
+}
+LayerElementMaterial: 0 {
+Version: 101
+MappingInformationType: "AllSame"
+ReferenceInformationType: "IndexToDirect"
+Materials: *1 {
+a: 0
+}
+}
+Layer: 0 {
+Version: 100
+LayerElement:  {
+Type: "LayerElementMaterial"
+TypedIndex: 0
+}
+LayerElement:  {
+Type: "LayerElementUV"
+TypedIndex: 0
+}
+}
+}
+Model: 2, "Model::part", "Mesh" {
+Version: 232
+Shading: T
+Culling: "CullingOff"
+}
+Material: 3, "Material::m", "" {
+Version: 102
+ShadingModel: "lambert"
+MultiLayer: 0
+Properties70:  {
+)" + material + "}\n}\n";
+  std::string links = "C: \"OO\",2,0\nC: \"OO\",1,2\nC: \"OO\",3,2\n";
+  int id = 10;
+  for (const auto& [property, picture] : textures) {
+    const std::string number = std::to_string(id++);
+    file += "Texture: " + number + ", \"Texture::t" + number +
+            "\", \"\" {\nType: \"TextureVideoClip\"\nVersion: 202\nFileName: \"" + picture +
+            "\"\nRelativeFilename: \"" + picture + "\"\nProperties70:  {\n" + of_texture + "}\n}\n";
+    links += "C: \"OP\"," + number + ",3, \"" + property + "\"\n";
+  }
+  return file + objects + "}\nConnections:  {\n" + links + connections + "}\n";
+}
+std::string fbx_colour(const std::string& name, const std::string& rgb) {
+  return "P: \"" + name + "\", \"Color\", \"\", \"A\"," + rgb + "\n";
+}
+std::string fbx_number(const std::string& name, const std::string& value) {
+  return "P: \"" + name + "\", \"Number\", \"\", \"A\"," + value + "\n";
+}
+
+LoadedModel load_fbx(const std::string& bytes) {
+  return load_model(write(made_folder("abc") / "a.fbx", bytes));
+}
+
+LoadedModel load_x3d(const std::string& appearance) {
+  const std::string shape = made::x3d(
+      "<Shape><Appearance>" + appearance +
+      "</Appearance><IndexedFaceSet coordIndex=\"0 1 2 -1\" texCoordIndex=\"0 1 2 -1\">"
+      "<Coordinate point=\"0 0 0 1 0 0 0 1 0\"/><TextureCoordinate point=\"0 0 1 0 0 1\"/>"
+      "</IndexedFaceSet></Shape>");
+  return load_model(write(made_folder("a") / "a.x3d", shape));
+}
+
+auto notes_of(const LoadedModel& model) { return model.report.notes; }
+
+TEST(ModelMaterial, LetsLightThroughUntintedByItsOpacity) {
+  const LoadedModel obj = load_obj("newmtl m\nKd 0 0 0\nd 0.25\n");
+  const LoadedModel fbx = load_fbx(made_fbx(
+      fbx_colour("TransparentColor", "1,1,1") + fbx_number("TransparencyFactor", ".75"), {}));
+  const LoadedModel x3d = load_x3d("<Material diffuseColor=\"0 0 0\" transparency=\".75\"/>");
+  for (const LoadedModel* model : {&obj, &fbx, &x3d}) {
+    const StandardParameters p = parameters_of(*model);
+    EXPECT_NEAR(p.opacity, 0.25, 1e-6);
+    EXPECT_EQ(p.transmission, 0);
+  }
+}
+
+TEST(ModelMaterial, WrapsTexturesAsTheFileSays) {
+  const std::string glowing = R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0}})";
+  const auto wrap_of = [](const LoadedModel& model) { return model.scene.textures.at(0)->wrap; };
+  EXPECT_THAT(wrap_of(load_glb(glowing)), ElementsAre(Wrap::repeat, Wrap::repeat));
+  EXPECT_THAT(wrap_of(load_glb(glowing, R"({"wrapS":33071,"wrapT":33648})")),
+              ElementsAre(Wrap::clamp, Wrap::mirror));
+  const std::string picture = "<Material/><ImageTexture url='\"a.png\"' ";
+  EXPECT_THAT(wrap_of(load_x3d(picture + "/>")), ElementsAre(Wrap::repeat, Wrap::repeat));
+  EXPECT_THAT(wrap_of(load_x3d(picture + "repeatS=\"false\"/>")),
+              ElementsAre(Wrap::clamp, Wrap::repeat));
+  const LoadedModel obj = load_obj("newmtl m\nKe 1 1 1\nmap_Ke -clamp on a.png\n");
+  EXPECT_THAT(wrap_of(obj), ElementsAre(Wrap::clamp, Wrap::clamp));
+}
+
+TEST(ModelMaterial, SharesATextureOnlyWhereItWrapsAlike) {
+  GlbParts parts;
+  parts.material = R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0},
+"pbrMetallicRoughness":{"baseColorTexture":{"index":1}},"normalTexture":{"index":2}})";
+  parts.more = R"(,"images":[{"uri":"a.png"}],"samplers":[{"wrapS":33071},{}],"textures":
+[{"source":0,"sampler":0},{"source":0,"sampler":1},{"source":0,"sampler":1}])";
+  const LoadedModel model = load_model(write(made_folder("a") / "a.glb", make_glb(parts)));
+  EXPECT_EQ(model.scene.textures.size(), 3U) << "two ways, and one is no colour";
+}
+
+}  // namespace
+}  // namespace render::model_material_test
