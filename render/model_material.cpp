@@ -6,6 +6,7 @@
 #include <assimp/scene.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <stdexcept>
 
@@ -80,6 +81,33 @@ Wrap MaterialImport::wrap_of(const aiMaterial& material,
   }
 }
 
+// Of the scene's textures, -1 if it is a file of its own. Those that are meant are named by their
+// number; other formats than glTF also know the name of the file that they once were, often under
+// another folder.
+int MaterialImport::embedded_index(const std::string& path) const {
+  const auto count = static_cast<int>(scene_.mNumTextures);
+  if (path.starts_with('*')) {
+    int index = -1;
+    std::from_chars(path.data() + 1, path.data() + path.size(), index);
+    return index < count ? index : -1;
+  }
+  if (format_.gltf) return -1;
+  const auto name_at = [this](int i) -> std::string {
+    return scene_.mTextures[i]->mFilename.C_Str();
+  };
+  const auto without_folder = [](const std::string& name) {
+    return name.substr(name.find_last_of("/\\") + 1);  // all of it if there is none
+  };
+  int found = -1, alike = 0;
+  for (int i = 0; i < count; ++i) {
+    if (name_at(i) == path) return i;
+    if (without_folder(name_at(i)) != without_folder(path)) continue;
+    found = i;
+    ++alike;
+  }
+  return alike == 1 ? found : -1;
+}
+
 std::int32_t MaterialImport::texture(const aiMaterial& material,
                                      unsigned type,
                                      unsigned slot,
@@ -93,7 +121,10 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
   aiString path;
   unsigned channel = 0;
   if (material.GetTexture(ai_type, slot, &path, nullptr, &channel) != aiReturn_SUCCESS) return -1;
-  if (path.length == 0) return -1;
+  if (path.length == 0) {
+    say("a texture whose picture is neither a file nor base64 is left out");
+    return -1;
+  }
   UvTransform uv{.channel = channel};
   aiUVTransform transform;
   if (material.Get(AI_MATKEY_UVTRANSFORM(ai_type, slot), transform) == aiReturn_SUCCESS) {
@@ -118,8 +149,8 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
   source.srgb = srgb;
   source.wrap = {wrap_of(material, _AI_MATKEY_MAPPINGMODE_U_BASE, type, slot),
                  wrap_of(material, _AI_MATKEY_MAPPINGMODE_V_BASE, type, slot)};
-  const auto [embedded, index] = scene_.GetEmbeddedTextureAndIndex(path.C_Str());
-  if (embedded != nullptr) {
+  const int index = embedded_index(source.name);
+  if (index >= 0) {
     source.name = "its embedded texture " + std::to_string(index);
     source.embedded = true;
   }
@@ -127,7 +158,7 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
                                                static_cast<std::int32_t>(textures_.size()));
   if (added) {
     textures_.push_back(std::move(source));
-    embedded_.push_back(embedded);
+    embedded_.push_back(index >= 0 ? scene_.mTextures[index] : nullptr);
   }
   return found->second;
 }

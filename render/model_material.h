@@ -63,6 +63,7 @@ class MaterialImport {
                        ImportedMaterial& result,
                        bool& uv_known);
   Wrap wrap_of(const aiMaterial& material, const char* key, unsigned type, unsigned slot) const;
+  int embedded_index(const std::string& path) const;
   void take_base(const aiMaterial& material, StandardParameters& p);
   void note_unhandled(const aiMaterial& material, const std::string& name);
   void note(const std::string& text);

@@ -193,5 +193,59 @@ TEST(ModelMaterial, SharesATextureOnlyWhereItWrapsAlike) {
   EXPECT_EQ(model.scene.textures.size(), 3U) << "two ways, and one is no colour";
 }
 
+// Of glTF, a picture inside may have the name of one that lies outside.
+TEST(ModelMaterial, TellsAFileFromAPictureInsideOfTheSameName) {
+  GlbParts parts;
+  parts.material = R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0},
+"pbrMetallicRoughness":{"baseColorTexture":{"index":1}}})";
+  parts.more =
+      R"(,"images":[{"name":"a.png","mimeType":"image/png","uri":"data:image/png;base64,AAAA"},
+{"uri":"a.png"}],"textures":[{"source":0},{"source":1}])";
+  const LoadedModel model = load_model(write(made_folder("a") / "a.glb", make_glb(parts)));
+  const StandardParameters p = parameters_of(model);
+  EXPECT_GE(p.base_color_texture, 0);
+  EXPECT_EQ(p.emission_texture, -1) << "what lies inside is no picture";
+}
+
+// Two pictures of one name in two folders.
+TEST(ModelMaterial, TellsPicturesInFbxByTheirWholeNames) {
+  std::ifstream picture(made::bad_files().parent_path() / "one_texel.png", std::ios::binary);
+  const std::string png((std::istreambuf_iterator<char>(picture)), {});
+  constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < png.size(); i += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      bits = bits << 8 | (i + k < png.size() ? static_cast<unsigned char>(png[i + k]) : 0U);
+    }
+    for (std::size_t k = 0; k < 4; ++k) {
+      text += i + k > png.size() ? '=' : digits[bits >> (18 - 6 * k) & 63U];
+    }
+  }
+  std::string objects, connections;
+  for (int i = 0; i < 2; ++i) {
+    const std::string id = std::to_string(20 + i), folder = i == 0 ? "one" : "two";
+    const std::string name = folder + "/x.png";
+    objects += "Video: " + id + ", \"Video::v" + id +
+               "\", \"Clip\" {\nType: \"Clip\"\nFileName: \"" + name + "\"\nRelativeFilename: \"" +
+               name + "\"\nContent: ,\n\"" + text + "\"\n}\n";
+    connections += "C: \"OO\"," + id + "," + std::to_string(10 + i) + "\n";
+  }
+  const LoadedModel model = load_fbx(made_fbx(
+      fbx_colour("EmissiveColor", "1,1,1"),
+      {{"DiffuseColor", "one/x.png"}, {"EmissiveColor", "two/x.png"}}, "", objects, connections));
+  EXPECT_EQ(model.scene.textures.size(), 2U);
+  const StandardParameters p = parameters_of(model);
+  EXPECT_NE(p.base_color_texture, p.emission_texture);
+}
+
+TEST(ModelMaterial, NotesPicturesWithoutBytes) {
+  GlbParts parts;
+  parts.material = R"({"name":"m","emissiveTexture":{"index":0}})";
+  parts.more = R"(,"images":[{"uri":"data:image/png,%89PNG"}],"textures":[{"source":0}])";
+  const LoadedModel model = load_model(write(made_folder() / "a.glb", make_glb(parts)));
+  EXPECT_THAT(notes_of(model), Contains(HasSubstr("neither a file nor base64")));
+}
+
 }  // namespace
 }  // namespace render::model_material_test
