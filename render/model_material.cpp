@@ -36,6 +36,48 @@ std::string name_of(const aiMaterial& material) {
   return material.Get(AI_MATKEY_NAME, name) == aiReturn_SUCCESS ? name.C_Str() : "";
 }
 
+// What people call a map, by assimp's types.
+std::string map_name(unsigned type, unsigned slot) {
+  switch (type) {
+    case aiTextureType_DIFFUSE:
+    case aiTextureType_BASE_COLOR:
+      return slot > 0 ? "second base colour map" : "base colour map";
+    case aiTextureType_SPECULAR:
+      return "specular map";
+    case aiTextureType_AMBIENT:
+      return "ambient map";
+    case aiTextureType_EMISSIVE:
+    case aiTextureType_EMISSION_COLOR:
+      return slot > 0 ? "second emission map" : "emission map";
+    case aiTextureType_HEIGHT:
+      return "height map";
+    case aiTextureType_NORMALS:
+    case aiTextureType_NORMAL_CAMERA:
+      return slot > 0 ? "second normal map" : "normal map";
+    case aiTextureType_SHININESS:
+      return "shininess map";
+    case aiTextureType_OPACITY:
+      return "opacity map";
+    case aiTextureType_DISPLACEMENT:
+      return "displacement map";
+    case aiTextureType_LIGHTMAP:
+    case aiTextureType_AMBIENT_OCCLUSION:
+      return "occlusion map";
+    case aiTextureType_REFLECTION:
+      return "reflection map";
+    case aiTextureType_METALNESS:
+      return "metallic map";
+    case aiTextureType_DIFFUSE_ROUGHNESS:
+      return "roughness map";
+    case aiTextureType_SHEEN:
+      return slot > 0 ? "sheen's roughness map" : "sheen's map";
+    case aiTextureType_CLEARCOAT:
+      return slot == 2 ? "coat's normal map" : "coat's map";
+    default:
+      return "map of a kind that is not known";
+  }
+}
+
 // Above this, glass scatters light so much that it is taken for a thin, clear sheet.
 constexpr float rough_glass = 0.3F;
 
@@ -118,6 +160,7 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
   const auto say = [&](const std::string& text) {
     note("material '" + name_of(material) + "': " + text);
   };
+  taken_.emplace_back(type, slot);
   aiString path;
   unsigned channel = 0;
   if (material.GetTexture(ai_type, slot, &path, nullptr, &channel) != aiReturn_SUCCESS) return -1;
@@ -170,12 +213,13 @@ void MaterialImport::note_unhandled(const aiMaterial& material, const std::strin
   float sheen[3];
   if (colour(material, AI_MATKEY_SHEEN_COLOR_FACTOR, sheen) && sheen[0] + sheen[1] + sheen[2] > 0)
     leave_out("sheen is");
-  const auto has = [&](aiTextureType type, unsigned slot) {
-    aiString path;
-    return material.GetTexture(type, slot, &path) == aiReturn_SUCCESS;
-  };
-  if (has(AI_MATKEY_CLEARCOAT_NORMAL_TEXTURE)) leave_out("the coat's normal map is");
-  if (has(aiTextureType_HEIGHT, 0)) leave_out("the height map is");
+  for (unsigned type = 1; type <= AI_TEXTURE_TYPE_MAX; ++type) {
+    const unsigned count = material.GetTextureCount(static_cast<aiTextureType>(type));
+    for (unsigned slot = 0; slot < count; ++slot) {
+      if (std::ranges::find(taken_, std::pair(type, slot)) == taken_.end())
+        leave_out("the " + map_name(type, slot) + " is");
+    }
+  }
 }
 
 void MaterialImport::take_base(const aiMaterial& material, StandardParameters& p) {
@@ -194,21 +238,40 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   StandardParameters& p = result.parameters;
   const std::string name = name_of(material);
   bool uv_known = false;
+  taken_.clear();
   const auto textured = [&](unsigned type, unsigned slot, bool srgb) {
     return texture(material, type, slot, srgb, result, uv_known);
+  };
+  const auto either = [&](unsigned type, unsigned other, bool srgb) {
+    const std::int32_t index = textured(type, 0, srgb);
+    return index >= 0 ? index : textured(other, 0, srgb);
   };
   aiColor4D base;
   const bool metallic_roughness = material.Get(AI_MATKEY_BASE_COLOR, base) == aiReturn_SUCCESS;
   take_base(material, p);
-  p.base_color_texture = textured(aiTextureType_BASE_COLOR, 0, true);
-  if (p.base_color_texture < 0) p.base_color_texture = textured(aiTextureType_DIFFUSE, 0, true);
+  p.base_color_texture = either(aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, true);
   p.metallic_roughness_texture =
       textured(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE, false);
-  p.normal_texture = textured(aiTextureType_NORMALS, 0, false);
-  p.emission_texture = textured(aiTextureType_EMISSIVE, 0, true);
+  if (format_.gltf) {
+    // assimp has maps of glTF under other names too.
+    for (const aiTextureType twin :
+         {aiTextureType_DIFFUSE, aiTextureType_METALNESS, aiTextureType_DIFFUSE_ROUGHNESS}) {
+      taken_.emplace_back(twin, 0);
+    }
+  }
+  p.normal_texture = either(aiTextureType_NORMALS, aiTextureType_NORMAL_CAMERA, false);
+  p.emission_texture = either(aiTextureType_EMISSIVE, aiTextureType_EMISSION_COLOR, true);
   p.clearcoat_texture = textured(AI_MATKEY_CLEARCOAT_TEXTURE, false);
   p.clearcoat_roughness_texture = textured(AI_MATKEY_CLEARCOAT_ROUGHNESS_TEXTURE, false);
   p.transmission_texture = textured(AI_MATKEY_TRANSMISSION_TEXTURE, false);
+  taken_.emplace_back(AI_MATKEY_VOLUME_THICKNESS_TEXTURE);  // the shape tells it
+  if (format_.obj) {
+    p.alpha_texture = textured(aiTextureType_OPACITY, 0, false);
+    if (p.alpha_texture >= 0) {
+      p.alpha_cutoff = 0.5F;
+      note("material '" + name + "': its opacity map is cut at a half");
+    }
+  }
 
   const float unit_roughness = metallic_roughness ? 1.0F : 0.5F;
   const float shininess = number(material, AI_MATKEY_SHININESS, 0);

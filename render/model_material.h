@@ -71,6 +71,7 @@ class MaterialImport {
   const aiScene& scene_;
   ModelFormat format_;
   std::vector<std::string>& notes_;
+  std::vector<std::pair<unsigned, unsigned>> taken_;  // types and slots of the material's maps
   std::map<TextureKey, std::int32_t> indices_;
   std::vector<RawTexture> textures_;
   std::vector<const aiTexture*> embedded_;  // of each, or null

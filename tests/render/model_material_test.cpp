@@ -193,6 +193,35 @@ TEST(ModelMaterial, SharesATextureOnlyWhereItWrapsAlike) {
   EXPECT_EQ(model.scene.textures.size(), 3U) << "two ways, and one is no colour";
 }
 
+TEST(ModelMaterial, NotesEveryMapThatIsLeftOut) {
+  const LoadedModel glb = load_glb(R"({"name":"m","occlusionTexture":{"index":0},
+"pbrMetallicRoughness":{"baseColorTexture":{"index":1},"metallicRoughnessTexture":{"index":2}}})");
+  EXPECT_THAT(notes_of(glb), ElementsAre("material 'm': the occlusion map is left out"));
+  const LoadedModel fbx = load_fbx(
+      made_fbx(fbx_colour("DiffuseColor", ".5,.5,.5"), {{"Maya|TEX_color_map", "a.png"},
+                                                        {"Maya|TEX_normal_map", "b.png"},
+                                                        {"Maya|TEX_roughness_map", "c.png"}}));
+  EXPECT_THAT(notes_of(fbx), ElementsAre("material 'm': the roughness map is left out"));
+  const StandardParameters p = parameters_of(fbx);
+  EXPECT_GE(p.base_color_texture, 0);
+  EXPECT_GE(p.normal_texture, 0);
+  EXPECT_THAT(notes_of(load_fbx(made_fbx("", {{"TransparentColor", "a.png"}}))),
+              Contains(HasSubstr("the opacity map is left out")));
+  EXPECT_THAT(notes_of(load_obj("newmtl m\nmap_Ks a.png\nmap_Bump b.png\n")),
+              AllOf(Contains(HasSubstr("specular map")), Contains(HasSubstr("height map"))));
+}
+
+TEST(ModelMaterial, CutsHolesByTheOpacityMapOfObj) {
+  const LoadedModel model = load_obj("newmtl m\nmap_Kd a.png\nmap_d b.png\n");
+  const StandardParameters p = parameters_of(model);
+  ASSERT_GE(p.alpha_texture, 0);
+  EXPECT_NE(p.alpha_texture, p.base_color_texture);
+  EXPECT_EQ(p.alpha_cutoff, 0.5F);
+  EXPECT_THAT(notes_of(model), Contains(HasSubstr("cut at a half")));
+  const LoadedModel without = load_obj("newmtl m\nmap_d lost.png\n");
+  EXPECT_EQ(parameters_of(without).alpha_cutoff, 0);
+}
+
 // Of glTF, a picture inside may have the name of one that lies outside.
 TEST(ModelMaterial, TellsAFileFromAPictureInsideOfTheSameName) {
   GlbParts parts;
