@@ -233,6 +233,38 @@ void MaterialImport::take_base(const aiMaterial& material, StandardParameters& p
   p.base_color_alpha = std::isfinite(rgba[3]) ? std::clamp(rgba[3], 0.0F, 1.0F) : 1;
 }
 
+// Of KHR_materials_pbrSpecularGlossiness: matte below, mirrored above, both with colours of their
+// own; what is no metal of ours mirrors at most 4 %, without colour. Without a matte part it is a
+// metal.
+void MaterialImport::take_specular_glossiness(const aiMaterial& material,
+                                              const std::string& name,
+                                              StandardParameters& p) {
+  float diffuse[3] = {1, 1, 1}, specular[3] = {1, 1, 1};
+  colour(material, AI_MATKEY_COLOR_DIFFUSE, diffuse);
+  colour(material, AI_MATKEY_COLOR_SPECULAR, specular);
+  aiColor4D with_alpha;
+  if (material.Get(AI_MATKEY_COLOR_DIFFUSE, with_alpha) == aiReturn_SUCCESS &&
+      std::isfinite(with_alpha.a))
+    p.base_color_alpha = std::clamp(with_alpha.a, 0.0F, 1.0F);
+  const float gloss = std::clamp(number(material, AI_MATKEY_GLOSSINESS_FACTOR, 1), 0.0F, 1.0F);
+  p.roughness = 1 - gloss;
+  const bool mapped = material.GetTextureCount(aiTextureType_SPECULAR) > 0;  // noted elsewhere
+  const float most = std::min(1.0F, *std::max_element(specular, specular + 3));
+  const float matte = *std::max_element(diffuse, diffuse + 3);
+  constexpr float of_dielectric = 0.04F;
+  p.metallic = !mapped && matte == 0 && most > of_dielectric ? 1.0F : 0.0F;
+  for (int c = 0; c < 3; ++c) {
+    const float shown = p.metallic > 0 ? specular[c] : diffuse[c] * (mapped ? 1 : 1 - most);
+    p.base_color[c] = std::clamp(shown, 0.0F, 1.0F);
+  }
+  if (p.metallic > 0) return;
+  if (!mapped) p.specular = std::min(1.0F, most / of_dielectric);
+  const bool grey = specular[0] == specular[1] && specular[1] == specular[2];
+  if (mapped || most > of_dielectric * 1.01F || !grey)
+    note("material '" + name +
+         "': its mirror colour (specular-glossiness) is left out: it mirrors as paint does");
+}
+
 ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   ImportedMaterial result;
   StandardParameters& p = result.parameters;
@@ -248,10 +280,19 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   };
   aiColor4D base;
   const bool metallic_roughness = material.Get(AI_MATKEY_BASE_COLOR, base) == aiReturn_SUCCESS;
+  ai_real gloss = 0;
+  const bool specular_glossiness =
+      format_.gltf && material.Get(AI_MATKEY_GLOSSINESS_FACTOR, gloss) == aiReturn_SUCCESS;
   take_base(material, p);
-  p.base_color_texture = either(aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, true);
-  p.metallic_roughness_texture =
-      textured(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE, false);
+  if (specular_glossiness) {
+    p.base_color_texture = textured(aiTextureType_DIFFUSE, 0, true);
+    taken_.emplace_back(aiTextureType_BASE_COLOR, 0);  // this and the next are for other readers
+    taken_.emplace_back(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE);
+  } else {
+    p.base_color_texture = either(aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, true);
+    p.metallic_roughness_texture =
+        textured(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE, false);
+  }
   if (format_.gltf) {
     // assimp has maps of glTF under other names too.
     for (const aiTextureType twin :
@@ -283,6 +324,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
       std::clamp(number(material, AI_MATKEY_ROUGHNESS_FACTOR, plain_roughness), 0.0F, 1.0F);
   p.metallic = std::clamp(
       number(material, AI_MATKEY_METALLIC_FACTOR, metallic_roughness ? 1.0F : 0.0F), 0.0F, 1.0F);
+  if (specular_glossiness) take_specular_glossiness(material, name, p);
   p.clearcoat = std::clamp(number(material, AI_MATKEY_CLEARCOAT_FACTOR, 0), 0.0F, 1.0F);
   p.clearcoat_roughness =
       std::clamp(number(material, AI_MATKEY_CLEARCOAT_ROUGHNESS_FACTOR, 0), 0.0F, 1.0F);

@@ -65,6 +65,9 @@ class MaterialImport {
   Wrap wrap_of(const aiMaterial& material, const char* key, unsigned type, unsigned slot) const;
   int embedded_index(const std::string& path) const;
   void take_base(const aiMaterial& material, StandardParameters& p);
+  void take_specular_glossiness(const aiMaterial& material,
+                                const std::string& name,
+                                StandardParameters& p);
   void note_unhandled(const aiMaterial& material, const std::string& name);
   void note(const std::string& text);
 

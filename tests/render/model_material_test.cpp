@@ -222,6 +222,33 @@ TEST(ModelMaterial, CutsHolesByTheOpacityMapOfObj) {
   EXPECT_EQ(parameters_of(without).alpha_cutoff, 0);
 }
 
+TEST(ModelMaterial, TakesSpecularGlossinessForPaintOrMetal) {
+  const auto load = [](const std::string& extension) {
+    return load_glb(R"({"name":"m","extensions":{"KHR_materials_pbrSpecularGlossiness":)" +
+                    extension + "}}");
+  };
+  const LoadedModel paint =
+      load(R"({"diffuseFactor":[0.5,0.25,0,1],"specularFactor":[0,0,0],"glossinessFactor":0.25})");
+  StandardParameters p = parameters_of(paint);
+  EXPECT_THAT(p.base_color, ElementsAre(0.5F, 0.25F, 0));
+  EXPECT_EQ(p.metallic, 0);
+  EXPECT_EQ(p.specular, 0);
+  EXPECT_NEAR(p.roughness, 0.75, 1e-6);
+  const LoadedModel metal =
+      load(R"({"diffuseFactor":[0,0,0,1],"specularFactor":[1,0.5,0.25],"glossinessFactor":1})");
+  p = parameters_of(metal);
+  EXPECT_THAT(p.base_color, ElementsAre(1, 0.5F, 0.25F));
+  EXPECT_EQ(p.metallic, 1);
+  const LoadedModel mapped =
+      load(R"({"diffuseTexture":{"index":0},"specularGlossinessTexture":{"index":1}})");
+  p = parameters_of(mapped);
+  EXPECT_GE(p.base_color_texture, 0);
+  EXPECT_THAT(p.base_color, ElementsAre(1, 1, 1));
+  EXPECT_EQ(p.metallic, 0);
+  EXPECT_THAT(notes_of(mapped), AllOf(Contains(HasSubstr("mirrors as paint does")),
+                                      Contains(HasSubstr("specular map is left out"))));
+}
+
 // Of glTF, a picture inside may have the name of one that lies outside.
 TEST(ModelMaterial, TellsAFileFromAPictureInsideOfTheSameName) {
   GlbParts parts;
