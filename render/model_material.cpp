@@ -265,6 +265,32 @@ void MaterialImport::take_specular_glossiness(const aiMaterial& material,
          "': its mirror colour (specular-glossiness) is left out: it mirrors as paint does");
 }
 
+void MaterialImport::take_volume(const aiMaterial& material,
+                                 const std::string& name,
+                                 ImportedMaterial& result) {
+  const StandardParameters& p = result.parameters;
+  if (!(number(material, AI_MATKEY_VOLUME_THICKNESS_FACTOR, 0) > 0)) return;
+  if (p.transmission < 0.5F || p.roughness >= rough_glass || p.transmission_texture >= 0) {
+    note("material '" + name + "': the volume (thickness, attenuation) is left out");
+    return;
+  }
+  result.glass = glass_of(material, p);
+  std::string lost;
+  const auto lose = [&lost](bool has, const char* what) {
+    if (has) lost += (lost.empty() ? "" : ", ") + std::string(what);
+  };
+  lose(std::min({p.base_color[0], p.base_color[1], p.base_color[2]}) < 1, "base colour");
+  lose(p.base_color_texture >= 0, "base colour map");
+  lose(p.alpha_cutoff > 0, "cut-outs");
+  lose(p.metallic_roughness_texture >= 0, "roughness map");
+  lose(p.normal_texture >= 0, "normal map");
+  lose(p.clearcoat > 0, "clear coat");
+  lose(std::max({p.emission[0], p.emission[1], p.emission[2]}) > 0, "emission");
+  lose(p.transmission < 1, "matte share");
+  if (!lost.empty())
+    note("material '" + name + "': it is solid glass, which goes without its " + lost);
+}
+
 ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   ImportedMaterial result;
   StandardParameters& p = result.parameters;
@@ -348,13 +374,10 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   int two_sided = 1;
   if (material.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS)
     p.two_sided = two_sided != 0 ? 1 : 0;
-  if (number(material, AI_MATKEY_VOLUME_THICKNESS_FACTOR, 0) > 0) {
-    if (p.transmission >= 0.5F && p.roughness < rough_glass) {
-      result.glass = glass_of(material, p);
-    } else {
-      note("material '" + name + "': the volume (thickness, attenuation) is left out");
-    }
-  }
+  take_volume(material, name, result);
+  constexpr float frosted = 0.1F;
+  if (p.transmission > 0 && p.metallic < 1 && p.roughness > frosted)
+    note("material '" + name + "': what goes through it is clear, not as rough as its surface");
   note_unhandled(material, name);
   return result;
 }

@@ -68,6 +68,7 @@ class MaterialImport {
   void take_specular_glossiness(const aiMaterial& material,
                                 const std::string& name,
                                 StandardParameters& p);
+  void take_volume(const aiMaterial& material, const std::string& name, ImportedMaterial& result);
   void note_unhandled(const aiMaterial& material, const std::string& name);
   void note(const std::string& text);
 

@@ -249,6 +249,46 @@ TEST(ModelMaterial, TakesSpecularGlossinessForPaintOrMetal) {
                                       Contains(HasSubstr("specular map is left out"))));
 }
 
+LoadedModel load_clear(const std::string& more, double roughness, bool volume) {
+  return load_glb(
+      R"({"name":"m","extensions":{"KHR_materials_transmission":{"transmissionFactor":1)" +
+      (more.starts_with("+") ? more.substr(1) : "") + "}" +
+      (volume ? R"(,"KHR_materials_volume":{"thicknessFactor":0.01}})" : "}") +
+      (more.starts_with("+") ? "" : more) +
+      (more.find("pbr") != std::string::npos
+           ? "}"
+           : R"(,"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":)" +
+                 std::to_string(roughness) + "}}"));
+}
+
+TEST(ModelMaterial, NotesWhatSolidGlassGoesWithout) {
+  const auto lost = [](const std::string& more) {
+    const LoadedModel model = load_clear(more, 0, true);
+    EXPECT_EQ(model.scene.materials.at(0).shader, "glass");
+    std::string all;
+    for (const std::string& note : model.report.notes) all += note + "\n";
+    return all;
+  };
+  EXPECT_EQ(lost(""), "");
+  EXPECT_EQ(lost(R"(,"normalTexture":{"index":0},"emissiveFactor":[0,1,0])"),
+            "material 'm': it is solid glass, which goes without its normal map, emission\n");
+  EXPECT_THAT(
+      lost(R"(,"alphaMode":"MASK","pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0,
+"baseColorFactor":[1,0.5,1,1],"baseColorTexture":{"index":0}})"),
+      HasSubstr("base colour, base colour map, cut-outs"));
+  const LoadedModel by_map = load_clear(R"(+,"transmissionTexture":{"index":0})", 0, true);
+  EXPECT_EQ(by_map.scene.materials.at(0).shader, "standard");
+  EXPECT_THAT(notes_of(by_map), Contains(HasSubstr("the volume (thickness")));
+}
+
+TEST(ModelMaterial, NotesThatFrostedGlassIsClear) {
+  for (const bool volume : {false, true}) {
+    EXPECT_THAT(notes_of(load_clear("", 0.25, volume)),
+                Contains(HasSubstr("not as rough as its surface")));
+    EXPECT_THAT(notes_of(load_clear("", 0.05, volume)), testing::IsEmpty());
+  }
+}
+
 // Of glTF, a picture inside may have the name of one that lies outside.
 TEST(ModelMaterial, TellsAFileFromAPictureInsideOfTheSameName) {
   GlbParts parts;
