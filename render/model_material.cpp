@@ -341,7 +341,8 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   }
 
   const float unit_roughness = metallic_roughness ? 1.0F : 0.5F;
-  const float shininess = number(material, AI_MATKEY_SHININESS, 0);
+  // Of X3D it is a share of the most.
+  const float shininess = number(material, AI_MATKEY_SHININESS, 0) * (format_.x3d ? 128 : 1);
   // Blinn-Phong exponent to GGX: alpha^2 = 2 / (n + 2), roughness = sqrt(alpha).
   const float shiny_roughness = std::pow(2 / (std::max(0.0F, shininess) + 2), 0.25F);
   const float plain_roughness =
@@ -360,6 +361,9 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   colour(material, AI_MATKEY_COLOR_EMISSIVE, p.emission);
   p.emission_gain = std::max(0.0F, number(material, AI_MATKEY_EMISSIVE_INTENSITY, 1));
   p.normal_scale = number(material, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1);
+  // FBX puts a texture in the place of a colour, which is whatever it was before.
+  if (format_.fbx && p.base_color_texture >= 0) std::fill_n(p.base_color, 3, 1.0F);
+  if (format_.fbx && p.emission_texture >= 0) std::fill_n(p.emission, 3, 1.0F);
 
   aiString alpha_mode;
   if (material.Get(AI_MATKEY_GLTF_ALPHAMODE, alpha_mode) == aiReturn_SUCCESS) {

@@ -289,6 +289,18 @@ TEST(ModelMaterial, NotesThatFrostedGlassIsClear) {
   }
 }
 
+TEST(ModelMaterial, PutsTexturesOfFbxInThePlaceOfColours) {
+  const LoadedModel model = load_fbx(
+      made_fbx(fbx_colour("DiffuseColor", ".5,.5,.5") + fbx_colour("EmissiveColor", "0,0,0") +
+                   fbx_number("EmissiveFactor", "1"),
+               {{"DiffuseColor", "a.png"}, {"EmissiveColor", "b.png"}}));
+  const StandardParameters p = parameters_of(model);
+  EXPECT_THAT(p.base_color, ElementsAre(1, 1, 1));
+  EXPECT_THAT(p.emission, ElementsAre(1, 1, 1));
+  const LoadedModel plain = load_fbx(made_fbx(fbx_colour("DiffuseColor", ".5,.5,.5"), {}));
+  EXPECT_THAT(parameters_of(plain).base_color, ElementsAre(0.5F, 0.5F, 0.5F));
+}
+
 // Of glTF, a picture inside may have the name of one that lies outside.
 TEST(ModelMaterial, TellsAFileFromAPictureInsideOfTheSameName) {
   GlbParts parts;
@@ -333,6 +345,12 @@ TEST(ModelMaterial, TellsPicturesInFbxByTheirWholeNames) {
   EXPECT_EQ(model.scene.textures.size(), 2U);
   const StandardParameters p = parameters_of(model);
   EXPECT_NE(p.base_color_texture, p.emission_texture);
+}
+
+TEST(ModelMaterial, CountsTheShininessOfX3dAsAShare) {
+  const LoadedModel x3d = load_x3d("<Material shininess=\".5\"/>");
+  const LoadedModel obj = load_obj("newmtl m\nNs 64\n");
+  EXPECT_NEAR(parameters_of(x3d).roughness, parameters_of(obj).roughness, 1e-5);
 }
 
 TEST(ModelMaterial, NotesPicturesWithoutBytes) {
