@@ -16,6 +16,7 @@
 #include <new>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -27,6 +28,7 @@
 #include "render/model_format.h"
 #include "render/model_material.h"
 #include "render/model_mesh.h"
+#include "render/mtl_mend.h"
 #include "render/x3d_mend.h"
 
 namespace render {
@@ -73,13 +75,20 @@ class MemoryStream : public Assimp::IOStream {
 // Lets assimp see nothing but what it is given.
 class GivenFiles : public Assimp::IOSystem {
  public:
-  // `mended` stands for the file of that name, where it is.
+  // `mended` stands for the file of that name, where it is; `missing` and `libraries` receive what
+  // is not there and what material libraries say.
   GivenFiles(ModelFiles& files,
              const std::string& name,
              const std::optional<MendedGltf>& mended,
-             bool x3d,
-             std::vector<std::string>& missing)
-      : files_(files), name_(name), mended_(mended), x3d_(x3d), missing_(missing) {}
+             const ModelFormat& format,
+             std::vector<std::string>& missing,
+             MtlFacts& libraries)
+      : files_(files),
+        name_(name),
+        mended_(mended),
+        format_(format),
+        missing_(missing),
+        libraries_(libraries) {}
   bool Exists(const char* file) const override { return files_.exists(file); }
   char getOsSeparator() const override { return '/'; }
   Assimp::IOStream* Open(const char* file, const char* mode) override {
@@ -88,20 +97,91 @@ class GivenFiles : public Assimp::IOSystem {
     if (mended_ && name == name_) return new MemoryStream(std::span(mended_->file));
     if (mended_ && name.ends_with(mended_vertices))
       return new MemoryStream(std::span(mended_->vertices));
-    if (auto bytes = files_.read(file))
-      return new MemoryStream(x3d_ ? mend_x3d(*bytes) : std::move(*bytes));
-    missing_.emplace_back(file);
+    const bool library = format_.obj && name.ends_with(".mtl");
+    if (auto bytes = files_.read(file)) {
+      return new MemoryStream(format_.x3d ? mend_x3d(*bytes)
+                              : library   ? mend_mtl(*bytes, libraries_)
+                                          : std::move(*bytes));
+    }
+    if (library) {
+      if (auto bytes = read_each(file)) return new MemoryStream(mend_mtl(*bytes, libraries_));
+    }
+    miss(file);
     return nullptr;
   }
   void Close(Assimp::IOStream* stream) override { delete stream; }
 
  private:
+  // Of a line that names several libraries, all that are there, one after the other. assimp takes
+  // it for one name.
+  std::optional<std::vector<std::byte>> read_each(const std::string& line) {
+    std::istringstream names(line);
+    std::vector<std::string> lost;
+    std::optional<std::vector<std::byte>> all;
+    for (std::string name; names >> name;) {
+      const auto bytes = files_.read(name);
+      if (!bytes) {
+        lost.push_back(name);
+        continue;
+      }
+      if (!all) all.emplace();
+      all->insert(all->end(), bytes->begin(), bytes->end());
+      all->push_back(std::byte{'\n'});
+    }
+    if (all) {
+      for (const std::string& name : lost) miss(name);
+    }
+    return all;
+  }
+  void miss(const std::string& name) {
+    if (std::ranges::find(missing_, name) == missing_.end()) missing_.push_back(name);
+  }
+
   ModelFiles& files_;
   const std::string& name_;
   const std::optional<MendedGltf>& mended_;
-  bool x3d_;
+  ModelFormat format_;
   std::vector<std::string>& missing_;
+  MtlFacts& libraries_;
 };
+
+// What assimp drops of material libraries, put where it keeps it of other files.
+void apply_libraries(const aiScene& scene, const MtlFacts& libraries) {
+  const auto type_of = [](const std::string& keyword) {
+    return keyword == "map_kd"   ? aiTextureType_DIFFUSE
+           : keyword == "map_ke" ? aiTextureType_EMISSIVE
+           : keyword == "map_d"  ? aiTextureType_OPACITY
+           : keyword == "norm"   ? aiTextureType_NORMALS
+                                 : aiTextureType_NONE;
+  };
+  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
+    aiString name;
+    if (scene.mMaterials[i]->Get(AI_MATKEY_NAME, name) != aiReturn_SUCCESS) continue;
+    for (const MtlMap& map : libraries.maps) {
+      const aiTextureType type = type_of(map.keyword);
+      if (map.material != name.C_Str() || type == aiTextureType_NONE) continue;
+      aiUVTransform transform;
+      transform.mScaling = {map.scale[0], map.scale[1]};
+      transform.mTranslation = {map.offset[0], map.offset[1]};
+      const int mode = map.clamps ? aiTextureMapMode_Clamp : aiTextureMapMode_Wrap;
+      scene.mMaterials[i]->AddProperty(&transform, 1, AI_MATKEY_UVTRANSFORM(type, 0));
+      scene.mMaterials[i]->AddProperty(&mode, 1, AI_MATKEY_MAPPINGMODE_U(type, 0));
+      scene.mMaterials[i]->AddProperty(&mode, 1, AI_MATKEY_MAPPINGMODE_V(type, 0));
+    }
+  }
+}
+
+// Notes of what an OBJ file's libraries say and do not say of the materials that it shows.
+void note_libraries(const MtlFacts& libraries, RawModel& model) {
+  std::vector<std::string>& notes = model.report.notes;
+  notes.insert(notes.end(), libraries.notes.begin(), libraries.notes.end());
+  if (libraries.materials.empty()) return;
+  for (const RawMaterial& material : model.materials) {
+    if (material.name != AI_DEFAULT_MATERIAL_NAME && !libraries.materials.contains(material.name))
+      notes.push_back("material '" + material.name +
+                      "' is in none of its libraries: a grey paint stands in its place");
+  }
+}
 
 // Metres per unit that an FBX file states.
 double unit_of(const aiScene& scene) {
@@ -393,9 +473,10 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
     return checked;
   }();
   std::vector<std::string> missing;
+  MtlFacts libraries;
   Assimp::Importer importer;
   importer.SetIOHandler(
-      new GivenFiles(files, file, mended, format.x3d, missing));  // the importer deletes it
+      new GivenFiles(files, file, mended, format, missing, libraries));  // the importer deletes it
   const aiScene* scene = importer.ReadFile(
       file, aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
   if (scene == nullptr) {
@@ -417,6 +498,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
       set_from_root[r][c] = static_cast<float>(options.scale * unit_of(*scene) * axes[r][c]);
   }
   if (format.gltf) check_faces(*scene, facts);
+  apply_libraries(*scene, libraries);
   RawModel model = ModelBuilder(*scene, options, format).build(set_from_root);
   auto& notes = model.report.notes;
   std::vector<std::string> more = facts.notes;
@@ -425,6 +507,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
     if (std::find(notes.begin(), notes.end(), note) == notes.end())
       notes.push_back(std::move(note));
   }
+  note_libraries(libraries, model);
   for (const std::string& name : missing)
     model.report.notes.push_back("'" + name + "' is not there");
   return model;

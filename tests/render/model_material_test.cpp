@@ -347,6 +347,44 @@ TEST(ModelMaterial, TellsPicturesInFbxByTheirWholeNames) {
   EXPECT_NE(p.base_color_texture, p.emission_texture);
 }
 
+TEST(ModelMaterial, TakesOptionsOfMapsInMaterialLibraries) {
+  const LoadedModel model = load_obj("newmtl m\nmap_Kd -s 2 3 1 -o .5 0 0 a.png\n");
+  const Mesh& mesh = *model.scene.meshes.at(0);
+  ASSERT_EQ(mesh.uvs.size(), 3U);
+  // Up, u goes .5 to 2.5 and v 0 to 3.
+  std::array<float, 4> bounds{9, -9, 9, -9};
+  for (const auto& [u, v] : mesh.uvs) {
+    bounds = {std::min(bounds[0], u), std::max(bounds[1], u), std::min(bounds[2], 1 - v),
+              std::max(bounds[3], 1 - v)};
+  }
+  EXPECT_THAT(bounds, ElementsAre(0.5F, 2.5F, 0, 3));
+  EXPECT_THAT(notes_of(model), testing::IsEmpty());
+  EXPECT_THAT(notes_of(load_obj("newmtl m\nmap_Kd -mm 0 .5 a.png\n")),
+              ElementsAre("material 'm': option -mm of a map is left out"));
+  EXPECT_THAT(notes_of(load_obj("newmtl m\nmap_Kd -mm 0 1 a.png\n")), testing::IsEmpty());
+}
+
+TEST(ModelMaterial, TakesOneNumberForAGrey) {
+  const LoadedModel model = load_obj("newmtl m\nKd 0 0 0\nKe .5\nd .5\n");
+  EXPECT_THAT(parameters_of(model).emission, ElementsAre(0.5F, 0.5F, 0.5F));
+  EXPECT_EQ(parameters_of(model).opacity, 0.5F);
+}
+
+TEST(ModelMaterial, ReadsSeveralLibrariesOfOneLine) {
+  const fs::path folder = made_folder();
+  write(folder / "a.mtl", "newmtl other\nKd 1 0 0");
+  write(folder / "b.mtl", "newmtl m\nKd 0 0.5 0\n");
+  const LoadedModel model =
+      load_model(write(folder / "c.obj", "mtllib a.mtl lost.mtl b.mtl\n" + textured_triangle));
+  EXPECT_THAT(parameters_of(model).base_color, ElementsAre(0, 0.5F, 0));
+  EXPECT_THAT(notes_of(model), ElementsAre("'lost.mtl' is not there"));
+}
+
+TEST(ModelMaterial, NotesMaterialsThatNoLibraryHas) {
+  EXPECT_THAT(notes_of(load_obj("newmtl other\nKd 1 0 0\n")),
+              ElementsAre(AllOf(HasSubstr("material 'm'"), HasSubstr("none of its libraries"))));
+}
+
 TEST(ModelMaterial, CountsTheShininessOfX3dAsAShare) {
   const LoadedModel x3d = load_x3d("<Material shininess=\".5\"/>");
   const LoadedModel obj = load_obj("newmtl m\nNs 64\n");
