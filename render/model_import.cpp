@@ -21,6 +21,7 @@
 #include <string_view>
 #include <utility>
 
+#include "render/fbx_wraps.h"
 #include "render/gltf_check.h"
 #include "render/gltf_mend.h"
 #include "render/join_vertices.h"
@@ -445,6 +446,8 @@ GltfFacts check_first(std::span<const std::byte> bytes, const ModelFormat& forma
   if (format.x3d) facts.notes = left_out_of_x3d(bytes);
   if (format.fbx && hides_by_visibility(bytes))
     facts.notes.emplace_back("what the file hides by its Visibility is shown");
+  if (format.fbx && fbx_clamps(bytes))
+    facts.notes.emplace_back("textures that it clamps at their edges repeat");
   return facts;
 }
 

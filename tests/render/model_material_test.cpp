@@ -193,6 +193,19 @@ TEST(ModelMaterial, SharesATextureOnlyWhereItWrapsAlike) {
   EXPECT_EQ(model.scene.textures.size(), 3U) << "two ways, and one is no colour";
 }
 
+TEST(ModelMaterial, NotesWhatTexturesAskForAndDoNotGet) {
+  const std::string glowing = R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0}})";
+  EXPECT_THAT(notes_of(load_glb(glowing, R"({"magFilter":9728})")),
+              Contains(HasSubstr("nearest texel")));
+  EXPECT_THAT(notes_of(load_glb(glowing, R"({"magFilter":9729})")), testing::IsEmpty());
+  const std::vector<std::pair<std::string, std::string>> textures{{"DiffuseColor", "a.png"}};
+  const auto clamping = [&](const std::string& mode) {
+    return made_fbx("", textures, "P: \"WrapModeU\", \"enum\", \"\", \"\"," + mode + "\n");
+  };
+  EXPECT_THAT(notes_of(load_fbx(clamping("1"))), Contains(HasSubstr("clamps at their edges")));
+  EXPECT_THAT(notes_of(load_fbx(clamping("0"))), testing::IsEmpty());
+}
+
 TEST(ModelMaterial, NotesEveryMapThatIsLeftOut) {
   const LoadedModel glb = load_glb(R"({"name":"m","occlusionTexture":{"index":0},
 "pbrMetallicRoughness":{"baseColorTexture":{"index":1},"metallicRoughnessTexture":{"index":2}}})");
