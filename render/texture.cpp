@@ -175,7 +175,7 @@ float wrapped(float coordinate, Wrap wrap) {
 }
 
 template <int channels, bool repeats>
-std::array<float, channels> sample_levels(
+[[gnu::always_inline]] inline std::array<float, channels> sample_levels(
     const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
   const LightTables& tables = light_tables();
   const float* alpha = tables.unit_of_code.data();
@@ -225,7 +225,7 @@ std::array<float, channels> sample_levels(
 }
 
 template <bool repeats>
-std::array<float, 4> sample_wrapped(
+[[gnu::always_inline]] inline std::array<float, 4> sample_wrapped(
     const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
   switch (texture.channels) {
     case 1: {
@@ -243,6 +243,12 @@ std::array<float, 4> sample_wrapped(
     default:
       return sample_levels<4, repeats>(texture, u, v, footprint, filter);
   }
+}
+
+// Apart, so that textures that repeat pay nothing for the others.
+[[gnu::noinline]] std::array<float, 4> sample_otherwise(
+    const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
+  return sample_wrapped<false>(texture, u, v, footprint, filter);
 }
 
 }  // namespace
@@ -295,9 +301,9 @@ Texture make_texture(int width,
 
 std::array<float, 4> sample(
     const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
-  const bool repeats = texture.wrap == std::array<Wrap, 2>{};
-  return repeats ? sample_wrapped<true>(texture, u, v, footprint, filter)
-                 : sample_wrapped<false>(texture, u, v, footprint, filter);
+  if (texture.wrap != std::array<Wrap, 2>{})
+    return sample_otherwise(texture, u, v, footprint, filter);
+  return sample_wrapped<true>(texture, u, v, footprint, filter);
 }
 
 }  // namespace render
