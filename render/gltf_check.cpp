@@ -21,21 +21,39 @@ constexpr std::uint64_t max_accessor_count = std::uint64_t{192} << 20;
 
 // Required extensions that the import understands.
 constexpr std::array understood_extensions{
-    "KHR_draco_mesh_compression", "KHR_lights_punctual",
-    "KHR_materials_clearcoat",    "KHR_materials_emissive_strength",
-    "KHR_materials_sheen",        "KHR_materials_transmission",
-    "KHR_materials_volume",       "KHR_mesh_quantization",
-    "KHR_texture_transform",      "KHR_materials_ior",
-    "KHR_materials_specular",     "KHR_materials_unlit",
-    "EXT_mesh_gpu_instancing",    "KHR_node_visibility",
+    "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_sheen",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_materials_ior",
+    "KHR_materials_specular",
+    "KHR_materials_unlit",
+    "EXT_mesh_gpu_instancing",
+    "KHR_node_visibility",
+    "KHR_materials_pbrSpecularGlossiness",
 };
 // What is shown, tells nothing of how a model looks, or is told of elsewhere: all else that a model
 // may use without need is left out.
 constexpr std::array quiet_extensions{
-    "EXT_mesh_gpu_instancing", "KHR_animation_pointer",      "KHR_draco_mesh_compression",
-    "KHR_materials_clearcoat", "KHR_materials_ior",          "KHR_materials_sheen",
-    "KHR_materials_volume",    "KHR_materials_transmission", "KHR_mesh_quantization",
-    "KHR_node_visibility",     "KHR_texture_transform",      "KHR_xmp_json_ld",
+    "EXT_mesh_gpu_instancing",
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
+    "KHR_materials_clearcoat",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_volume",
+    "KHR_materials_transmission",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+    "KHR_xmp",
+    "KHR_materials_pbrSpecularGlossiness",
 };
 
 template <std::size_t size>

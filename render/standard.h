@@ -73,8 +73,8 @@ struct StandardSurface {
   Vec3f coat_normal;  // without it: the coat is smooth over a rough ground
   float alpha;        // below alpha_cutoff = hole
   float specular = 1;
-  float facing =
-      1;  // of diffuse light, what the normals within the footprint get beside their mean
+  // Of diffuse light, what the normals within the footprint get beside their mean.
+  float facing = 1;
   float opacity = 1;
 };
 

@@ -29,6 +29,7 @@ double apart_rad(const calibrate::Lens& a, const calibrate::Lens& b, double x, d
 }
 
 TEST(LiveCar, SeesAsItsMadeCamerasDo) {
+  start();
   const Set set = read_set(live_car);
   const render::MadeStudio studio = render::make_studio(
       {.width = 480, .height = 360, .probe_size = 256, .sky_height = 128, .texture_size = 64});
