@@ -216,6 +216,36 @@ std::optional<double> number_after(std::string_view text) {
   return std::nullopt;
 }
 
+// The last number on a line of an ascii FBX file; nothing if there is none.
+std::optional<double> number_that_ends(std::string_view line) {
+  const std::size_t comma = line.rfind(',');
+  if (comma == std::string_view::npos) return std::nullopt;
+  line.remove_prefix(comma + 1);
+  const std::string_view word = take_word(line);
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc{} && end == word.data() + word.size() ? std::optional(value)
+                                                                  : std::nullopt;
+}
+
+// Whether an FBX file, binary or ascii, has a property of that name whose number is as asked.
+template <class Is>
+bool any_fbx_property(std::span<const std::byte> file_bytes, std::string_view name, const Is& is) {
+  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
+  const bool binary = text.starts_with("Kaydara FBX Binary");
+  const std::string word =
+      binary ? std::string{'S', static_cast<char>(name.size()), 0, 0, 0} + std::string(name)
+             : '"' + std::string(name) + '"';
+  for (std::size_t at = text.find(word); at != std::string_view::npos; at = text.find(word, at)) {
+    at += word.size();
+    const std::string_view rest = text.substr(at);
+    const auto number =
+        binary ? number_after(rest) : number_that_ends(rest.substr(0, rest.find('\n')));
+    if (number && is(*number)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<std::string> check_ply(std::span<const std::byte> file_bytes) {
@@ -248,27 +278,13 @@ void check_stl(std::span<const std::byte> file_bytes) {
 }
 
 bool hides_by_visibility(std::span<const std::byte> file_bytes) {
-  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
-  using namespace std::string_view_literals;
-  const bool binary = text.starts_with("Kaydara FBX Binary");
-  const std::string_view name = binary ? "S\x0a\0\0\0Visibility"sv : "\"Visibility\""sv;
-  for (std::size_t at = text.find(name); at != std::string_view::npos;) {
-    std::string_view rest = text.substr(at + name.size());
-    at = text.find(name, at + name.size());
-    if (binary) {
-      if (number_after(rest) == 0.0) return true;
-      continue;
-    }
-    rest = rest.substr(0, rest.find('\n'));
-    const std::size_t comma = rest.rfind(',');
-    if (comma == std::string_view::npos) continue;
-    rest.remove_prefix(comma + 1);
-    const std::string_view word = take_word(rest);
-    double value = 1;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error == std::errc{} && end == word.data() + word.size() && value == 0) return true;
-  }
-  return false;
+  return any_fbx_property(file_bytes, "Visibility", [](double value) { return value == 0; });
+}
+
+bool fbx_clamps(std::span<const std::byte> file_bytes) {
+  const auto is_set = [](double value) { return value != 0; };
+  return any_fbx_property(file_bytes, "WrapModeU", is_set) ||
+         any_fbx_property(file_bytes, "WrapModeV", is_set);
 }
 
 }  // namespace render

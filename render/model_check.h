@@ -22,4 +22,7 @@ void check_stl(std::span<const std::byte> file_bytes);
 // tell. Anything may stand in the file.
 bool hides_by_visibility(std::span<const std::byte> file_bytes);
 
+// Whether it has textures that are clamped to the sides or up and down, which assimp does not tell.
+bool fbx_clamps(std::span<const std::byte> file_bytes);
+
 }  // namespace render

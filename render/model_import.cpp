@@ -21,7 +21,6 @@
 #include <string_view>
 #include <utility>
 
-#include "render/fbx_wraps.h"
 #include "render/gltf_check.h"
 #include "render/gltf_mend.h"
 #include "render/join_vertices.h"

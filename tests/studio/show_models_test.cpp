@@ -50,16 +50,20 @@ TEST_F(ShowModels, GoesOnWhenAModelCrashesItsReader) {
   EXPECT_THAT(show.status()->notes, Contains(AllOf(HasSubstr("lost.png"), HasSubstr("magenta"))));
 }
 
+// A folder of helper programs in which the models' reader is a shell script.
+void make_helpers(const std::filesystem::path& helpers, const std::string& script) {
+  std::filesystem::create_directory(helpers);
+  std::filesystem::create_symlink(capture::helper_path("platelight-decode"),
+                                  helpers / "platelight-decode");
+  std::ofstream(helpers / "platelight-model") << "#!/bin/sh\n" << script << "\n";
+  std::filesystem::permissions(helpers / "platelight-model", std::filesystem::perms::owner_all);
+}
+
 TEST_F(ShowModels, GoesOnLiveWhileAModelIsRead) {
   if (std::getenv("PLATELIGHT_HELPERS") != nullptr) GTEST_SKIP() << "the helpers are elsewhere";
   // In the place of the models' reader, one that waits for the show's fifth frame, and fails.
   const std::filesystem::path helpers = dir_ / "helpers", fifth = dir_ / "fifth";
-  std::filesystem::create_directory(helpers);
-  std::filesystem::create_symlink(capture::helper_path("platelight-decode"),
-                                  helpers / "platelight-decode");
-  std::ofstream(helpers / "platelight-model")
-      << "#!/bin/sh\nwhile [ ! -e " << fifth.string() << " ]; do sleep 0.01; done\n";
-  std::filesystem::permissions(helpers / "platelight-model", std::filesystem::perms::owner_all);
+  make_helpers(helpers, "while [ ! -e " + fifth.string() + " ]; do sleep 0.01; done");
   Set changed = made_set("grey:100000,25,0");
   ShowOptions options;
   options.live = true;
@@ -87,12 +91,7 @@ TEST_F(ShowModels, GivesUpAModelThatIsBeingReadWhenItEnds) {
   // In the place of the models' reader, one that takes its time, and says that it was let.
   const std::filesystem::path helpers = dir_ / "helpers", begun = dir_ / "begun",
                               done = dir_ / "done";
-  std::filesystem::create_directory(helpers);
-  std::filesystem::create_symlink(capture::helper_path("platelight-decode"),
-                                  helpers / "platelight-decode");
-  std::ofstream(helpers / "platelight-model")
-      << "#!/bin/sh\n: > " << begun.string() << "\nsleep 5\n: > " << done.string() << "\n";
-  std::filesystem::permissions(helpers / "platelight-model", std::filesystem::perms::owner_all);
+  make_helpers(helpers, ": > " + begun.string() + "\nsleep 5\n: > " + done.string());
   Set changed = made_set("grey:100000,25,0");
   ShowOptions options;
   options.live = true;
