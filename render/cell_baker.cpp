@@ -17,12 +17,6 @@
 namespace render {
 namespace {
 
-void clear_answer(ShadePoint& p) {
-  p.radiance = p.diffuse = p.light_normal = p.plate_share = p.environment_share = {};
-  p.catches_shadow = p.catches_lamps = false;
-  p.video = {};
-}
-
 // Whether the table's light matters to a point.
 bool receives_light(const ShadePoint& p) {
   return p.diffuse != Vec3f{} || p.catches_shadow || p.catches_lamps;
@@ -90,6 +84,7 @@ void CellBaker::bake(const FrameContext& frame,
   is_first_.fill(0);
   sent_.fill(0);
   looked_up_.direction = {};
+  see_foreground();
   trace_centres();
   const bool finds_edges = effort_.aa_samples > 1;
   if (finds_edges) keep_centres();
@@ -108,7 +103,14 @@ void CellBaker::bake(const FrameContext& frame,
       statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays - rays_before;
 }
 
-void CellBaker::trace(int count, bool coherent, RayKind kind, float cone_rad) {
+void CellBaker::clear_answer(ShadePoint& p) {
+  p.radiance = p.diffuse = p.light_normal = p.plate_share = p.environment_share = {};
+  p.catches_shadow = p.catches_lamps = false;
+  p.video = {};
+}
+
+void CellBaker::trace(
+    int count, bool coherent, RayKind kind, float cone_rad, LivePictures pictures) {
   RayStream& s = stream_;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     s.far_m[i] = s.mask[i] ? ray_far : -1.0F;
@@ -125,6 +127,7 @@ void CellBaker::trace(int count, bool coherent, RayKind kind, float cone_rad) {
   }
   TraceContext context(*frame_->inputs.scene, kind, coherent);
   context.cone_rad = cone_rad;
+  context.past_pictures = pictures == LivePictures::passed;
   RTCRayHitNp rays;
   rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
               s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
@@ -170,19 +173,21 @@ void CellBaker::turn_camera_rays(int count) {
 
 void CellBaker::trace_centres() {
   const auto& table = *frame_->inputs.directions;
+  const bool has_foreground = !transport_->foreground.empty();
   inside_ = {};
   // 4x4 blocks one after the other: coherent for Embree, and each stream is exactly one cell.
   for (int i = 0; i < cell_pixels; ++i) {
     const auto [x, y] = pixel_of_ray(i);
     const bool in = transport_->blocks.has_ray(x, y);
-    if (in) {
+    const bool sees = in && !(has_foreground && is_behind_foreground(x, y));
+    if (sees) {
       const std::size_t t = table.index(y0_ + y, x0_ + x);
       set_camera_ray(i, {table.x[t], table.y[t], table.z[t]});
-      inside_[static_cast<std::size_t>(y / 4)] |= std::uint64_t{1} << ((y & 3) * 16 + x);
     } else {
       set_camera_ray(i, {});
     }
-    statistics_->primary_rays += in;
+    if (in) inside_[static_cast<std::size_t>(y / 4)] |= std::uint64_t{1} << ((y & 3) * 16 + x);
+    statistics_->primary_rays += sees;
   }
   turn_camera_rays(cell_pixels);
   for (int i = 0; counting_ && i < cell_pixels; ++i) {
@@ -190,7 +195,8 @@ void CellBaker::trace_centres() {
     const auto [x, y] = pixel_of_ray(i);
     ++counting_[static_cast<std::size_t>(y * cell_size + x)].rays;
   }
-  trace(cell_pixels, true, RayKind::camera, frame_->pixel_angle * static_cast<float>(block_));
+  trace(cell_pixels, true, RayKind::camera, frame_->pixel_angle * static_cast<float>(block_),
+        has_foreground ? LivePictures::passed : LivePictures::met);
 }
 
 void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::uint32_t slot) {
@@ -233,24 +239,6 @@ void CellBaker::set_camera_cone(ShadePoint& p, int index, float pixels) const {
                                       y0_ + static_cast<int>(p.pixel) / cell_size);
   const float far_m = stream_.far_m[static_cast<std::size_t>(index)];
   arrive(p, {}, {frame_->turn.to_set(right) * pixels, frame_->turn.to_set(down) * pixels}, far_m);
-}
-
-// Calls `call` with each shader and its points, in the order in which shaders first appear.
-template <class F>
-void CellBaker::for_each_shader(int count, F&& call) {
-  const Scene& scene = *frame_->inputs.scene;
-  std::fill_n(done_.begin(), count, std::uint8_t{0});
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-    if (done_[i]) continue;
-    const Shader& shader = scene.shader_of(points_[i].hit.material);
-    std::size_t n = 0;
-    for (std::size_t j = i; j < static_cast<std::size_t>(count); ++j) {
-      if (done_[j] || &scene.shader_of(points_[j].hit.material) != &shader) continue;
-      done_[j] = 1;
-      group_[n++] = &points_[j];
-    }
-    call(shader, std::span<ShadePoint* const>(group_.data(), n));
-  }
 }
 
 // Answers, then light, at the first `count` points; in a grid each is its pixel's centre.

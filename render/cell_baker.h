@@ -12,6 +12,7 @@
 #include "render/kernel.h"
 #include "render/sample_sequence.h"
 #include "render/standard.h"
+#include "render/trace.h"
 
 namespace render {
 
@@ -175,7 +176,12 @@ class CellBaker final : public RaySink {
   }
 
   // cell_baker.cpp
-  void trace(int count, bool coherent, RayKind kind, float cone_rad);
+  static void clear_answer(ShadePoint& p);
+  void trace(int count,
+             bool coherent,
+             RayKind kind,
+             float cone_rad,
+             LivePictures pictures = LivePictures::met);
   void set_camera_ray(int i, Vec3f v_cam);
   void turn_camera_rays(int count);
   void set_point(ShadePoint& p, int i, std::uint32_t pixel, std::uint32_t slot);
@@ -195,6 +201,15 @@ class CellBaker final : public RaySink {
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_shared(const ShadePoint& p, std::size_t centre);
   void collect(const ShadePoint& p);
+
+  // cell_foreground.cpp
+  bool may_see_pictures() const;
+  void set_rays_of_all_pixels();
+  int meet_pictures(std::span<const float, cell_pixels> came_m,
+                    std::span<const Vec3f, cell_pixels> left,
+                    std::span<int, cell_pixels> ray_of_point);
+  void see_foreground();
+  bool is_behind_foreground(int x, int y) const;
 
   // cell_bounce.cpp
   void mark_passed(std::size_t count);
@@ -429,5 +444,23 @@ class CellBaker final : public RaySink {
   int block_ = 1;      // pixels a side that share a camera ray
   CellMask inside_{};  // pixels that have one
 };
+
+// Calls `call` with each shader and its points, in the order in which shaders first appear.
+template <class F>
+void CellBaker::for_each_shader(int count, F&& call) {
+  const Scene& scene = *frame_->inputs.scene;
+  std::fill_n(done_.begin(), count, std::uint8_t{0});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    if (done_[i]) continue;
+    const Shader& shader = scene.shader_of(points_[i].hit.material);
+    std::size_t n = 0;
+    for (std::size_t j = i; j < static_cast<std::size_t>(count); ++j) {
+      if (done_[j] || &scene.shader_of(points_[j].hit.material) != &shader) continue;
+      done_[j] = 1;
+      group_[n++] = &points_[j];
+    }
+    call(shader, std::span<ShadePoint* const>(group_.data(), n));
+  }
+}
 
 }  // namespace render

@@ -82,7 +82,8 @@ void CellBaker::pack() {
   pack_bases();
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
   t.empty = t.receiving == CellMask{} && t.mirrored.empty() && places_.empty() &&
-            t.lights.empty() && t.bent.empty() && t.video.empty() && lamp_terms_.empty();
+            t.lights.empty() && t.bent.empty() && t.video.empty() && lamp_terms_.empty() &&
+            t.foreground.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;

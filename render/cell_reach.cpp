@@ -142,31 +142,44 @@ void SpaceGrid::mark_bounds(const Scene::Bounds& bounds, Mask& mask) const {
   }
 }
 
-std::vector<CellCone> cell_cones(const calibrate::DirectionTable& table, const CameraTurn& turn) {
+CellCone cell_cone(const calibrate::DirectionTable& table, const CameraTurn& turn, int x0, int y0) {
   const auto direction_at = [&](int x, int y) {
     const std::size_t t =
         table.index(std::clamp(y, 0, table.height - 1), std::clamp(x, 0, table.width - 1));
     return normalize(turn.to_set(Vec3f{table.x[t], table.y[t], table.z[t]}));
   };
+  CellCone cone;
+  cone.axis = direction_at(x0 + cell_size / 2, y0 + cell_size / 2);
+  float cosine = 1;
+  for (int y = y0 - 2; y <= y0 + cell_size + 1; ++y) {
+    for (int x = x0 - 2; x <= x0 + cell_size + 1; ++x) {
+      cosine = std::min(cosine, dot(cone.axis, direction_at(x, y)));
+    }
+  }
+  // Where the lens sees nothing there is no direction: then any may be.
+  if (dot(cone.axis, cone.axis) > 0.5F && cosine > 0) {
+    cone.half_rad = std::acos(std::min(cosine, 1.0F)) + 1e-3F;
+  }
+  return cone;
+}
+
+std::vector<CellCone> cell_cones(const calibrate::DirectionTable& table, const CameraTurn& turn) {
   std::vector<CellCone> cones;
   for (int y0 = 0; y0 < table.height; y0 += cell_size) {
     for (int x0 = 0; x0 < table.width; x0 += cell_size) {
-      CellCone cone;
-      cone.axis = direction_at(x0 + cell_size / 2, y0 + cell_size / 2);
-      float cosine = 1;
-      for (int y = y0 - 2; y <= y0 + cell_size + 1; ++y) {
-        for (int x = x0 - 2; x <= x0 + cell_size + 1; ++x) {
-          cosine = std::min(cosine, dot(cone.axis, direction_at(x, y)));
-        }
-      }
-      // Where the lens sees nothing there is no direction: then any may be.
-      if (dot(cone.axis, cone.axis) > 0.5F && cosine > 0) {
-        cone.half_rad = std::acos(std::min(cosine, 1.0F)) + 1e-3F;
-      }
-      cones.push_back(cone);
+      cones.push_back(cell_cone(table, turn, x0, y0));
     }
   }
   return cones;
+}
+
+// No ray of the cone is further from its axis, at what is there, than the box is grown by.
+bool may_be_seen(const CellCone& cone, Vec3f camera, const Scene::Bounds& bounds) {
+  constexpr float wide_rad = 1;  // from here on any may be
+  if (!(cone.half_rad < wide_rad)) return true;
+  const float farthest = length(middle(bounds) - camera) + length(half_size(bounds));
+  const float aside = std::tan(cone.half_rad + 1e-3F) * farthest;
+  return meets(grown(bounds, {aside, aside, aside}), camera, cone.axis, infinite);
 }
 
 MovedThings::MovedThings(std::vector<Scene::Bounds> where,
@@ -203,15 +216,9 @@ bool MovedThings::may_shade(const Scene::Bounds& receivers) const {
   });
 }
 
-// No ray of the cone is further from its axis, at what moved, than the box is grown by.
 bool MovedThings::may_be_seen(const CellCone& cone, Vec3f camera) const {
-  constexpr float wide_rad = 1;  // from here on any may be
-  if (!(cone.half_rad < wide_rad)) return true;
-  const float per_metre = std::tan(cone.half_rad + 1e-3F);
   return std::ranges::any_of(where_, [&](const Scene::Bounds& bounds) {
-    const float farthest = length(middle(bounds) - camera) + length(half_size(bounds));
-    const float aside = per_metre * farthest;
-    return meets(grown(bounds, {aside, aside, aside}), camera, cone.axis, infinite);
+    return render::may_be_seen(cone, camera, bounds);
   });
 }
 

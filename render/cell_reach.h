@@ -61,8 +61,15 @@ struct CellCone {
   Vec3f axis;           // unit, in the set's frame
   float half_rad = 10;  // more than a half turn: any direction
 };
+// Of the cell whose top-left pixel is (x0, y0), and of all cells, row by row.
+CellCone cell_cone(const calibrate::DirectionTable& directions,
+                   const CameraTurn& turn,
+                   int x0,
+                   int y0);
 std::vector<CellCone> cell_cones(const calibrate::DirectionTable& directions,
                                  const CameraTurn& turn);
+// Whether any of these rays may meet what fills those bounds. Never says no where it is yes.
+bool may_be_seen(const CellCone& cone, Vec3f camera, const Scene::Bounds& bounds);
 
 // Whether what moved may have changed what a cell's rays met: things that filled `where`, before
 // or after. Never says no where it is yes.

@@ -187,6 +187,15 @@ void fill_blocks(const CellTransport::Blocks& blocks, CellPicture& picture) {
   }
 }
 
+void show_foreground(const CellTransport::Foreground& foreground, CellPicture& picture) {
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const Four passed = foreground.passed[k];
+    picture.added[k] = foreground.radiance[k] + passed * picture.added[k];
+    picture.share[k] *= passed;
+    picture.seen[k] *= passed[3];
+  }
+}
+
 }  // namespace
 
 Vec3f plate_at(const capture::Image& level, float x, float y) {
@@ -206,6 +215,7 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
 void CellTransport::clear() {
   empty = true;
   blocks = {};
+  foreground.clear();
   bases.clear();
   centres.assign(1, Centres{});
   receiving = mirrored_receiving = {};
@@ -226,7 +236,7 @@ std::size_t CellTransport::bytes() const {
     return of(v.lit) + of(v.seen) + of(v.tints) + of(v.near) + of(v.windows);
   };
   return sizeof *this + of_sight(visibility) + of_sight(mirrored_visibility) + of(mirrored) +
-         of(bases) + of(centres) + of(shared) + of(lights) + environment.bytes() +
+         of(foreground) + of(bases) + of(centres) + of(shared) + of(lights) + environment.bytes() +
          of(shadow_points) + of(shadow_lights) + of(lamps.numbers) + of(lamps.factors) +
          of(lamps.tints) + of(lamp_terms) + of(catchers) + of(caught) + of(bent) +
          of(bent_caustics) + of(video) + of(borrowed) + of(further) + of(counts);
@@ -298,6 +308,7 @@ void relight(const CellTransport& cell,
     picture.seen[k] = picture.seen[from] / n;
   }
   if (cell.blocks.size > 1) fill_blocks(cell.blocks, picture);
+  if (!cell.foreground.empty()) show_foreground(cell.foreground.front(), picture);
 }
 
 }  // namespace render

@@ -119,6 +119,12 @@ struct CellTransport {
     Base base;
   };
 
+  // Live pictures before what blocks share, each pixel's own: it shows their radiance, and `passed`
+  // of the block's. The last of the four is 0, and the mean.
+  struct Foreground {
+    std::array<Four, cell_pixels> radiance, passed;
+  };
+
   // Pixels that share a camera ray.
   struct Blocks {
     int size = 1;                               // pixels a side
@@ -133,7 +139,8 @@ struct CellTransport {
 
   bool empty = true;  // nothing but plate
   Blocks blocks;
-  std::vector<Base> bases;  // most cells have one or two of them
+  std::vector<Foreground> foreground;  // one, or none; of blocks alone
+  std::vector<Base> bases;             // most cells have one or two of them
   std::array<std::uint8_t, cell_pixels> base_of{};
   std::vector<Centres> centres;  // one; or none, where no centre receives light
   CellMask receiving{};
