@@ -20,6 +20,7 @@ namespace studio {
 namespace {
 
 constexpr std::size_t longest_cycle = 16;  // exposures of a bracket
+constexpr std::size_t at_once = 16;        // frames that are held together
 constexpr std::size_t most_untold = 4;     // pictures without an exposure, for one to be waited for
 constexpr double same_exposure = 0.02;     // relative
 constexpr capture::Time bracket_patience = std::chrono::seconds(5);  // for a live camera's first
@@ -244,7 +245,7 @@ capture::Frame ProbeSource::wait_for_next() {
   if (camera_->is_live()) camera_->wait_for_newer(capture::monotonic_now() + next_patience);
   const std::optional<capture::Time> time = camera_->next_time();
   if (!time) return {};
-  return camera_->advance(*time).front();
+  return camera_->advance(*time, 1).front();
 }
 
 // The first cycle is taken at once, so that no frame is lit by half a bracket. It ends with an
@@ -285,20 +286,30 @@ void ProbeSource::prime() {
     single_ = {};
     newest_ = {};
     auto next = read.begin();
-    while (next != read.end() && newest_.image == nullptr) take({*next++});
+    while (next != read.end() && newest_.image == nullptr) {
+      Taken taken;
+      take(*next++, taken);
+      show(taken);
+    }
     ahead_.assign(next, read.end());
   }
   note_camera();
 }
 
 // What came by then, after those that were read ahead.
-std::vector<capture::Frame> ProbeSource::frames_until(capture::Time time) {
+void ProbeSource::take_until(capture::Time time) {
+  note_camera();
+  Taken taken;
   const auto due = std::ranges::find_if(
       ahead_, [&](const capture::Frame& frame) { return frame.time > time + camera_->early(); });
-  std::vector<capture::Frame> frames(ahead_.begin(), due);
+  for (auto frame = ahead_.begin(); frame != due; ++frame) take(*frame, taken);
   ahead_.erase(ahead_.begin(), due);
-  if (ahead_.empty()) std::ranges::move(camera_->advance(time), std::back_inserter(frames));
-  return frames;
+  while (ahead_.empty()) {
+    const std::vector<capture::Frame> frames = camera_->advance(time, at_once);
+    if (frames.empty()) break;
+    for (const capture::Frame& frame : frames) take(frame, taken);
+  }
+  show(taken);
 }
 
 // Waits for a whole bracket, or what comes of it in time.
@@ -308,9 +319,12 @@ void ProbeSource::prime_live(std::size_t cycle) {
   std::string why = camera_->first().note;
   while (bracket_->shots() < cycle && capture::monotonic_now() < end) {
     camera_->wait_for_newer(end);
-    const std::vector<capture::Frame> frames = camera_->advance(capture::Time::max());
+    const std::vector<capture::Frame> frames = camera_->advance(capture::Time::max(), at_once);
     if (frames.empty()) break;
-    take(frames);
+    note_camera();
+    Taken taken;
+    for (const capture::Frame& frame : frames) take(frame, taken);
+    show(taken);
     // Exposures that follow the light may have become fewer.
     cycle = std::min(cycle, status_.exposures_s.size());
     if (!frames.back().note.empty()) why = frames.back().note;
@@ -385,18 +399,19 @@ void ProbeSource::note_camera() {
   status_.too_dark = camera.too_dark;
 }
 
-void ProbeSource::take(const std::vector<capture::Frame>& frames) {
-  note_camera();
-  std::optional<capture::Time> fresh;
-  for (const capture::Frame& frame : frames) {
-    if (add(frame)) fresh = frame.time;
-  }
-  if (fresh && bracket_) {
-    merge(*fresh);
-  } else if (fresh) {
+void ProbeSource::take(const capture::Frame& frame, Taken& taken) {
+  if (add(frame)) taken.fresh = frame.time;
+  taken.any = true;
+  taken.last_note = frame.note;
+}
+
+void ProbeSource::show(const Taken& taken) {
+  if (taken.fresh && bracket_) {
+    merge(*taken.fresh);
+  } else if (taken.fresh) {
     status_.kept_because.clear();
-  } else if (!frames.empty()) {
-    const std::string& why = frames.back().note;
+  } else if (taken.any) {
+    const std::string& why = taken.last_note;
     status_.kept_because = "the probe's last shot told nothing" + (why.empty() ? "" : ": " + why);
   }
 }
@@ -406,7 +421,7 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time, bool on_clock) {
     const bool by_itself = camera_->is_live() && !on_clock;
     const capture::Time on_its_clock =
         by_itself ? capture::monotonic_now() : time + offset_ - passed_;
-    take(frames_until(on_its_clock));
+    take_until(on_its_clock);
     if (ahead_.empty() && camera_->has_ended(on_its_clock))
       status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;

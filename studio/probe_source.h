@@ -71,11 +71,18 @@ class ProbeSource {
   void open(const Set& set, std::optional<capture::Time> from);
   void open_camera(const Set& set, const ProbeSettings& probe, std::optional<capture::Time> from);
   void prime();
-  std::vector<capture::Frame> frames_until(capture::Time time);
+  // What frames tell that are taken together.
+  struct Taken {
+    bool any = false;
+    std::optional<capture::Time> fresh;  // of the newest that tells new light
+    std::string last_note;
+  };
   void prime_live(std::size_t cycle);
   void note_camera();
   capture::Frame wait_for_next();
-  void take(const std::vector<capture::Frame>& frames);
+  void take(const capture::Frame& frame, Taken& taken);
+  void take_until(capture::Time time);
+  void show(const Taken& taken);
   bool tells_exposure(const capture::Frame& frame) const;
   bool add(const capture::Frame& frame);
   void merge(capture::Time time);

@@ -17,7 +17,8 @@ constexpr capture::Time of_rounding = 1us;    // a file's frame is due so much b
 
 }  // namespace
 
-Source::Source(std::unique_ptr<capture::Camera> camera) : camera_(std::move(camera)) {
+Source::Source(std::unique_ptr<capture::Camera> camera, bool with_sound)
+    : camera_(std::move(camera)), with_sound_(with_sound) {
   const capture::Rational rate = camera_->info().rate;
   if (rate.num > 0) period_ = capture::time_of_frame(1, rate);
   if (camera_->info().live) {
@@ -48,6 +49,7 @@ capture::CameraStatistics Source::statistics() const {
 
 void Source::read_ahead() {
   if (auto frame = camera_->next()) next_.push_back({std::move(*frame), {}});
+  if (!with_sound_) return;
   if (auto sound = camera_->take_sound()) sound_.push_back(std::move(*sound));
 }
 
@@ -57,21 +59,27 @@ void Source::fetch(capture::Time until) {
   while (next_.size() > most_waiting) next_.pop_front();
 }
 
-std::vector<capture::Frame> Source::advance(capture::Time time) {
+// Goes on to the next frame, if that is due by then.
+bool Source::step(capture::Time time) {
+  if (next_.empty() || next_.front().frame.time > time + early()) return false;
+  period_ = std::max(next_.front().frame.time - current_.frame.time, capture::Time{1});
+  current_ = std::move(next_.front());
+  next_.pop_front();
+  if (!live_) read_ahead();
+  return true;
+}
+
+std::vector<capture::Frame> Source::advance(capture::Time time, std::size_t most) {
   if (live_) fetch({});
   std::vector<capture::Frame> passed;
-  while (!next_.empty() && next_.front().frame.time <= time + early()) {
-    period_ = std::max(next_.front().frame.time - current_.frame.time, capture::Time{1});
-    current_ = std::move(next_.front());
-    next_.pop_front();
-    passed.push_back(current_.frame);
-    if (!live_) read_ahead();
-  }
+  while (passed.size() < most && step(time)) passed.push_back(current_.frame);
   return passed;
 }
 
 std::optional<capture::Frame> Source::at(capture::Time time) {
-  static_cast<void>(advance(time));
+  if (live_) fetch({});
+  while (step(time)) {
+  }
   if (has_ended(time)) return std::nullopt;
   return current_.frame;
 }

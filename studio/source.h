@@ -17,8 +17,9 @@ namespace studio {
 // A live camera is read on a thread of its own: only what has come counts, and nobody waits.
 class Source {
  public:
-  // Reads the first frame. Throws std::runtime_error if there is none.
-  explicit Source(std::unique_ptr<capture::Camera> camera);
+  // Reads the first frame. Throws std::runtime_error if there is none. Its sound is kept only where
+  // somebody takes it: `with_sound`.
+  explicit Source(std::unique_ptr<capture::Camera> camera, bool with_sound = false);
 
   const capture::CameraInfo& info() const;
   capture::CameraStatistics statistics() const;
@@ -32,8 +33,9 @@ class Source {
   // ahead, so that the next call finds it decoded.
   std::optional<capture::Frame> at(capture::Time time);
 
-  // Every frame since the last call, or the last at(), up to and including those of this time.
-  std::vector<capture::Frame> advance(capture::Time time);
+  // Every frame since the last call, or the last at(), up to and including those of this time, but
+  // no more than `most`: then there are others. A show that was held up may be late by thousands.
+  std::vector<capture::Frame> advance(capture::Time time, std::size_t most);
   // The frame that at() or advance() came to last, though the source has ended.
   const capture::Frame& current() const { return current_.frame; }
   // Whether it has no more frames, and its last was due for longer than a frame lasts.
@@ -57,6 +59,7 @@ class Source {
 
  private:
   void read_ahead();
+  bool step(capture::Time time);
   void fetch(capture::Time until);
   const capture::Frame& newest() const;
 
@@ -67,6 +70,7 @@ class Source {
   std::deque<capture::Arrival> next_;  // a file's next frame; all that have come of a live one
   capture::Time period_{};             // between the last two frames
   bool still_ = false;
+  bool with_sound_;
   std::vector<capture::Sound> sound_;
 };
 

@@ -63,6 +63,38 @@ TEST(Source, GivesEveryFrameOnceWhicheverItBeginsWith) {
   }
 }
 
+// Tells how many of its pictures there are at once.
+class CountedCamera final : public GreyCamera {
+ public:
+  explicit CountedCamera(std::size_t& most) : GreyCamera(100'000, {25, 1}, 0), most_(most) {}
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    pictures_.push_back(frame->image);
+    std::erase_if(pictures_, [](const auto& picture) { return picture.expired(); });
+    most_ = std::max(most_, pictures_.size());
+    return frame;
+  }
+
+ private:
+  std::size_t& most_;
+  std::vector<std::weak_ptr<const capture::Image>> pictures_;
+};
+
+// As after a machine's sleep.
+TEST(Source, HoldsFewOfTheFramesThatAShowIsLateBy) {
+  std::size_t most = 0;
+  Source source(std::make_unique<CountedCamera>(most));
+  EXPECT_EQ(source.at(100s)->number, 2500);
+  EXPECT_LE(most, 5U);
+  int frames = 0;
+  for (std::size_t some = 16; some == 16; frames += static_cast<int>(some)) {
+    some = source.advance(200s, 16).size();
+  }
+  EXPECT_EQ(frames, 2500);
+  EXPECT_EQ(source.current().number, 5000);
+  EXPECT_LE(most, 20U);
+}
+
 TEST(Source, EndsWhenItsLastFrameHasBeenShownForAsLongAsTheOthers) {
   Source source = grey_source(3, 10);
   EXPECT_EQ(source.at(299ms)->number, 2);
@@ -129,7 +161,7 @@ TEST(Source, KeepsTheNewestLiveFramesWhileNobodyAsks) {
   std::vector<capture::Frame> came;
   while (came.empty() || came.back().number < 59) {
     std::this_thread::sleep_for(100ms);
-    for (capture::Frame& frame : source.advance(capture::Time::max())) came.push_back(frame);
+    for (capture::Frame& frame : source.advance(capture::Time::max(), 60)) came.push_back(frame);
   }
   EXPECT_TRUE(std::ranges::is_sorted(came, {}, &capture::Frame::number));
   EXPECT_FALSE(source.at(capture::Time::max())) << "it has ended";
@@ -158,8 +190,15 @@ class HummingCamera final : public GreyCamera {
   std::optional<capture::Time> heard_;
 };
 
-TEST(Source, ReadsTheSoundOfFramesThatAShowPassesOver) {
+// For hours of a person's video nobody does.
+TEST(Source, KeepsNoSoundThatNobodyTakes) {
   Source source(std::make_unique<HummingCamera>(25));
+  EXPECT_TRUE(source.at(800ms));
+  EXPECT_TRUE(source.take_sound().empty());
+}
+
+TEST(Source, ReadsTheSoundOfFramesThatAShowPassesOver) {
+  Source source(std::make_unique<HummingCamera>(25), true);
   std::size_t samples = 0;
   for (int frame = 0; frame < 5; ++frame) {  // at five frames a second
     ASSERT_TRUE(source.at(frame * 200ms));
