@@ -370,6 +370,7 @@ void CellBaker::clear_receivers() {
   Receivers& r = receivers_;
   r.active = r.by_lamps = r.by_caustics = {};
   r.count = 0;
+  r.surfaces.clear();
   r.real_first.fill(0);
 }
 
@@ -385,7 +386,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   const bool real = instance.kind == ObjectKind::stand_in;
   r.mask[k] = real ? mask_virtual : mask_virtual | mask_real_blocker;
   r.real_first[k] = real;
-  r.surface[k] = p.hit.instance * 4096 + p.hit.material;
+  r.surface[k] = r.surfaces.of({p.hit.instance, p.hit.material});
   // Further samples of an edge pixel share its weight.
   const float further_share = 1 / static_cast<float>(effort_.aa_samples);
   r.share[k] = largest(p.throughput) * (is_further(p.slot) ? further_share : 1.0F);

@@ -16,6 +16,24 @@ namespace render {
 
 inline constexpr int stream_rays = 256;  // rays that go to Embree at once
 
+// Numbers the surfaces of a few points, in the order in which they first appear.
+class SurfaceNumbers {
+ public:
+  void clear() { count_ = 0; }
+  // At most cell_pixels different ones. Neighbours mostly show the one that came last.
+  std::uint32_t of(Scene::Surface surface) {
+    for (std::uint32_t n = count_; n-- > 0;) {
+      if (seen_[n] == surface) return n;
+    }
+    seen_[count_] = surface;
+    return count_++;
+  }
+
+ private:
+  std::array<Scene::Surface, cell_pixels> seen_;
+  std::uint32_t count_ = 0;
+};
+
 // Up to 256 points that receive light, as structure of arrays. In a grid, entry y * 16 + x is the
 // pixel (x, y) of a cell, and idle entries are those without a receiver.
 struct Receivers {
@@ -23,7 +41,9 @@ struct Receivers {
   alignas(64) std::array<float, cell_pixels> nx, ny, nz;  // shading normal
   alignas(64) std::array<float, cell_pixels> gx, gy, gz;  // geometric normal
   LightSums light;                                        // out
-  std::array<std::uint32_t, cell_pixels> surface;         // same number = same object and material
+  // Same number = same object and material; below 256.
+  std::array<std::uint32_t, cell_pixels> surface;
+  SurfaceNumbers surfaces;
   std::array<std::uint32_t, cell_pixels> mask;  // what blocks: mask_virtual, mask_real_blocker
   std::array<std::uint8_t, cell_pixels>
       real_first;  // light that real things block does not count as open

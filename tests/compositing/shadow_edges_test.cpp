@@ -53,6 +53,44 @@ TEST(RenderFrame, CastsTheSunsShadowAcrossTheBordersOfCells) {
   }
 }
 
+// A step above a floor, of one look, but each of its own of very many materials; seen from above
+// under a sun that shines aslant.
+MadeShot stepped_floor(std::uint32_t floor, std::uint32_t step) {
+  register_shaders();
+  render::SceneDescription scene;
+  scene.background = "environment";
+  render::StandardParameters dull;
+  dull.roughness = 1;
+  dull.specular = 0;
+  scene.materials.assign(4097, render::make_standard_material("dull", dull));
+  auto high = std::make_shared<render::Mesh>();
+  high->positions = {{0.03F, -1, 0.2F}, {1, -1, 0.2F}, {1, 1, 0.2F}, {-0.05F, 1, 0.2F}};
+  high->triangles = {{0, 1, 2}, {0, 2, 3}};
+  high->materials = {step};
+  scene.meshes = {made_floor(1, floor), std::move(high)};
+  scene.instances.resize(2);
+  scene.instances[1].mesh = 1;
+  MadeShot shot = made_shot(64, 64, std::move(scene));
+  shot.directions = calibrate::make_direction_table({"pinhole", 64, 64, {1000, 1000, 31.5, 31.5}});
+  shot.job.cam_from_set = calibrate::look_at({0, 0, 10}, {0, 0, 0}, 0);
+  shot.job.lights.lights = {{normalize(render::Vec3f{1, 0.2F, 2}), {3, 3, 3}, 0.01F, 1}};
+  shot.job.effort.interleave = 4;
+  return shot;
+}
+
+TEST(RenderFrame, KeepsSurfacesApartHoweverManyMaterialsThereAre) {
+  const MadeShot few = stepped_floor(0, 1), many = stepped_floor(4096, 0);
+  render::FrameResult with_few, with_many;
+  render_frame(few.inputs(), few.job, few.plate, with_few);
+  render_frame(many.inputs(), many.job, many.plate, with_many);
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < with_few.rgba.pixels.size(); i += 4) {
+    differ += with_few.rgba.pixels[i] != with_many.rgba.pixels[i];
+  }
+  EXPECT_EQ(differ, 0U);
+  EXPECT_EQ(with_few.statistics, with_many.statistics);
+}
+
 // A mirror, in which the edge of a bright wall behind the camera lies at `column` of the picture,
 // or at such a row.
 MadeShot mirrored_edge(float place, bool upright) {
