@@ -106,7 +106,6 @@ struct MadeGigeCamera::Device {
   gige::UdpSocket discovery_socket;
   std::thread thread;
   std::atomic<bool> stopping{false};
-  std::atomic<bool> ignores_exposures{false};
   std::atomic<bool> hides_exposures{false};
 
   // Of the control thread alone, while it runs.
@@ -229,7 +228,6 @@ Bytes MadeGigeCamera::Device::obey(const gige::Command& command, gige::Endpoint 
 Status MadeGigeCamera::Device::write(std::uint32_t at, ByteSpan data, gige::Endpoint from) {
   if (!controls(from)) return Status::access_denied;
   if (!controller && at != gige::at::control_privilege) return Status::access_denied;
-  if (ignores_exposures && at == gige::feature::exposure_us) return Status::success;
   if (at == gige::at::stream_packet_size && data.size() == 4 && (data[0] & 0x80U) != 0) {
     stream.send_test_packet(*registers, gige::get32(data.data()) & 0xffffU);
     return Status::success;
@@ -283,8 +281,6 @@ void MadeGigeCamera::unplug() { device_->stop(); }
 void MadeGigeCamera::plug_in() { device_->start(); }
 
 void MadeGigeCamera::drop_next(int frames) { device_->stream.drop_next(frames); }
-
-void MadeGigeCamera::ignore_exposures(bool ignored) { device_->ignores_exposures = ignored; }
 
 void MadeGigeCamera::hide_exposures(bool hidden) { device_->hides_exposures = hidden; }
 

@@ -81,9 +81,8 @@ class MadeGigeCamera {
   void unplug();
   // The same camera again, as it was made. Throws std::runtime_error if its address was taken.
   void plug_in();
-  void drop_next(int frames);           // so many are counted and not sent
-  void ignore_exposures(bool ignored);  // that are written from now on, without a word
-  void hide_exposures(bool hidden);     // tells 0 for the one that is set
+  void drop_next(int frames);        // so many are counted and not sent
+  void hide_exposures(bool hidden);  // tells 0 for the one that is set
   void set_packet_loss(double share);
   void set_exposure_lag(int frames);
 

@@ -198,7 +198,6 @@ void check_noise(const NoiseLine& line) {
 struct Measured {
   ChannelTransfer channel;
   BlackFit fit;
-  double black_deviations = 0;
 };
 
 Estimate root_of(double variance, double sigma) {

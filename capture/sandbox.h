@@ -45,7 +45,6 @@ class SandboxedChild {
   bool read(std::span<std::byte> bytes);
   // Gives the child bytes to read; false if it takes no more. Throws as read.
   bool write(std::span<const std::byte> bytes);
-  void allow_more_time(std::chrono::milliseconds time) { deadline_ += time; }
   // Once a stop is requested, reading, writing and ending() soon throw std::runtime_error.
   void give_up_on(std::stop_token stop) { stop_ = std::move(stop); }
 

@@ -60,7 +60,6 @@ SceneTrial judge_scene(const MadeScene& scene,
       const KeyReport report = keyer.key(light_of(made.seen), keyed);
       trial.confidence +=
           report.confidence / static_cast<float>(size.frames * static_cast<int>(seeds.size()));
-      trial.least_confidence = std::min(trial.least_confidence, report.confidence);
       own.add(to_float(keyed), made, background, i, true);
       const bool counts = i % size.peer_step == 0;
       if (!counts && i < MadeClip::rests_from) continue;

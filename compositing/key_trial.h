@@ -30,7 +30,6 @@ struct SceneTrial {
   std::string_view name;
   KeyScore ours, ffmpeg, obs, gstreamer;
   float confidence = 0;  // of ours, the mean
-  float least_confidence = 1;
 };
 
 struct TrialSize {

@@ -38,8 +38,7 @@ Material make_glass_material(std::string name, const GlassParameters& parameters
 
 Glass make_glass(const Material& material) {
   const GlassParameters p = glass_parameters(material);
-  return {
-      indices_of(p), {p.absorption[0], p.absorption[1], p.absorption[2]}, p.priority, p.abbe != 0};
+  return {indices_of(p), {p.absorption[0], p.absorption[1], p.absorption[2]}, p.priority};
 }
 
 namespace {

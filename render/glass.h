@@ -40,7 +40,6 @@ struct Glass {
   std::array<float, 3> index;
   Vec3f absorption;
   std::int32_t priority;
-  bool disperses;
 };
 Glass make_glass(const Material& material);
 

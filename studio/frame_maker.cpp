@@ -168,7 +168,6 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
           Clock::time_point(std::chrono::duration_cast<Clock::duration>(plate_->arrived()));
     }
     prepared.plate = half_plate(*frame);
-    prepared.plate_status = frame->status;
     prepared.plate_exposure_s =
         frame->exposure_s > 0 ? frame->exposure_s : set_.camera.exposure_s.value_or(0);
     plate_->read_sound_to(time + capture::time_of_frame(1, rate_));

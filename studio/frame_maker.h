@@ -53,7 +53,6 @@ struct PreparedFrame {
   std::chrono::steady_clock::time_point arrived;  // of the plate
   render::MatchResult match;
   ProbeStatus probe;
-  capture::FrameStatus plate_status = capture::FrameStatus::good;
   double plate_exposure_s = 0;            // 0 = not told
   std::array<double, stages> stage_ms{};  // capture, probe and job are set
 
