@@ -8,6 +8,8 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "capture/median.h"
+
 namespace calibrate {
 namespace {
 
@@ -79,10 +81,7 @@ float median_light(const Brightness& picture) {
   for (std::size_t i = 0; i < picture.size(); ++i) {
     if (picture.sees(i)) lights.push_back(picture.light(i));
   }
-  if (lights.empty()) return 0;
-  const auto middle = lights.begin() + static_cast<std::ptrdiff_t>(lights.size() / 2);
-  std::ranges::nth_element(lights, middle);
-  return *middle;
+  return lights.empty() ? 0 : capture::median_in_place(lights);
 }
 
 struct Region {

@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "calibrate/board_pose.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -21,12 +22,6 @@ constexpr double fine_step = 1.1;  // around the best of them
 // Views and corners that a trial looks at.
 constexpr std::size_t trial_views = 10;
 constexpr std::size_t trial_corners = 20;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // First corner of each view, and the end; corners are sorted by view.
 std::vector<std::size_t> begins_of(std::size_t views, std::span<const SeenCorner> corners) {
@@ -75,7 +70,8 @@ void mark_smooth(const Board& board,
     const Eigen::MatrixXd H = A.transpose() * weight.asDiagonal() * A;
     const Eigen::MatrixXd solved = H.ldlt().solve(A.transpose() * weight.asDiagonal() * q);
     distance = (q - A * solved).rowwise().norm();
-    scale = std::max(median({distance.begin(), distance.end()}) / 1.1774, least_px);
+    scale = std::max(
+        capture::median(std::vector<double>(distance.begin(), distance.end())) / 1.1774, least_px);
     for (Eigen::Index i = 0; i < weight.size(); ++i) {
       const double d = distance(i);
       weight(i) =
@@ -185,7 +181,7 @@ std::optional<LensSeed> seed_lens(const LensForm& form,
           pose_of(lens, board, {}, corners.subspan(begins[view], count), chosen, PoseEffort::rough);
       errors.push_back(pose ? pose->error_rad * focal_px : HUGE_VAL);
     }
-    return errors.empty() ? HUGE_VAL : median(errors);
+    return errors.empty() ? HUGE_VAL : capture::median_in_place(errors);
   };
   double best_focal = 0;
   double best_error = HUGE_VAL;

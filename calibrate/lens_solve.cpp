@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "calibrate/lens_seed.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -37,9 +38,7 @@ Scale scale_of(const Bundle& bundle,
     if (used[i] != 0) in_use.push_back(distance);
   }
   if (in_use.empty()) return scale;
-  const auto middle = in_use.begin() + static_cast<std::ptrdiff_t>(in_use.size() / 2);
-  std::nth_element(in_use.begin(), middle, in_use.end());
-  scale.sigma_px = std::max(*middle / rayleigh_median, least_sigma_px);
+  scale.sigma_px = std::max(capture::median_in_place(in_use) / rayleigh_median, least_sigma_px);
   return scale;
 }
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "calibrate/angles.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -134,13 +135,12 @@ void warn_of_coverage(const LensProblem& problem,
         text("no corners beyond %.0f degrees off the axis: the rim is a guess", c.coverage_deg));
   }
   if (errors.empty()) return;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  if (*middle > large_error_px) {
+  const double error_px = capture::median_in_place(errors);
+  if (error_px > large_error_px) {
     warnings.push_back(
         text("a virtual object may be off by %.0f px in half of the picture: take more pictures, "
              "tilted in all directions",
-             *middle));
+             error_px));
   }
 }
 

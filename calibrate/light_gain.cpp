@@ -10,6 +10,8 @@
 
 #include <Eigen/Dense>
 
+#include "capture/median.h"
+
 namespace calibrate {
 namespace {
 
@@ -42,17 +44,13 @@ void check(std::span<const LightPair> pairs) {
   }
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 // Robust standard deviation about 0.
 double spread_of(std::span<const double> errors) {
   std::vector<double> sizes;
   for (const double e : errors) sizes.push_back(std::abs(e));
-  return sizes.empty() ? least_spread : std::max(least_spread, 1.4826 * median_of(sizes));
+  return sizes.empty()
+             ? least_spread
+             : std::max(least_spread, capture::sigma_by_median * capture::median_in_place(sizes));
 }
 
 double weight_of(double error, double spread) {
@@ -114,14 +112,14 @@ Logs solve_gains(std::span<const LightPair> pairs, const Used& used) {
     }
   }
   for (std::size_t f = 0; f < frames; ++f) {
-    if (!by_frame[f].empty()) logs.exposure[f] = median_of(by_frame[f]);
+    if (!by_frame[f].empty()) logs.exposure[f] = capture::median_in_place(by_frame[f]);
   }
   for (std::size_t c = 0; c < 3; ++c) {
     std::vector<double> rest;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       if (used[i]) rest.push_back(error_of(pairs[i], c, logs));
     }
-    logs.gain[c] = median_of(rest);
+    logs.gain[c] = capture::median_in_place(rest);
   }
   for (int round = 0; round < rounds; ++round) {
     const double spread = spread_of(errors_of(pairs, logs, used));
@@ -247,7 +245,7 @@ double colour_spread(std::span<const LightPair> pairs) {
   for (const std::size_t c : {std::size_t{0}, std::size_t{2}}) {
     std::vector<double> tints;
     for (const LightPair& pair : pairs) tints.push_back(std::log(pair.probe[c] / pair.probe[1]));
-    const double middle = median_of(tints);
+    const double middle = capture::median(tints);
     for (double& tint : tints) tint -= middle;
     least = std::min(least, spread_of(tints));
   }
@@ -392,7 +390,7 @@ double follow_exposure(const LightGain& fit, std::span<const LightPair> pairs) {
     }
   }
   if (logs.empty()) throw std::runtime_error("no pair of light can be predicted");
-  double level = median_of(logs);
+  double level = capture::median(logs);
   for (int round = 0; round < rounds; ++round) {
     std::vector<double> errors;
     for (const double log : logs) errors.push_back(log - level);

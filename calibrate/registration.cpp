@@ -12,6 +12,7 @@
 #include <Eigen/Dense>
 
 #include "calibrate/pose_seeds.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -166,9 +167,7 @@ double robust_sigma(std::span<const Sight> sights, const Pose& pose) {
   for (const Sight& sight : sights) {
     lengths.push_back(std::sqrt(squared(residual_of(sight, pose))));
   }
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::ranges::nth_element(lengths, middle);
-  return *middle / 1.1774;
+  return capture::median_in_place(lengths) / 1.1774;
 }
 
 double sum_of_squares(std::span<const Sight> sights, const Pose& pose) {

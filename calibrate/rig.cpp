@@ -10,6 +10,7 @@
 
 #include "calibrate/board_pose.h"
 #include "calibrate/rig_bundle.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -216,10 +217,8 @@ double length_px(const RigCorner& corner, const RigBundle& bundle) {
 double robust_sigma(const Start& start) {
   std::vector<double> lengths;
   for (const RigCorner& corner : start.corners) lengths.push_back(length_px(corner, start.bundle));
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::ranges::nth_element(lengths, middle);
   constexpr double median_of_rayleigh = 1.17741;
-  return *middle / median_of_rayleigh;
+  return capture::median_in_place(lengths) / median_of_rayleigh;
 }
 
 // Solves, and says which corners are in use.

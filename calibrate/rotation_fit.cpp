@@ -11,6 +11,7 @@
 #include <Eigen/Dense>
 
 #include "calibrate/track.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -97,9 +98,7 @@ std::optional<Mat3> best_of_pairs(std::span<const SeenDirection> directions) {
 double spread_of(std::span<const SeenDirection> directions, const Mat3& R) {
   std::vector<double> residuals;
   for (const SeenDirection& d : directions) residuals.push_back(residual(d, R));
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::ranges::nth_element(residuals, middle);
-  return std::max(1.0, *middle / median_length);
+  return std::max(1.0, capture::median_in_place(residuals) / median_length);
 }
 
 void check(std::span<const SeenDirection> directions) {

@@ -9,6 +9,8 @@
 
 #include <Eigen/Dense>
 
+#include "capture/median.h"
+
 namespace calibrate {
 namespace {
 
@@ -57,9 +59,7 @@ double median_residual(std::span<const Sight> sights, const Pose& pose) {
   std::vector<double> squares(sights.size());
   std::ranges::transform(sights, squares.begin(),
                          [&](const Sight& sight) { return squared(residual_of(sight, pose)); });
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::ranges::nth_element(squares, middle);
-  return std::sqrt(*middle);
+  return std::sqrt(capture::median_in_place(squares));
 }
 
 struct Normal {

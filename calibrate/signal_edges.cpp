@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "capture/median.h"
+
 namespace calibrate {
 namespace {
 
@@ -25,9 +27,8 @@ double noise_of(std::span<const SignalSample> signal) {
     low = std::min(low, signal[i].value);
     high = std::max(high, signal[i].value);
   }
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  return std::max(*middle / (0.6745 * std::numbers::sqrt2), 1e-4 * (high - low));
+  return std::max(capture::median_in_place(steps) / (0.6745 * std::numbers::sqrt2),
+                  1e-4 * (high - low));
 }
 
 // The integral of the normal distribution's integral: where two limits meet, smoothed.

@@ -11,6 +11,7 @@
 #include <Eigen/Dense>
 
 #include "calibrate/vignetting.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -39,12 +40,6 @@ Places by_place(std::span<const VignettingSample> samples) {
   return places;
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double log_sensitivity(std::span<const double> terms, double angle_rad) {
   return std::log(std::max(least_sensitivity, sensitivity(terms, angle_rad)));
 }
@@ -61,7 +56,7 @@ std::vector<double> residuals_of(const Places& places, std::span<const double> t
     }
     double centre = 0;
     for (const double log : logs) centre += log / static_cast<double>(logs.size());
-    if (logs.size() > 4) centre = median_of(logs);
+    if (logs.size() > 4) centre = capture::median(logs);
     for (const double log : logs) residuals.push_back(log - centre);
   }
   return residuals;
@@ -135,7 +130,8 @@ std::vector<double> solve(const Places& places,
   for (int round = 0; round < rounds && !terms.empty(); ++round) {
     std::vector<double> sizes;
     for (const double r : residuals) sizes.push_back(std::abs(r));
-    const double spread = std::max(1e-6, 1.4826 * median_of(std::move(sizes)));
+    const double spread =
+        std::max(1e-6, capture::sigma_by_median * capture::median_in_place(sizes));
     const double loss = loss_of(residuals, used, spread);
     Eigen::VectorXd step = step_from(places, terms, used, residuals, spread);
     bool better = false;

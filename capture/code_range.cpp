@@ -8,16 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "capture/median.h"
+
 namespace capture {
 namespace {
-
-double quantile_of(std::vector<double>& values, double share) {
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-double median_of(std::vector<double>& values) { return quantile_of(values, 0.5); }
 
 // By the means at which noise reaches code 0, not block by block: those that chance spares are no
 // fair sample.
@@ -82,14 +76,14 @@ Saturation find_saturation(const ColourBlocks& colour,
     saturation.seen = full >= least_blocks;
     return saturation;
   }
-  const double code = median_of(means);
-  const double spread = quantile_of(means, 0.75) - quantile_of(means, 0.25);
+  const double code = quantile_in_place(means, 0.5);
+  const double spread = quantile_in_place(means, 0.75) - quantile_in_place(means, 0.25);
   constexpr double narrow = 0.03;
   if (spread > narrow * (highest - lowest) || code - lowest < 0.5 * (highest - lowest)) {
     return saturation;
   }
   saturation.code = code;
-  saturation.from = std::min(code, quantile_of(lows, 0.25));
+  saturation.from = std::min(code, quantile_in_place(lows, 0.25));
   saturation.seen = true;
   return saturation;
 }

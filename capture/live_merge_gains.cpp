@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "capture/live_merge_plan.h"
+#include "capture/median.h"
 
 namespace capture::window_merge {
 namespace {
@@ -57,12 +59,6 @@ Pair compare_stretch(const Plan<Code>& plan,
           std::sqrt(variance_of(a, count, shorter.terms) + variance_of(b, count, longer.terms))};
 }
 
-double median(std::array<double, most_compared>& values, std::size_t count) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(count / 2);
-  std::nth_element(values.begin(), middle, values.begin() + static_cast<std::ptrdiff_t>(count));
-  return *middle;
-}
-
 // The light that `longer` tells over that of `shorter`: the median over stretches that both
 // resolve. 1 if they cannot be compared, or agree within their noise.
 template <class Code>
@@ -85,8 +81,9 @@ double compare(const Plan<Code>& plan,
       deviations[count++] = pairs[k].deviation;
     }
     if (count < fewest_compared) continue;
-    const double ratio = median(ratios, count);
-    return std::abs(ratio - 1) > 2 * median(deviations, count) ? ratio : 1;
+    const double ratio = median_in_place(std::span(ratios).first(count));
+    return std::abs(ratio - 1) > 2 * median_in_place(std::span(deviations).first(count)) ? ratio
+                                                                                         : 1;
   }
   return 1;
 }

@@ -14,6 +14,7 @@
 #include "capture/exr.h"
 #include "capture/files.h"
 #include "capture/hdr.h"
+#include "capture/median.h"
 #include "capture/rgbe.h"
 #include "capture/still.h"
 
@@ -226,14 +227,8 @@ double range_stops(const Image& radiance) {
     if (y > 0 && std::isfinite(y)) luminance.push_back(y);
   }
   if (luminance.empty()) return 0;
-  const auto at = [&](double share) {
-    const auto place = luminance.begin() + static_cast<std::ptrdiff_t>(
-                                               share * static_cast<double>(luminance.size() - 1));
-    std::nth_element(luminance.begin(), place, luminance.end());
-    return *place;
-  };
-  const double faintest = at(tail);
-  return std::log2(at(1 - tail) / faintest);
+  const double faintest = quantile_in_place(luminance, tail);
+  return std::log2(quantile_in_place(luminance, 1 - tail) / faintest);
 }
 
 }  // namespace capture

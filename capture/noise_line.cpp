@@ -42,7 +42,6 @@ struct Group {
 // The mean of those variances that are not outliers: beyond 7 deviations of a normal spread, where
 // a chi-square's own tail does not reach.
 bool group_of(std::span<const NoisePoint> points, Group& group) {
-  constexpr double sigma_by_median = 1.4826;
   constexpr double far = 7;
   std::vector<double> values;
   for (const NoisePoint& point : points) values.push_back(point.variance);

@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "capture/median.h"
+
 namespace capture {
 namespace {
 
@@ -43,13 +45,6 @@ constexpr std::size_t least_followed = 8;
 constexpr std::size_t longest_followed = 32;
 
 bool enough(int agreeing, int telling) { return agreeing >= least_share * telling; }
-
-// Of one or more; changes their order.
-float median_of(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 }  // namespace
 
@@ -244,7 +239,7 @@ void RadianceReference::follow_drift(const Thumbnail& thumbnail,
   for (std::size_t age = 0; age < longest_followed; ++age) {
     std::vector<float>& of_age = ratios[age];
     if (of_age.size() < least_followed) continue;
-    const float median = median_of(of_age);
+    const float median = median_in_place(of_age);
     const float apart = finest_of_drift / 2 +
                         uneven * certain * std::sqrt(drift_squared_) * static_cast<float>(age);
     const auto alike = std::ranges::count_if(
@@ -328,7 +323,7 @@ double RadianceReference::brighter_than(const RadianceReference& other) const {
     if (fine(*this, i) && fine(other, i)) ratios.push_back(radiance_[i] / other.radiance_[i]);
   }
   if (ratios.size() < least_votes) return 1;
-  return median_of(ratios);
+  return median_in_place(ratios);
 }
 
 FitResult RadianceReference::check(const Thumbnail& thumbnail,

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "capture/files.h"
+#include "capture/median.h"
 #include "capture/picture_camera.h"
 
 namespace capture {
@@ -170,10 +171,7 @@ Rational rate_of(const std::vector<PictureEntry>& entries) {
   for (std::size_t i = 1; i < entries.size(); ++i) {
     steps_s.push_back(std::chrono::duration<double>(entries[i].time - entries[i - 1].time).count());
   }
-  std::vector<double> sorted = steps_s;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  const double frame_s = *middle;
+  const double frame_s = median(steps_s);
   double frames = 0, length_s = 0;
   std::size_t even = 0;
   for (const double step_s : steps_s) {

@@ -10,6 +10,8 @@
 
 #include <Eigen/Dense>
 
+#include "capture/median.h"
+
 namespace capture {
 namespace {
 
@@ -17,7 +19,6 @@ constexpr double white = Response::codes - 1;
 constexpr double exposure_prior = 0.05;  // shutters are off by several percent
 constexpr double judged_from = 25;       // codes by which curves are judged
 constexpr double judged_to = 235;
-constexpr double sigma_by_median = 1.4826;
 constexpr double changed_from = 5;  // deviations; what is beyond them is no error of a curve
 constexpr int channels = CurveFamily::channels;
 
@@ -74,12 +75,6 @@ constexpr double cauchy_squared = 9;  // its width, 3 standard deviations
 double loss(double r) { return cauchy_squared * std::log1p(r * r / cauchy_squared); }
 double loss_weight(double r) { return 1 / (1 + r * r / cauchy_squared); }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // How much wider than their standard deviations the residuals spread: at least 1, more for curves
 // that do not fit, all of whose matches would otherwise count as outliers.
 double spread_of(const Problem& problem, const Parameters& p) {
@@ -87,7 +82,7 @@ double spread_of(const Problem& problem, const Parameters& p) {
   for (const CodeMatch& match : problem.matches) {
     sizes.push_back(std::abs(residual_of(problem, p, match).value));
   }
-  return std::max(1.0, sigma_by_median * median(std::move(sizes)));
+  return std::max(1.0, sigma_by_median * median_in_place(sizes));
 }
 
 struct NormalEquations {
@@ -299,7 +294,7 @@ struct Judgement {
   double largest() const {
     std::vector<double> sizes;
     for (const auto& [error, weight] : errors) sizes.push_back(std::abs(error));
-    return sizes.empty() ? 0 : changed_from * sigma_by_median * median(std::move(sizes));
+    return sizes.empty() ? 0 : changed_from * sigma_by_median * median_in_place(sizes);
   }
   double root_mean_square(double limit = std::numeric_limits<double>::infinity()) const {
     double squares = 0;

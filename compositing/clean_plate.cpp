@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "capture/median.h"
 #include "compositing/gap_filler.h"
 
 namespace compositing {
@@ -179,9 +180,7 @@ CleanPlate background_from_footage(std::span<const Image> frames) {
   for (std::size_t i = 0; i < plate.light.pixels.size(); ++i) {
     std::ranges::transform(frames, seen.begin(),
                            [&](const Image& f) { return clean(f.pixels[i]); });
-    const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
-    std::nth_element(seen.begin(), middle, seen.end());
-    const float median = plate.light.pixels[i] = *middle;
+    const float median = plate.light.pixels[i] = capture::median_in_place(seen);
     const float near = still_share * median + still_least;
     const auto alike =
         std::ranges::count_if(seen, [&](float v) { return std::abs(v - median) <= near; });

@@ -8,6 +8,8 @@
 
 #include <Eigen/Dense>
 
+#include "capture/median.h"
+
 namespace compositing {
 namespace {
 
@@ -17,12 +19,6 @@ constexpr float most_sigma = 0.1F;                   // of a patch that is worth
 constexpr float own_error = 0.004F;                  // of light: what is neither noise nor shift
 constexpr int fewest = 4;                            // patches that must agree
 constexpr float agreed = 0.5F;                       // cells: spread of patches that agree
-
-float median_of(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -221,10 +217,11 @@ PlateShift PlateWatch::look_at(const Rows& frame) {
   shift.seen = static_cast<int>(rights_.size());
   if (shift.seen < fewest || 3 * shift.seen < shift.patches) return shift;
   const auto count = static_cast<float>(shift.seen);
-  const float right = median_of(rights_), down = median_of(downs_);
+  const float right = capture::median_in_place(rights_), down = capture::median_in_place(downs_);
   for (float& value : rights_) value = std::abs(value - right);
   for (float& value : downs_) value = std::abs(value - down);
-  const float spread = 1.48F * std::max(median_of(rights_), median_of(downs_));
+  const float spread =
+      1.48F * std::max(capture::median_in_place(rights_), capture::median_in_place(downs_));
   const auto pixels = static_cast<float>(pixels_);
   shift.known = spread <= agreed;
   shift.right_px = right * pixels, shift.down_px = down * pixels;

@@ -7,12 +7,12 @@
 #include <stdexcept>
 #include <vector>
 
+#include "capture/median.h"
+
 namespace render {
 namespace {
 
 using std::numbers::pi;
-// Turns a median absolute deviation into a standard deviation.
-constexpr double deviation_of_median = 1.4826;
 // Plate pixels to look at along a texel's side, and the largest step that leaves out others.
 constexpr double pixels_along_texel = 3;
 constexpr int most_step = 16;
@@ -22,12 +22,6 @@ constexpr int least_pixels_per_texel = 4;
 constexpr double doubtful_spread = 0.3;
 
 using Colour = std::array<float, 3>;
-
-double median(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 // Median per channel, and the largest channel's relative robust deviation from it.
 struct Robust {
@@ -40,12 +34,14 @@ Robust robust_mean(const std::vector<Colour>& values) {
   std::vector<float> channel(values.size());
   for (std::size_t c = 0; c < 3; ++c) {
     std::ranges::transform(values, channel.begin(), [c](const Colour& v) { return v[c]; });
-    const double m = median(channel);
+    const double m = capture::median_in_place(channel);
     std::ranges::transform(values, channel.begin(), [c, m](const Colour& v) {
       return static_cast<float>(std::abs(v[c] - m));
     });
     result.median[c] = m;
-    if (m > 0) result.spread = std::max(result.spread, deviation_of_median * median(channel) / m);
+    if (m > 0)
+      result.spread =
+          std::max(result.spread, capture::sigma_by_median * capture::median_in_place(channel) / m);
   }
   return result;
 }

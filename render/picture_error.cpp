@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "capture/median.h"
 #include "render/reference.h"
 
 namespace render {
@@ -26,12 +27,6 @@ Lab ok_lab(const float* rgb) {
   return {0.2104542553 * l + 0.7936177850 * m - 0.0040720468 * s,
           1.9779984951 * l - 2.4285922050 * m + 0.4505937099 * s,
           0.0259040371 * l + 0.7827717662 * m - 0.8086757660 * s};
-}
-
-double percentile(std::vector<double>& values, double share) {
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + at, values.end());
-  return values[static_cast<std::size_t>(at)];
 }
 
 void check(const capture::Image& image, const capture::Image& mask, int channels) {
@@ -83,12 +78,12 @@ PictureError compare(const capture::Image& x,
   // Two references that hardly agree may leave less than nothing; not-a-number stays.
   error.relative_rms = std::sqrt(squares < 0 ? 0 : relative(squares, reference_squares));
   error.reference_noise = std::sqrt(relative(noise_squares, reference_squares));
-  error.p99 = relative(percentile(differences, 0.99),
+  error.p99 = relative(capture::quantile_in_place(differences, 0.99),
                        std::sqrt(unclamped_squares / static_cast<double>(differences.size())));
   for (const double e : delta_es) error.delta_e_mean += e;
   error.delta_e_mean /= static_cast<double>(delta_es.size());
-  error.delta_e_p95 = percentile(delta_es, 0.95);
-  error.delta_e_p99 = percentile(delta_es, 0.99);
+  error.delta_e_p95 = capture::quantile_in_place(delta_es, 0.95);
+  error.delta_e_p99 = capture::quantile_in_place(delta_es, 0.99);
   return error;
 }
 

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "capture/median.h"
+
 namespace studio {
 namespace {
 
@@ -20,12 +22,6 @@ constexpr double least_change = 0.01;
 // Fewer directions may be one thing that moves.
 constexpr std::size_t fewest_pairs = 10;
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 // By how much the pairs differ from what is common to them, relative and robust.
 double spread_of(std::span<const calibrate::LightPair> pairs, double common) {
   std::vector<double> off;
@@ -34,7 +30,7 @@ double spread_of(std::span<const calibrate::LightPair> pairs, double common) {
     for (std::size_t c = 0; c < 3; ++c) sum += std::log(pair.plate[c] / (common * pair.probe[c]));
     off.push_back(std::abs(sum / 3));
   }
-  return 1.4826 * median_of(off);
+  return capture::sigma_by_median * capture::median_in_place(off);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@
 #include "capture/hdr.h"
 #include "capture/live_merge.h"
 #include "capture/made_sensor.h"
+#include "capture/median.h"
 #include "studio/charts/opencv_merge.h"
 #include "studio/machine.h"
 
@@ -132,19 +133,14 @@ Error error_stops(const Image& radiance, const Image& truth) {
         static_cast<double>(radiance.pixels[i]) / static_cast<double>(truth.pixels[i]);
     logs.push_back(std::log2(std::max(floor, ratio)));
   }
-  const auto quantile = [&](double share) {
-    const auto place =
-        logs.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(logs.size() - 1));
-    std::nth_element(logs.begin(), place, logs.end());
-    return *place;
-  };
-  const double median = quantile(0.5);
+  const double median = capture::quantile_in_place(logs, 0.5);
   double squares = 0;
   for (double& log : logs) {
     log = std::abs(log - median);
     squares += log * log;
   }
-  return {std::sqrt(squares / static_cast<double>(logs.size())), quantile(0.99)};
+  return {std::sqrt(squares / static_cast<double>(logs.size())),
+          capture::quantile_in_place(logs, 0.99)};
 }
 
 // Of values with a finite deviation.

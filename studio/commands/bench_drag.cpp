@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/median.h"
 #include "render/kernel.h"
 #include "studio/arguments.h"
 #include "studio/commands/bench_rows.h"
@@ -37,11 +38,6 @@ constexpr Drag drags[] = {{"headlight", "bulb", {0.15F, 0, 0}},
                           {"glass_sphere", "glass sphere", {0.2F, 0, 0}},
                           {"tv_room", "vase", {0.25F, 0, 0}},
                           {"car", "wheel front left", {0, 0.3F, 0}}};
-
-double median_of(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values.empty() ? 0 : values[values.size() / 2];
-}
 
 // The scene's frames one after the other, each as soon as the one before is done.
 class Dragging {
@@ -71,7 +67,7 @@ class Dragging {
       lost += lost_;
       if (first_changed < 0 && result_.rgba.pixels != before.pixels) first_changed = i;
     }
-    const double drag_ms = median_of(ms);
+    const double drag_ms = capture::median_in_place(ms);
     write_picture("dragged", capture::to_float(result_.rgba));
     const capture::Image after_1_s = wait(waited);
     write_picture("a_second_later", after_1_s);
