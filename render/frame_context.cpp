@@ -219,7 +219,8 @@ std::array<std::array<float, 2>, samples_max> sample_pattern() {
   return pattern;
 }
 
-// The plate, and its halves down to 1 pixel a side.
+// The plate, and its halves until the shorter side is 1 pixel. Of odd sides the last row, or
+// column, is left out.
 std::vector<capture::Image> plate_levels_of(const capture::HalfImage& plate) {
   std::vector<capture::Image> levels;
   capture::Image& whole =

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "capture/colour.h"
+#include "render/area_cover.h"
 
 namespace render {
 namespace {
@@ -36,27 +37,6 @@ const LightTables& light_tables() {
   return tables;
 }
 
-// The part of a source row (or column) that one target texel covers.
-struct Cover {
-  int first = 0;
-  int count = 0;
-  std::array<float, 3> weights{};
-};
-
-// Target texel i of n_target = max(1, n_source / 2) covers 2 or, of odd sizes, 3 source texels.
-Cover cover(int i, int n_source, int n_target) {
-  const double scale = static_cast<double>(n_source) / n_target;
-  const double from = i * scale;
-  const double to = (i + 1) * scale;
-  Cover result;
-  result.first = static_cast<int>(from);
-  for (int k = result.first; k < n_source && k < to && result.count < 3; ++k) {
-    const double share = (std::min(to, k + 1.0) - std::max(from, static_cast<double>(k))) / scale;
-    result.weights[static_cast<std::size_t>(result.count++)] = static_cast<float>(share);
-  }
-  return result;
-}
-
 void halve(const std::uint8_t* source,
            int width,
            int height,
@@ -67,12 +47,12 @@ void halve(const std::uint8_t* source,
            int target_height) {
   const LightTables& tables = light_tables();
   const int colour_channels = !srgb ? 0 : channels >= 3 ? 3 : 1;
-  std::vector<Cover> columns;
-  for (int x = 0; x < target_width; ++x) columns.push_back(cover(x, width, target_width));
+  std::vector<AreaCover> columns;
+  for (int x = 0; x < target_width; ++x) columns.emplace_back(x, width, target_width);
   for (int y = 0; y < target_height; ++y) {
-    const Cover rows = cover(y, height, target_height);
+    const AreaCover rows(y, height, target_height);
     for (int x = 0; x < target_width; ++x) {
-      const Cover& column = columns[static_cast<std::size_t>(x)];
+      const AreaCover& column = columns[static_cast<std::size_t>(x)];
       std::array<float, 4> sum{};
       for (int j = 0; j < rows.count; ++j) {
         const auto row = static_cast<std::size_t>(rows.first + j) * static_cast<std::size_t>(width);
