@@ -131,7 +131,7 @@ json material_of(const Material& material, const SceneDescription& scene) {
     extensions["KHR_materials_transmission"] = {{"transmissionFactor", p.transmission}};
   }
   return {{"name", material.name},
-          {"doubleSided", p.two_sided != 0},
+          {"doubleSided", true},  // nothing is culled
           {"emissiveFactor", emission},
           {"extensions", extensions},
           {"pbrMetallicRoughness",

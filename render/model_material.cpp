@@ -375,9 +375,6 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
       note("material '" + name + "': blended alpha is cut at a half");
     }
   }
-  int two_sided = 1;
-  if (material.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS)
-    p.two_sided = two_sided != 0 ? 1 : 0;
   take_volume(material, name, result);
   constexpr float frosted = 0.1F;
   if (p.transmission > 0 && p.metallic < 1 && p.roughness > frosted)

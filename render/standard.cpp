@@ -16,7 +16,7 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 108, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 104, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();

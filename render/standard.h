@@ -49,7 +49,6 @@ struct StandardParameters {
   std::int32_t emission_texture = -1;
   float base_color_alpha = 1;
   float specular = 1;  // share of the mirrored light of what is not metal (KHR_materials_specular)
-  std::uint32_t two_sided = 1;
   std::int32_t emission_video = -1;  // of SceneDescription::videos: emission is times its light
   std::int32_t clearcoat_roughness_texture = -1;  // green
   // In the place of the base texture's alpha: its alpha if it has one, else red.

@@ -169,6 +169,12 @@ TEST(ModelMaterial, LetsLightThroughUntintedByItsOpacity) {
   }
 }
 
+TEST(ModelMaterial, HasTwoSidesWhateverGltfSays) {
+  const LoadedModel one = load_glb(R"({"name":"m","doubleSided":false})");
+  const LoadedModel two = load_glb(R"({"name":"m","doubleSided":true})");
+  EXPECT_EQ(one.scene.materials, two.scene.materials);
+}
+
 TEST(ModelMaterial, WrapsTexturesAsTheFileSays) {
   const std::string glowing = R"({"emissiveFactor":[1,1,1],"emissiveTexture":{"index":0}})";
   const auto wrap_of = [](const LoadedModel& model) { return model.scene.textures.at(0)->wrap; };
