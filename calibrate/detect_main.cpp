@@ -1,16 +1,13 @@
 // platelight-detect: looks for boards in the pictures on standard input, confined, and writes their
 // corners to standard output (detect_wire.h). Its finders cannot be interrupted and may crash or
 // never end: that is why they are here.
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <exception>
-#include <stdexcept>
-#include <system_error>
+#include <span>
 #include <vector>
 
 #include <opencv2/aruco.hpp>
@@ -18,42 +15,16 @@
 #include <opencv2/core.hpp>
 
 #include "calibrate/detect_wire.h"
+#include "capture/helper_io.h"
 #include "capture/sandbox.h"
 
 namespace {
 
 namespace wire = calibrate::wire;
 
-void read_all(void* data, std::size_t size) {
-  auto* bytes = static_cast<char*>(data);
-  while (size > 0) {
-    const ssize_t got = read(STDIN_FILENO, bytes, size);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw std::system_error(errno, std::generic_category(), "cannot read");
-    if (got == 0) throw std::runtime_error("the pictures end too early");
-    bytes += got;
-    size -= static_cast<std::size_t>(got);
-  }
-}
-
-void write_all(const void* data, std::size_t size) {
-  const auto* bytes = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t done = write(STDOUT_FILENO, bytes, size);
-    if (done < 0 && errno == EINTR) continue;
-    if (done < 0) throw std::system_error(errno, std::generic_category(), "cannot write");
-    bytes += done;
-    size -= static_cast<std::size_t>(done);
-  }
-}
-
 void send(const std::vector<cv::Point2f>& points) {
-  const wire::Reply reply{static_cast<std::uint32_t>(points.size())};
-  write_all(&reply, sizeof reply);
-  for (const cv::Point2f& p : points) {
-    const double q[2]{p.x, p.y};
-    write_all(q, sizeof q);
-  }
+  capture::write_value(wire::Reply{static_cast<std::uint32_t>(points.size())});
+  for (const cv::Point2f& p : points) capture::write_value(std::array<double, 2>{p.x, p.y});
 }
 
 void send_chessboard(const cv::Mat& picture, const wire::Request& request) {
@@ -88,20 +59,15 @@ void send_markers(const cv::Mat& picture, const wire::Request& request) {
   std::vector<cv::Point2f> points;
   for (const auto& marker : markers) points.insert(points.end(), marker.begin(), marker.end());
   send(points);
-  for (const int id : ids) {
-    const std::int32_t number = id;
-    write_all(&number, sizeof number);
-  }
+  for (const int id : ids) capture::write_value(std::int32_t{id});
 }
 
 void detect() {
-  wire::Request request;
-  read_all(&request, sizeof request);
+  const auto request = capture::read_value<wire::Request>();
   for (std::uint32_t i = 0; i < request.pictures; ++i) {
-    wire::Picture size;
-    read_all(&size, sizeof size);
+    const auto size = capture::read_value<wire::Picture>();
     cv::Mat picture(size.height, size.width, CV_8U);
-    read_all(picture.data, picture.total());
+    capture::read_all(std::as_writable_bytes(std::span(picture.data, picture.total())));
     if (request.finder == wire::Finder::markers) {
       send_markers(picture, request);
     } else {

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
-#include <cstring>
 #include <exception>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -24,6 +24,7 @@
 #include <OpenEXR/ImfVecAttribute.h>
 
 #include "capture/exr_wire.h"
+#include "capture/helper_io.h"
 #include "capture/sandbox.h"
 
 namespace {
@@ -55,22 +56,7 @@ class StandardInput : public Imf::IStream {
   std::uint64_t position_ = 0;
 };
 
-void write_all(const void* data, std::size_t size) {
-  const auto* bytes = static_cast<const char*>(data);
-  while (size > 0) {
-    const ssize_t done = write(STDOUT_FILENO, bytes, size);
-    if (done < 0 && errno == EINTR) continue;
-    if (done < 0) throw std::system_error(errno, std::generic_category(), "cannot write");
-    bytes += done;
-    size -= static_cast<std::size_t>(done);
-  }
-}
-
-void send(wire::Kind kind, const void* payload, std::size_t bytes) {
-  const wire::Prefix prefix{kind, static_cast<std::uint32_t>(bytes)};
-  write_all(&prefix, sizeof prefix);
-  write_all(payload, bytes);
-}
+constexpr auto tell = capture::send_message<wire::Prefix>;
 
 // Both windows of a picture, in 64 bits, since hostile ones overflow.
 struct Window {
@@ -174,9 +160,9 @@ void send_rows(const Window& data, const Window& display, std::size_t channels, 
                     &picture[static_cast<std::size_t>(y - top) * picture_row + margin]);
       }
     }
-    send(wire::Kind::rows, picture.data(), picture.size() * sizeof(float));
+    tell(wire::Kind::rows, std::as_bytes(std::span(picture)));
   }
-  send(wire::Kind::end, nullptr, 0);
+  tell(wire::Kind::end, {});
 }
 
 void send_header(const Imf::Header& header, const Window& display, std::size_t channels) {
@@ -198,7 +184,7 @@ void send_header(const Imf::Header& header, const Window& display, std::size_t c
     out.has_noise = 1;
     out.noise = {noise->value().x, noise->value().y};
   }
-  send(wire::Kind::header, &out, sizeof out);
+  tell(wire::Kind::header, std::as_bytes(std::span(&out, 1)));
 }
 
 void send_plain(StandardInput& input) {
@@ -286,7 +272,7 @@ int main() {
     return 0;
   } catch (const std::exception& error) {
     try {
-      send(wire::Kind::failure, error.what(), std::strlen(error.what()));
+      tell(wire::Kind::failure, std::as_bytes(std::span(std::string_view(error.what()))));
     } catch (const std::exception&) {
       return 2;  // nobody listens
     }

@@ -1,17 +1,15 @@
 // platelight-model: reads a model that its parent hands it, confined, and sends it back as plain
 // arrays (model_wire.h). A damaged file may crash it; that is what it is for.
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <exception>
 #include <new>
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <system_error>
+#include <vector>
 
+#include "capture/helper_io.h"
 #include "capture/sandbox.h"
 #include "render/model_import.h"
 #include "render/model_process.h"
@@ -21,38 +19,16 @@ namespace {
 
 namespace wire = render::wire;
 
-void read_all(std::span<std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t got = read(STDIN_FILENO, bytes.data(), bytes.size());
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) throw std::runtime_error("nobody listens");
-    bytes = bytes.subspan(static_cast<std::size_t>(got));
-  }
-}
-template <class T>
-T read_value() {
-  T value;
-  read_all(std::as_writable_bytes(std::span(&value, 1)));
-  return value;
-}
+using capture::read_value, capture::write_all;
+
 std::vector<std::byte> read_bytes(std::uint64_t count) {
   std::vector<std::byte> bytes(count);
-  read_all(bytes);
+  capture::read_all(bytes);
   return bytes;
 }
 
-void write_all(std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t done = write(STDOUT_FILENO, bytes.data(), bytes.size());
-    if (done < 0 && errno == EINTR) continue;
-    if (done < 0) throw std::system_error(errno, std::generic_category(), "cannot write");
-    bytes = bytes.subspan(static_cast<std::size_t>(done));
-  }
-}
 void send(wire::Kind kind, std::span<const std::byte> payload) {
-  const wire::Prefix prefix{kind, static_cast<std::uint32_t>(payload.size())};
-  write_all(std::as_bytes(std::span(&prefix, 1)));
-  write_all(payload);
+  capture::send_message<wire::Prefix>(kind, payload);
 }
 void send(wire::Kind kind, const std::string& text) {
   send(kind,
