@@ -14,27 +14,17 @@
 #include "calibrate/mrcal_lens.h"
 #include "calibrate/opencv_lens.h"
 #include "calibrate/text_file.h"
+#include "capture/toml_reader.h"
 
 namespace calibrate {
 namespace {
 
-[[noreturn]] void fail(const std::string& path,
-                       const toml::source_region& at,
-                       const std::string& why) {
-  throw std::runtime_error(path + ":" + std::to_string(at.begin.line) + ":" +
-                           std::to_string(at.begin.column) + ": " + why);
-}
+using capture::in_quotes;
 
 // A .toml lens while it is read: whatever is not taken in the end is unknown.
-class LensTable {
+class LensTable : private capture::TomlReader {
  public:
-  LensTable(const std::string& path, const std::string& text) : path_(path) {
-    try {
-      table_ = toml::parse(text);
-    } catch (const toml::parse_error& error) {
-      fail(path, error.source(), std::string(error.description()));
-    }
-  }
+  explicit LensTable(const std::string& path) : TomlReader(path, "lens"), table_(parse()) {}
 
   bool has(std::string_view key) const { return table_.contains(key); }
 
@@ -70,23 +60,22 @@ class LensTable {
   void refuse_unknown(const std::string& model) const {
     for (const auto& [key, node] : table_) {
       if (std::ranges::find(taken_, key.str()) != taken_.end()) continue;
-      fail(path_, key.source(),
-           "unknown key \"" + std::string(key.str()) + "\" in a lens of model " + model);
+      fail(key.source(), "unknown key " + in_quotes(key.str()) + " in a lens of model " + model);
     }
   }
 
   // Complains about the value of a key that was read.
   [[noreturn]] void fail_at_key(std::string_view key, const std::string& why) const {
-    fail(path_, table_.get(key)->source(), why);
+    fail(table_.get(key)->source(), why);
   }
   [[noreturn]] void fail_whole(const std::string& why) const {
-    throw std::runtime_error(path_ + ": " + why);
+    throw std::runtime_error(path() + ": " + why);
   }
 
  private:
   const toml::node& take(std::string_view key) {
     const toml::node* node = table_.get(key);
-    if (node == nullptr) fail_whole("the key \"" + std::string(key) + "\" is missing");
+    if (node == nullptr) fail_whole("the key " + in_quotes(key) + " is missing");
     taken_.emplace_back(key);
     return *node;
   }
@@ -105,10 +94,9 @@ class LensTable {
   [[noreturn]] void fail_at(const toml::node& node,
                             std::string_view key,
                             const std::string& why) const {
-    fail(path_, node.source(), "\"" + std::string(key) + "\" " + why);
+    fail(node.source(), in_quotes(key) + " " + why);
   }
 
-  const std::string& path_;
   toml::table table_;
   std::vector<std::string> taken_;
 };
@@ -135,8 +123,7 @@ ParameterNames names_of(AxialLens::Kind kind) {
 }
 
 Lens read_toml_lens(const std::string& path) {
-  const std::string text = read_text_file(path);
-  LensTable table(path, text);
+  LensTable table(path);
   Lens lens;
   lens.model = table.string("model");
   lens.width = table.whole_number("width");

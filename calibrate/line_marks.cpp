@@ -10,10 +10,12 @@
 #include <toml++/toml.h>
 
 #include "calibrate/angles.h"
-#include "calibrate/toml_reader.h"
+#include "capture/toml_reader.h"
 
 namespace calibrate {
 namespace {
+
+using capture::in_quotes, capture::TomlReader;
 
 constexpr std::size_t most_lines = 1000;
 constexpr std::size_t most_pixels = 10000;  // of a line

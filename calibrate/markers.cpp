@@ -9,10 +9,13 @@
 
 #include <toml++/toml.h>
 
-#include "calibrate/toml_reader.h"
+#include "calibrate/text_file.h"
+#include "capture/toml_reader.h"
 
 namespace calibrate {
 namespace {
+
+using capture::in_quotes, capture::TomlReader;
 
 Marker marker_of(const TomlReader& reader, const toml::table& table) {
   reader.refuse_unknown(table, {"name", "position", "pixel", "picture"});

@@ -1,73 +1,35 @@
 // A pose in a file of its own.
 #include "calibrate/pose_file.h"
 
-#include <algorithm>
-#include <cmath>
+#include <array>
 #include <span>
 #include <stdexcept>
-#include <vector>
 
 #include <toml++/toml.h>
 
 #include "calibrate/camera_model.h"
 #include "calibrate/text_file.h"
+#include "capture/toml_reader.h"
 
 namespace calibrate {
 namespace {
 
-[[noreturn]] void fail(const std::string& path,
-                       const toml::source_region& at,
-                       const std::string& why) {
-  throw std::runtime_error(path + ":" + std::to_string(at.begin.line) + ":" +
-                           std::to_string(at.begin.column) + ": " + why);
-}
-
-std::vector<double> numbers_of(const std::string& path,
-                               const toml::table& table,
-                               std::string_view key,
-                               std::size_t count) {
-  const toml::array* list = table[key].as_array();
-  const std::string what =
-      "\"" + std::string(key) + "\" must be a list of " + std::to_string(count) + " numbers";
-  if (list == nullptr || list->size() != count) fail(path, table.source(), "a pose's " + what);
-  std::vector<double> numbers;
-  for (const toml::node& element : *list) {
-    const auto number = element.is_number() ? element.value<double>() : std::nullopt;
-    if (!number || !std::isfinite(*number)) fail(path, element.source(), what);
-    numbers.push_back(*number);
-  }
-  return numbers;
-}
-
 Pose read_toml_pose(const std::string& path) {
-  toml::table root;
-  try {
-    root = toml::parse(read_text_file(path));
-  } catch (const toml::parse_error& error) {
-    fail(path, error.source(), std::string(error.description()));
-  }
+  const capture::TomlReader reader(path, "pose");
+  const toml::table root = reader.parse();
   const toml::table* table = root["pose"].as_table();
   if (table == nullptr) {
     throw std::runtime_error(path + ": has no pose = { position = [...], rotation = [...] }");
   }
-  const auto refuse_others = [&](const toml::table& of,
-                                 std::initializer_list<std::string_view> known) {
-    for (const auto& [key, node] : of) {
-      if (std::ranges::find(known, key.str()) == known.end()) {
-        fail(path, key.source(), "unknown key \"" + std::string(key.str()) + "\"");
-      }
-    }
-  };
-  refuse_others(root, {"pose"});
-  refuse_others(*table, {"position", "rotation"});
-  const std::vector<double> p = numbers_of(path, *table, "position", 3);
-  const std::vector<double> r = numbers_of(path, *table, "rotation", 9);
+  reader.refuse_unknown(root, {"pose"});
+  reader.refuse_unknown(*table, {"position", "rotation"});
+  const auto p = reader.numbers<3>(reader.required(*table, "position"), "position", true);
   Mat3 rotation;
-  std::ranges::copy(r, rotation.m.begin());
+  rotation.m = reader.numbers<9>(reader.required(*table, "rotation"), "rotation", true);
   try {
     return pose_from_rotation(rotation, {p[0], p[1], p[2]});
   } catch (const std::invalid_argument& error) {
-    fail(path, table->source(), error.what());
+    reader.fail(table->source(), error.what());
   }
 }
 

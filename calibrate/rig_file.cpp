@@ -12,10 +12,12 @@
 #include <toml++/toml.h>
 
 #include "calibrate/text_file.h"
-#include "calibrate/toml_reader.h"
+#include "capture/toml_reader.h"
 
 namespace calibrate {
 namespace {
+
+using capture::in_quotes, capture::TomlReader;
 
 class RigReader : public TomlReader {
  public:

@@ -12,6 +12,7 @@
 #include <toml++/toml.h>
 
 #include "capture/files.h"
+#include "capture/toml_reader.h"
 
 namespace capture {
 namespace {
@@ -21,14 +22,10 @@ constexpr std::array<std::string_view, 3> colours{"red", "green", "blue"};
 bool ends_as(const std::string& path, std::string_view ending) { return path.ends_with(ending); }
 
 // A response file while it is read: what is not taken in the end is unknown.
-class ResponseTable {
+class ResponseTable : private TomlReader {
  public:
-  ResponseTable(const std::string& path, const toml::table& table, std::string inside = {})
-      : path_(path), table_(table), inside_(std::move(inside)) {}
-
-  [[noreturn]] void fail(const toml::source_region& at, const std::string& why) const {
-    throw std::runtime_error(path_ + ":" + std::to_string(at.begin.line) + ": " + why);
-  }
+  ResponseTable(const TomlReader& reader, const toml::table& table, std::string inside = {})
+      : TomlReader(reader), table_(table), inside_(std::move(inside)) {}
 
   std::string text(std::string_view key) {
     const toml::node& node = take(key);
@@ -56,7 +53,7 @@ class ResponseTable {
   ResponseTable table(std::string_view key) {
     const toml::node& node = take(key);
     if (!node.is_table()) fail(node.source(), named(key) + " must be a table");
-    return {path_, *node.as_table(), std::string(key) + "."};
+    return {*this, *node.as_table(), std::string(key) + "."};
   }
 
   void refuse_unknown() const {
@@ -71,7 +68,7 @@ class ResponseTable {
   }
 
  private:
-  std::string named(std::string_view key) const { return "\"" + inside_ + std::string(key) + "\""; }
+  std::string named(std::string_view key) const { return in_quotes(inside_ + std::string(key)); }
   const toml::node& take(std::string_view key) {
     const toml::node* node = table_.get(key);
     if (node == nullptr) fail(table_.source(), "the key " + named(key) + " is missing");
@@ -88,7 +85,6 @@ class ResponseTable {
     return *value;
   }
 
-  std::string path_;
   const toml::table& table_;
   std::string inside_;
   std::set<std::string> taken_;
@@ -146,16 +142,9 @@ CameraResponse read_curve(ResponseTable& table) {
 
 CameraResponse read_toml(const std::string& path) {
   constexpr std::size_t most_bytes = 1 << 18;
-  const std::vector<std::byte> bytes = read_file(path, most_bytes);
-  toml::table parsed;
-  try {
-    parsed =
-        toml::parse(std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
-  } catch (const toml::parse_error& error) {
-    throw std::runtime_error(path + ":" + std::to_string(error.source().begin.line) + ": " +
-                             std::string(error.description()));
-  }
-  ResponseTable table(path, parsed);
+  const TomlReader reader(path, "response");
+  const toml::table parsed = reader.parse(most_bytes);
+  ResponseTable table(reader, parsed);
   const std::string model = table.text("model");
   if (model != "linear" && model != "curve") {
     table.fail_at("model", "must be \"linear\" or \"curve\"");

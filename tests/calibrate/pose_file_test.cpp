@@ -34,16 +34,17 @@ TEST(WritePose, RefusesFilesThatCannotHoldIt) {
 }
 
 TEST(ReadPose, RefusesEveryBadFileWithPlaceAndReason) {
-  made::expect_refusals("pose_", ".toml",
-                        {{"pose_empty.toml", ": has no pose = {"},
-                         {"pose_syntax.toml", ":1:"},
-                         {"pose_unknown_key.toml", ":1:32: unknown key \"roll\""},
-                         {"pose_other_section.toml", ":2:1: unknown key \"name\""},
-                         {"pose_no_rotation.toml", "\"rotation\" must be a list of 9 numbers"},
-                         {"pose_eight_numbers.toml", "\"rotation\" must be a list of 9 numbers"},
-                         {"pose_mirror.toml", "mirror image"},
-                         {"pose_nan.toml", ":1:25: \"position\" must be"}},
-                        read_pose);
+  made::expect_refusals(
+      "pose_", ".toml",
+      {{"pose_empty.toml", ": has no pose = {"},
+       {"pose_syntax.toml", ":1:"},
+       {"pose_unknown_key.toml", ":1:32: unknown key \"roll\""},
+       {"pose_other_section.toml", ":2:1: unknown key \"name\""},
+       {"pose_no_rotation.toml", ":1:8: this pose has no \"rotation\""},
+       {"pose_eight_numbers.toml", ":1:43: \"rotation\" must be a list of 9 numbers"},
+       {"pose_mirror.toml", "mirror image"},
+       {"pose_nan.toml", ":1:25: \"position\" must be"}},
+      read_pose);
   EXPECT_THROW(read_pose("pose.txt"), std::runtime_error);
 }
 

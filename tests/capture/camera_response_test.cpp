@@ -86,13 +86,13 @@ TEST(OpenCamera, ReadsALinearSensorsPicturesByItsResponse) {
 
 TEST(ReadResponse, RefusesEveryBadFileWithItsReason) {
   made::expect_refusals("response_", ".toml",
-                        {{"response_no_toml.toml", ":1: "},
+                        {{"response_no_toml.toml", ":1:9: "},
                          {"response_no_model.toml", "\"model\" is missing"},
-                         {"response_model_of_ours_not.toml", ":1: \"model\" must be"},
-                         {"response_unknown_key.toml", ":8: there is no key \"gamma\""},
+                         {"response_model_of_ours_not.toml", ":1:9: \"model\" must be"},
+                         {"response_unknown_key.toml", ":8:1: there is no key \"gamma\""},
                          {"response_unknown_noise.toml", "there is no key \"noise.flicker\""},
                          {"response_white_below_black.toml", "must be above \"black\""},
-                         {"response_two_blacks.toml", ":3: \"black\" must be a list of 3"},
+                         {"response_two_blacks.toml", ":3:9: \"black\" must be a list of 3"},
                          {"response_nan.toml", "\"white\" must be made of numbers"},
                          {"response_short_curve.toml", "\"red\" must be a list of 256"}},
                         [](const std::string& path) { read_response(path); });

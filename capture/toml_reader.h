@@ -4,32 +4,36 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <initializer_list>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <toml++/toml.h>
 
-#include "calibrate/text_file.h"
+#include "capture/files.h"
 
-namespace calibrate {
+namespace capture {
 
 inline std::string in_quotes(std::string_view text) { return "\"" + std::string(text) + "\""; }
 
 // One file. Every fault is a std::runtime_error with path, line and column.
 class TomlReader {
  public:
-  // Numbers beyond this are mistakes, if nothing else is said.
-  static constexpr double farthest = 1e6;
-
-  // `what` a table of it is: "marker".
+  // `what` a table of it is: "marker". Both must outlive the reader.
   TomlReader(const std::string& path, std::string_view what) : path_(path), what_(what) {}
 
-  toml::table parse() const {
+  const std::string& path() const { return path_; }
+
+  // Of a file that is no larger.
+  toml::table parse(std::size_t most_bytes = std::size_t{64} << 20) const {
+    const std::vector<std::byte> bytes = read_file(path_, most_bytes);
     try {
-      return toml::parse(read_text_file(path_));
+      return toml::parse(
+          std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
     } catch (const toml::parse_error& error) {
       fail(error.source(), std::string(error.description()));
     }
@@ -68,23 +72,29 @@ class TomlReader {
     return *value;
   }
 
-  double number(const toml::node& node, std::string_view key) const {
+  // Numbers beyond this are mistakes, unless `any`, if finite, will do.
+  static constexpr double farthest = 1e6;
+
+  double number(const toml::node& node, std::string_view key, bool any = false) const {
     const auto value = node.is_number() ? node.value<double>() : std::nullopt;
-    if (!value || !(std::abs(*value) <= farthest)) {
-      fail(node.source(), in_quotes(key) + " must hold numbers of at most 1e6");
+    if (!value || !std::isfinite(*value) || (!any && std::abs(*value) > farthest)) {
+      fail(node.source(),
+           in_quotes(key) + " must hold " + (any ? "finite numbers" : "numbers of at most 1e6"));
     }
     return *value;
   }
 
   template <std::size_t count>
-  std::array<double, count> numbers(const toml::node& node, std::string_view key) const {
+  std::array<double, count> numbers(const toml::node& node,
+                                    std::string_view key,
+                                    bool any = false) const {
     const toml::array* list = node.as_array();
     if (list == nullptr || list->size() != count) {
       fail(node.source(),
            in_quotes(key) + " must be a list of " + std::to_string(count) + " numbers");
     }
     std::array<double, count> result{};
-    for (std::size_t i = 0; i < count; ++i) result[i] = number(*list->get(i), key);
+    for (std::size_t i = 0; i < count; ++i) result[i] = number(*list->get(i), key, any);
     return result;
   }
 
@@ -93,4 +103,4 @@ class TomlReader {
   std::string_view what_;
 };
 
-}  // namespace calibrate
+}  // namespace capture
