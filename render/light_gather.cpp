@@ -11,6 +11,7 @@
 #include "render/caustics.h"
 #include "render/lanes.h"
 #include "render/shadow_stream.h"
+#include "render/smooth_blocks.h"
 #include "render/soft_lights.h"
 #include "render/trace.h"
 #include "render/visibility_finder.h"
@@ -263,8 +264,7 @@ void gather_cell(const LightContext& context,
     if (real_first != CellMask{}) {
       // Light that real things block is not there to be lost.
       VisibilityFinder behind(context, r, w, statistics, mask_real_blocker);
-      behind.skip_ = skip;
-      behind.find(first32, count);
+      behind.find(first32, std::span(skip).first(count));
       w.tints.clear();
       for (std::size_t i = 0; i < count; ++i) {
         for (std::size_t word = 0; word < 4; ++word) {
@@ -274,8 +274,7 @@ void gather_cell(const LightContext& context,
       }
     }
     VisibilityFinder finder(context, r, w, statistics, 0);
-    finder.skip_ = skip;
-    finder.find(first32, count);
+    finder.find(first32, std::span(skip).first(count));
     for (const auto& tint : w.tints) {
       visibility.tints.push_back({static_cast<std::uint16_t>(tint.light),
                                   static_cast<std::uint16_t>(tint.point), tint.lost_share});
@@ -426,13 +425,13 @@ void gather_cell_lamps(const LightContext& context,
   const auto& lamps = context.table->lamps;
   for (std::size_t first = 0; first < lamps.size(); first += GatherWorkspace::group) {
     const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lamps.size() - first);
-    VisibilityFinder finder(context, r, w, statistics, mask_virtual | mask_real_blocker, true);
     std::array<std::uint16_t, GatherWorkspace::group> place{};
+    std::array<bool, GatherWorkspace::group> skip{};
     w.tints.clear();
     for (std::size_t i = 0; i < count; ++i) {
       const LocalLight& lamp = lamps[first + i];
       w.lit[i] = {};
-      finder.skip_[i] = lamp.ambient != 0 || context.is_caustic(first + i);
+      skip[i] = lamp.ambient != 0 || context.is_caustic(first + i);
       if (lamp.intensity == Vec3f{}) continue;
       if (context.is_caustic(first + i)) {
         add_cell_caustic(context, r, first + i, cell);
@@ -445,7 +444,8 @@ void gather_cell_lamps(const LightContext& context,
       cell.numbers.push_back(static_cast<std::uint16_t>(first + i));
       cell.factors.push_back(factors);
     }
-    finder.find(static_cast<std::uint32_t>(first), count);
+    VisibilityFinder finder(context, r, w, statistics, mask_virtual | mask_real_blocker, true);
+    finder.find(static_cast<std::uint32_t>(first), std::span(skip).first(count));
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t word = 0; word < 4; ++word) {
         for (std::uint64_t bits = w.lit[i][word] & ~w.seen[i][word]; bits != 0; bits &= bits - 1) {
