@@ -30,15 +30,17 @@ struct Effort {
   int light_samples = 64;  // lights in the table
   int interleave = 1;  // 1, 2 or 4: each pixel of a block of this size tests its share of lights
   bool adaptive_visibility = true;  // shadow rays on every fourth pixel, more only at penumbrae
-  int bounce_lamps = 0;     // stand for light between dull surfaces (BouncedLight); 0 = none is
+  // Virtual point lights, which stand for light between dull surfaces (BouncedLight); 0 = none is.
+  int bounce_lamps = 0;
   int caustic_photons = 0;  // from bright lights through clear bodies (Caustics); 0 = straight on
   // Pixels look for wide lights all over the regions that these stand for, and share what they
   // find: soft shadows instead of steps.
   bool soft_lights = true;
   bool cull_lights = true;  // skip shadow rays that no object can block
   float accuracy = 0.97F;   // rays whose share of the pixel falls below 1 - accuracy are cut
-  // Of rays that would be cut, some are followed and stand for all of them, by chance: right in the
-  // mean of many samples, and nearer than any cut where glass and mirrors face each other.
+  // Russian roulette: of rays that would be cut, some are followed and stand for all of them, by
+  // chance. Right in the mean of many samples, and nearer than any cut where glass and mirrors face
+  // each other.
   bool chance_cuts = false;
   bool dark_cuts = false;  // cut rays see nothing, instead of the environment: for charts
   int max_depth = 64;      // safety net; counted when hit
