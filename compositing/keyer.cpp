@@ -93,10 +93,41 @@ std::vector<std::uint8_t> masked_blocks(const KeyMasks& masks, int height, int w
 constexpr int frames_between_looks = 3;
 constexpr float shift_still_px = 1;
 
-// 1 up to `good`, 0 from `bad` on.
-float falling(float value, float good, float bad) {
-  return std::clamp((bad - value) / (bad - good), 0.0F, 1.0F);
-}
+// Up to which value a key is sure, and from which on it is not at all.
+struct Fall {
+  float good, bad;
+  // 1 up to `good`, 0 from `bad` on.
+  float of(float value) const { return std::clamp((bad - value) / (bad - good), 0.0F, 1.0F); }
+};
+
+// What lowers the confidence. What the made scenes and stressors show of each is in
+// keying_measured.md (Confidence).
+// Share of the plate's screen in sight: made persons leave .64 of it and more. The other way about:
+// up to the first it is as if none were, from the second on it lowers nothing.
+constexpr Fall screen_in_sight{0.03F, 0.25F};
+// Share of that which is at the camera's limit: none in the made scenes but "over-exposed", where
+// nearly all is, and edges are twice as wrong as in "plain".
+constexpr Fall screen_clipped{0.05F, 0.6F};
+constexpr float least_if_clipped = 0.5F;
+// Share of the screen with its colour, but less than a fourth of its light: at most .0014 in the
+// made scenes, .008 to .015 under a shadow of .75.
+constexpr Fall screen_shadowed{0.003F, 0.012F};
+// Noise of the screen's share at a pixel: .02 in "plain", .07 in "noise", .24 under 160 times the
+// variance of "plain".
+constexpr Fall noise_of_share{0.06F, 0.25F};
+// How far the screen is off the plate as lit, as a share of it: .01 in "plain", .04 in "noise"; .14
+// where the screen has 3 % of display white.
+constexpr Fall screen_unlike_plate{0.06F, 0.16F};
+// Share of pixels that are neither screen nor person: .08 in "plain", .16 in "glass", .25 under
+// such noise.
+constexpr Fall neither_share{0.15F, 0.45F};
+// Of a camera that was pushed, in pixels: a look is right to a quarter of one, and found up to five
+// (PlateWatch tests).
+constexpr Fall camera_shift_px{shift_still_px, 4};
+constexpr float least_if_moved = 0.5F, more_if_hardly_moved = 0.4F;
+// Light over the plate's, and, with its sign changed, under it: .88 to 1.07 in the made scenes, .45
+// before a plate too bright by 1.2, which changes nothing.
+constexpr Fall gain_above_plate{1.7F, 2.3F}, gain_below_plate{-0.45F, -0.2F};
 
 }  // namespace
 
@@ -269,18 +300,20 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
     lower(0, KeyStatus::no_screen);
     return report;
   }
-  lower(1 - falling(sight.screen, 0.03F, 0.25F), KeyStatus::hidden);
+  lower(1 - screen_in_sight.of(sight.screen), KeyStatus::hidden);
   if (settings_.method == KeyMethod::screen) {
-    lower(0.5F + 0.5F * falling(sight.clipped, 0.05F, 0.6F), KeyStatus::clipped);
-    lower(falling(sight.shadowed, 0.003F, 0.012F), KeyStatus::shadowed);
-    lower(falling(light_.lit().sigma, 0.06F, 0.25F), KeyStatus::noisy);
+    lower(least_if_clipped + (1 - least_if_clipped) * screen_clipped.of(sight.clipped),
+          KeyStatus::clipped);
+    lower(screen_shadowed.of(sight.shadowed), KeyStatus::shadowed);
+    lower(noise_of_share.of(light_.lit().sigma), KeyStatus::noisy);
   }
-  lower(falling(sight.mismatch, 0.06F, 0.16F), KeyStatus::misfit);
-  lower(falling(soft, 0.15F, 0.45F), KeyStatus::misfit);
+  lower(screen_unlike_plate.of(sight.mismatch), KeyStatus::misfit);
+  lower(neither_share.of(soft), KeyStatus::misfit);
   if (report.moved) {
-    lower(0.5F + 0.4F * falling(shift_.size_px(), shift_still_px, 4), KeyStatus::moved);
+    lower(least_if_moved + more_if_hardly_moved * camera_shift_px.of(shift_.size_px()),
+          KeyStatus::moved);
   }
-  lower(falling(sight.gain, 1.7F, 2.3F) * falling(-sight.gain, -0.45F, -0.2F), KeyStatus::unlit);
+  lower(gain_above_plate.of(sight.gain) * gain_below_plate.of(-sight.gain), KeyStatus::unlit);
   return report;
 }
 
