@@ -144,19 +144,13 @@ std::vector<double> BracketedCamera::exposures_s() const {
   return taken_s;
 }
 
-BracketStatistics BracketedCamera::bracket_statistics() const {
-  BracketStatistics statistics = counts_;
-  statistics.lag = labeller_.lag();
-  return statistics;
-}
-
 CameraStatistics BracketedCamera::statistics() const {
   CameraStatistics statistics = camera_->statistics();
   statistics.damaged += damaged_;
-  statistics.rejected = counts_.rejected;
-  statistics.unknown = counts_.unknown;
   statistics.exposure_lag = labeller_.lag();
   statistics.exposures_s = exposures_s();
+  statistics.refused = refused_;
+  statistics.refusal = refusal_;
   statistics.too_bright = auto_ && auto_->too_bright();
   statistics.too_dark = auto_ && auto_->too_dark();
   return statistics;
@@ -180,8 +174,8 @@ void BracketedCamera::request(std::int64_t after_frame) {
       schedule_members();
     }
   } catch (const std::runtime_error& refusal) {
-    ++counts_.refused;
-    counts_.refusal = refusal.what();
+    ++refused_;
+    refusal_ = refusal.what();
   }
 }
 
@@ -203,9 +197,6 @@ std::optional<Frame> BracketedCamera::next() {
         labeller_.lag()) {
       frame->exposure_s = label.predicted_s;
     }
-    counts_.accepted += label.verdict == LabelVerdict::accepted;
-    counts_.rejected += label.verdict == LabelVerdict::rejected;
-    counts_.unknown += label.verdict == LabelVerdict::unknown;
     if (label.verdict != LabelVerdict::accepted) frame->note = words_of(label.reason);
     if (label.verdict == LabelVerdict::rejected) {
       frame->status = FrameStatus::damaged;

@@ -16,15 +16,6 @@
 
 namespace capture {
 
-struct BracketStatistics {
-  std::optional<int> lag;  // frames from a request to the first that it can act on; not yet known
-  std::int64_t accepted = 0;
-  std::int64_t rejected = 0;
-  std::int64_t unknown = 0;  // black or saturated
-  std::int64_t refused = 0;  // requests that the camera did not take
-  std::string refusal;       // why, of the last one
-};
-
 // Asks a camera for one exposure of a schedule after each frame that arrives, in turn for ever, and
 // says of each frame which of them made it (see ExposureLabeller). Images are as the camera gives
 // them; their values must be linear, with 1 = saturated.
@@ -59,7 +50,6 @@ class BracketedCamera final : public Camera {
   void set_exposures(std::span<const double> exposures_s);
   // What the device makes of the schedule, in its order.
   std::vector<double> exposures_s() const;
-  BracketStatistics bracket_statistics() const;
 
   const CameraInfo& info() const override { return camera_->info(); }
   std::optional<Frame> next() override;
@@ -84,9 +74,10 @@ class BracketedCamera final : public Camera {
   std::string name_;
   ExposureLabeller labeller_;
   std::vector<Member> members_;
-  std::size_t turn_ = 0;  // of the next request
-  BracketStatistics counts_;
+  std::size_t turn_ = 0;      // of the next request
   std::int64_t damaged_ = 0;  // by our verdict
+  std::int64_t refused_ = 0;  // requests
+  std::string refusal_;       // of the last one
   // Of exposures that follow the light.
   std::optional<AutoExposures> auto_;
   std::optional<LightMeter> meter_;

@@ -42,10 +42,10 @@ struct CameraStatistics {
   std::int64_t lost = 0;
   std::int64_t damaged = 0;
   // Of a camera that brackets (bracketed_camera.h):
-  std::int64_t rejected = 0;        // the exposure is not certain
-  std::int64_t unknown = 0;         // black or saturated, so that it cannot be told
   std::optional<int> exposure_lag;  // frames from a request to its effect, where it is known
   std::vector<double> exposures_s;  // that it is told in turn
+  std::int64_t refused = 0;         // exposures asked for that it did not take
+  std::string refusal;              // why, of the last one
   // Of exposures that follow the light (auto_exposures.h):
   bool too_bright = false;  // something saturates in the shortest possible exposure
   bool too_dark = false;    // the longest possible exposure is too short

@@ -233,6 +233,8 @@ bool Recorder::Take::push(RecordedFrame frame) {
   }
   if (frame.sound && waiting_sounds_.size() < most_waiting_sounds) {
     waiting_sounds_.push_back(std::move(*frame.sound));
+  } else if (frame.sound && sound_) {
+    ++status_.sounds_left_out;
   }
   frame.sound.reset();
   if (!has_room()) {
@@ -252,9 +254,7 @@ void Recorder::Take::wait_for_room() {
 
 RecorderStatus Recorder::Take::status() const {
   const std::lock_guard lock(mutex_);
-  RecorderStatus status = status_;
-  status.queued = static_cast<int>(queue_.size());
-  return status;
+  return status_;
 }
 
 void Recorder::Take::close() {

@@ -55,12 +55,12 @@ struct RecordedFrame {
 struct RecorderStatus {
   std::int64_t written = 0;
   std::int64_t dropped = 0;  // came while the queue was full, or after an error
-  int queued = 0;
-  std::int64_t sounds_left_out = 0;  // chunks of another form, or with a time far after their frame
-  double raised_share = 0;           // of pixels whose key is above the matte, see fill_and_key.h
-  double worst_write_s = 0;          // longest time that one frame took to write
-  double write_s = 0;                // time spent writing, in all
-  std::string error;                 // why recording stopped; "" = it has not
+  // Chunks of another form, with a time far after their frame, or of too many dropped frames.
+  std::int64_t sounds_left_out = 0;
+  double raised_share = 0;   // of pixels whose key is above the matte, see fill_and_key.h
+  double worst_write_s = 0;  // longest time that one frame took to write
+  double write_s = 0;        // time spent writing, in all
+  std::string error;         // why recording stopped; "" = it has not
 };
 
 // Throws as Recorder's constructor, for all that can be told before anything is written.

@@ -47,6 +47,8 @@ Json probe_json(const ShowStatus& s) {
       {"exposures_s", s.probe.exposures_s},
       {"too_bright", s.probe.too_bright},
       {"too_dark", s.probe.too_dark},
+      {"refused", s.probe.refused},
+      {"refusal", s.probe.refusal},
       {"flicker_hz", s.probe.flicker ? Json(s.probe.flicker->light_hz) : Json(nullptr)},
       {"flicker_modulation", s.probe.flicker ? Json(s.probe.flicker->modulation) : Json(nullptr)},
       {"good", share_of(capture::MergeStatus::good)},
@@ -80,6 +82,7 @@ Json persons_json(const std::vector<PersonStatus>& persons) {
 Json record_json(const Set& set, const compositing::RecorderStatus& recorder) {
   Json json{{"written", recorder.written},
             {"dropped", recorder.dropped},
+            {"sounds_left_out", recorder.sounds_left_out},
             {"worst_write_ms", recorder.worst_write_s * 1000},
             {"write_ms", recorder.write_s * 1000}};
   if (!set.record.key.empty()) json["key_raised"] = recorder.raised_share;

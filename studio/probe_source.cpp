@@ -397,6 +397,8 @@ void ProbeSource::note_camera() {
   status_.exposures_s = std::move(camera.exposures_s);
   status_.too_bright = camera.too_bright;
   status_.too_dark = camera.too_dark;
+  status_.refused = camera.refused;
+  status_.refusal = std::move(camera.refusal);
 }
 
 void ProbeSource::take(const capture::Frame& frame, Taken& taken) {

@@ -33,6 +33,8 @@ struct ProbeStatus {
   std::vector<double> exposures_s;
   bool too_bright = false;
   bool too_dark = false;
+  std::int64_t refused = 0;                 // exposures that such a camera did not take
+  std::string refusal;                      // why, of the last one
   std::optional<capture::Flicker> flicker;  // of lamps, which is levelled
   std::string kept_because;  // why the last good light stays on air; "" = the light is new
 };

@@ -397,6 +397,23 @@ class Show::Stages {
            " on the last good light stays: " + why);
     }
     light_kept_because_ = why;
+    const std::int64_t refused = frame.probe.refused;
+    if (refused > 0 && refused_exposures_ == 0) {
+      note("by frame " + std::to_string(frame.job.frame) +
+           " the probe's camera has refused an exposure: " + frame.probe.refusal);
+    }
+    refused_exposures_ = refused;
+  }
+
+  // Once a recording.
+  void note_sound(const ShowStatus& status) {
+    const std::int64_t left_out = status.recorder.sounds_left_out;
+    if (left_out > 0 && sounds_left_out_ == 0) {
+      note("by frame " + std::to_string(status.frame) +
+           " sound is missing in the recording: it has another form than the plate told, a time "
+           "far after its picture, or came while no frame could be written");
+    }
+    sounds_left_out_ = left_out;
   }
 
   template <class Act>
@@ -432,6 +449,7 @@ class Show::Stages {
     status.finished = finished;
     status.recording = recording_.running();
     status.recorder = recording_.status();
+    note_sound(status);
     publish(status);
   }
 
@@ -491,6 +509,8 @@ class Show::Stages {
   render::KeptTransport kept_;
   bool stays_coarse_ = false;
   std::string light_kept_because_;
+  std::int64_t refused_exposures_ = 0;  // of the probe's camera, by the last frame
+  std::int64_t sounds_left_out_ = 0;    // of the recording, by then
   capture::Pool<render::FrameResult> results_;
   capture::Pool<std::vector<std::uint8_t>> pictures_;
 

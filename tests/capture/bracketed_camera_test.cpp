@@ -99,8 +99,12 @@ TEST(BracketedCamera, SaysOfEachFrameWhatMadeIt) {
   EXPECT_THAT(camera.exposures_s(),
               testing::ElementsAre(testing::DoubleEq(1e-3), testing::DoubleEq(4e-3),
                                    testing::DoubleEq(16e-3)));
+  int accepted = 0;
+  int damaged = 0;
   for (int i = 0; i < 100; ++i) {
     const Frame frame = camera.next().value();
+    accepted += frame.exposure_s > 0 && frame.note.empty();
+    damaged += frame.status == FrameStatus::damaged;
     if (i < 15 && frame.exposure_s == 0) {
       EXPECT_NE(frame.note, "");
       continue;
@@ -108,11 +112,10 @@ TEST(BracketedCamera, SaysOfEachFrameWhatMadeIt) {
     EXPECT_EQ(frame.status, FrameStatus::good) << i << " " << frame.note;
     EXPECT_EQ(frame.exposure_s, script->made_s.back());
   }
-  const BracketStatistics statistics = camera.bracket_statistics();
-  EXPECT_TRUE(statistics.lag);
-  EXPECT_GE(statistics.accepted, 85);
-  EXPECT_EQ(statistics.accepted + statistics.rejected + statistics.unknown, 100);
-  EXPECT_EQ(camera.statistics().damaged, statistics.rejected);
+  EXPECT_TRUE(camera.statistics().exposure_lag);
+  EXPECT_GE(accepted, 85);
+  EXPECT_EQ(camera.statistics().damaged, damaged);
+  EXPECT_EQ(camera.statistics().refused, 0);
 }
 
 TEST(BracketedCamera, SaysNothingWrongOfAFaultyCamera) {
@@ -145,8 +148,8 @@ TEST(BracketedCamera, GoesOnWhereTheCameraRefuses) {
       EXPECT_EQ(frame.status, FrameStatus::good) << frame.note;
     }
   }
-  EXPECT_EQ(camera.bracket_statistics().refused, 10);
-  EXPECT_EQ(camera.bracket_statistics().refusal, "made: camera: busy");
+  EXPECT_EQ(camera.statistics().refused, 10);
+  EXPECT_EQ(camera.statistics().refusal, "made: camera: busy");
 }
 
 TEST(BracketedCamera, GoesOnWhereTheCameraTellsNoExposure) {
@@ -158,8 +161,8 @@ TEST(BracketedCamera, GoesOnWhereTheCameraTellsNoExposure) {
     EXPECT_TRUE(camera.next());
     script->told_s.reset();
     EXPECT_TRUE(camera.next());
-    EXPECT_EQ(camera.bracket_statistics().refused, 1);
-    EXPECT_THAT(camera.bracket_statistics().refusal, testing::HasSubstr("the camera tells"));
+    EXPECT_EQ(camera.statistics().refused, 1);
+    EXPECT_THAT(camera.statistics().refusal, testing::HasSubstr("the camera tells"));
   }
 }
 

@@ -3,11 +3,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <fstream>
+#include <memory>
+#include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "studio/figures.h"
 #include "studio/show.h"
+#include "tests/capture/made_light_camera.h"
 #include "tests/studio/made_show.h"
 
 namespace studio::show_notes_test {
@@ -113,6 +120,112 @@ TEST_F(ShowNotes, NotesWhatACommandCannotDoAndGoesOn) {
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("no such thing")));
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("/proc/nowhere")));
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("size and rate")));
+}
+
+// Its sound is of another rate than it says from a frame on.
+class HoarseCamera final : public GreyCamera {
+ public:
+  explicit HoarseCamera(std::int64_t first) : GreyCamera(20, {25, 1}, 0), first_(first) {
+    info_.sound_channels = 1;
+    info_.sound_rate = 8000;
+  }
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (frame) {
+      const int rate = frame->number < first_ ? 8000 : 16000;
+      sound_ = {frame->time, 1, rate, std::vector<float>(static_cast<std::size_t>(rate / 25))};
+    }
+    return frame;
+  }
+  std::optional<capture::Sound> take_sound() override { return std::exchange(sound_, {}); }
+
+ private:
+  std::int64_t first_;
+  std::optional<capture::Sound> sound_;
+};
+
+TEST_F(ShowNotes, TellsOnceARecordingThatSoundIsMissing) {
+  capture::register_camera("hoarse", [](std::string_view rest, const capture::CameraOptions&) {
+    return std::make_unique<HoarseCamera>(std::stol(std::string(rest)));
+  });
+  const auto missing_of = [](const std::vector<std::string>& notes) {
+    return std::ranges::count_if(notes, [](const std::string& note) {
+      return note.find("sound is missing in the recording") != std::string::npos;
+    });
+  };
+  for (const int first : {10, 20}) {
+    const Set set = made_set("hoarse:" + std::to_string(first),
+                             "[record]\nfile = \"" + (dir_ / "take.mkv").string() + "\"\n");
+    Show show(set);
+    show.run();
+    const ShowStatus status = *show.status();
+    EXPECT_EQ(status.recorder.sounds_left_out > 0, first < 20);
+    EXPECT_LE(status.recorder.sounds_left_out, 20 - first);
+    EXPECT_EQ(missing_of(status.notes), first < 20 ? 1 : 0);
+    const std::string figure =
+        "\"sounds_left_out\": " + std::to_string(status.recorder.sounds_left_out);
+    EXPECT_THAT(show_figures(set, status, {}), HasSubstr(figure));
+  }
+}
+
+// Refuses exposures once it is told to.
+class UnwillingCamera final : public made::LightCamera {
+ public:
+  UnwillingCamera(const std::shared_ptr<made::LightScript>& script,
+                  const std::atomic<bool>& refuses)
+      : LightCamera(script), refuses_(refuses) {
+    info_.live = true;
+  }
+  double set_exposure(double exposure_s) override {
+    if (refuses_) throw std::runtime_error("unwilling: it is busy");
+    return LightCamera::set_exposure(exposure_s);
+  }
+  std::optional<capture::Frame> next() override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    auto frame = LightCamera::next();
+    frame->time = capture::monotonic_now();
+    return frame;
+  }
+
+ private:
+  const std::atomic<bool>& refuses_;
+};
+
+TEST_F(ShowNotes, TellsOnceThatTheProbesCameraRefusesExposures) {
+  std::atomic<bool> refuses = false;
+  const auto script = std::make_shared<made::LightScript>();
+  capture::register_camera("unwilling", [&](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<UnwillingCamera>(script, refuses);
+  });
+  Set set = made_set("grey:100000,25,0");
+  set.probe->kind = ProbeSettings::Kind::camera;
+  set.probe->source = "unwilling:";
+  set.probe->lens = calibrate::Lens{.model = "equisolid",
+                                    .width = 96,
+                                    .height = 96,
+                                    .parameters = {34, 47.5, 47.5},
+                                    .max_angle_rad = 1.5707963};
+  Show show(set);
+  show.run([&](const ShownFrame&) {
+    const std::shared_ptr<const ShowStatus> status = show.status();
+    if (status->frames == 1) {
+      EXPECT_EQ(status->probe.refused, 0);
+      refuses = true;
+    }
+    if (status->probe.refused > 4) show.post(Quit{});
+  });
+  const ShowStatus status = *show.status();
+  EXPECT_EQ(std::ranges::count_if(status.notes,
+                                  [](const std::string& note) {
+                                    return note.find(
+                                               "the probe's camera has refused an "
+                                               "exposure: unwilling: it is busy") !=
+                                           std::string::npos;
+                                  }),
+            1);
+  EXPECT_EQ(status.probe.refusal, "unwilling: it is busy");
+  const std::string figure = "\"refused\": " + std::to_string(status.probe.refused);
+  EXPECT_THAT(show_figures(set, status, {}), HasSubstr(figure));
 }
 
 TEST_F(ShowNotes, RecordsFromOneFrameToAnother) {
