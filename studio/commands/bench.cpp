@@ -72,12 +72,33 @@ struct BenchOptions {
   std::string set;
   std::string pictures, scene;
   std::vector<std::string> files;
-  std::optional<std::int64_t> runs = 5;
-  std::optional<std::int64_t> check = 64;
-  std::optional<std::int64_t> converged = 1024;
-  std::optional<std::int64_t> width = 640, height = 480;
-  std::optional<std::int64_t> frames = 250;
+  // As given; what is left out is as default_runs and the benches' own settings have it.
+  std::optional<std::int64_t> runs, check, converged, width, height, frames;
 };
+
+constexpr int default_runs = 5;
+constexpr std::int64_t default_frames = 250;
+
+void take(const std::optional<std::int64_t>& given, int& setting) {
+  if (given) setting = static_cast<int>(*given);
+}
+
+PapersBench papers_of(const BenchOptions& o, int runs) {
+  PapersBench bench{.runs = runs, .pictures = o.pictures, .scene = o.scene};
+  take(o.check, bench.check);
+  take(o.width, bench.width);
+  take(o.height, bench.height);
+  return bench;
+}
+
+CyclesBench cycles_of(const BenchOptions& o, int runs) {
+  if (o.pictures.empty()) throw UsageError("bench cycles needs a place: --pictures DIR");
+  CyclesBench bench{.directory = o.pictures, .runs = runs, .scene = o.scene};
+  take(o.check, bench.check);
+  take(o.converged, bench.converged);
+  bench.check = std::max(1, bench.check);
+  return bench;
+}
 
 std::string listed(const std::vector<std::string>& names) {
   std::string list;
@@ -95,7 +116,15 @@ void refuse_what_is_ignored(const BenchOptions& o) {
   for (const Option& option :
        {Option{"--set", !o.set.empty(), {"inputs"}}, Option{"--model", !o.files.empty(), {"load"}},
         Option{"--scene", !o.scene.empty(), {"papers", "drag", "cycles"}},
-        Option{"--pictures", !o.pictures.empty(), {"papers", "drag", "cycles"}}}) {
+        Option{"--pictures", !o.pictures.empty(), {"papers", "drag", "cycles"}},
+        Option{"--check-error", o.check.has_value(), {"papers", "cycles"}},
+        Option{"--converged", o.converged.has_value(), {"cycles"}},
+        Option{"--width", o.width.has_value(), {"papers"}},
+        Option{"--height", o.height.has_value(), {"papers"}},
+        Option{"--frames", o.frames.has_value(), {"inputs"}},
+        Option{"--runs",
+               o.runs.has_value(),
+               {"kernel", "growth", "papers", "deform", "cycles", "inputs", "hdr", "load"}}}) {
     if (!option.is_given || std::ranges::find(option.takers, o.what) != option.takers.end()) {
       continue;
     }
@@ -136,9 +165,9 @@ Command bench_command() {
         arguments.option("--width", o->width, 16, 7680, "papers: of the pictures, in pixels");
         arguments.option("--height", o->height, 16, 4320, "papers: of the pictures, in pixels");
         arguments.option("--frames", o->frames, 2, 1 << 20, "inputs: at most so many of the set's");
-        arguments.option("--runs", o->runs, 1, 1000, "take the best of so many runs");
+        arguments.option("--runs", o->runs, 1, 1000, "all but drag: take the best of so many runs");
         return [o](Console& console) {
-          const int runs = static_cast<int>(*o->runs);
+          const int runs = static_cast<int>(o->runs.value_or(default_runs));
           const std::vector<std::string> names{"kernel", "growth", "papers", "drag", "deform",
                                                "cycles", "inputs", "hdr",    "load"};
           if (std::ranges::find(names, o->what) == names.end()) {
@@ -151,20 +180,11 @@ Command bench_command() {
           if (o->what == "hdr") return bench_hdr(runs, console);
           if (o->what == "deform") return bench_deform(runs, console);
           if (o->what == "drag") return bench_drag(o->scene, o->pictures, console);
-          if (o->what == "papers") {
-            return bench_papers({runs, static_cast<int>(*o->check), o->pictures, o->scene,
-                                 static_cast<int>(*o->width), static_cast<int>(*o->height)},
-                                console);
-          }
+          if (o->what == "papers") return bench_papers(papers_of(*o, runs), console);
           if (o->what == "load") return bench_load(o->files, runs, console);
-          if (o->what == "cycles") {
-            if (o->pictures.empty()) throw UsageError("bench cycles needs a place: --pictures DIR");
-            return bench_cycles({o->pictures, runs, std::max(1, static_cast<int>(*o->check)),
-                                 static_cast<int>(*o->converged), o->scene},
-                                console);
-          }
+          if (o->what == "cycles") return bench_cycles(cycles_of(*o, runs), console);
           if (o->set.empty()) throw UsageError("bench inputs needs a set file: --set SET.toml");
-          bench_inputs(o->set, runs, *o->frames, console);
+          bench_inputs(o->set, runs, o->frames.value_or(default_frames), console);
         };
       }};
 }

@@ -40,7 +40,7 @@ struct CyclesBench {
   std::string
       directory;         // for the scenes as files, both renderers' pictures, and what Blender says
   int runs = 5;          // of each point, ours and theirs: the best counts
-  int check = 256;       // paths a pixel of each of our two references
+  int check = 64;        // paths a pixel of each of our two references
   int converged = 1024;  // samples of each of Cycles' two
   std::string scene;     // this one only; "" = all
 };

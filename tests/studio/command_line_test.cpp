@@ -142,7 +142,13 @@ TEST_F(CommandLine, RefusesWhatAChartOrABenchmarkWouldNotLookAt) {
         {"bench kernel --scene car", "papers, drag, cycles"},
         {"bench growth --pictures here", "papers, drag, cycles"},
         {"bench kernel --set a.toml", "inputs"},
-        {"bench hdr --model a.obj", "load"}}) {
+        {"bench hdr --model a.obj", "load"},
+        {"bench kernel --width 64", "papers"},
+        {"bench cycles --pictures here --height 64", "papers"},
+        {"bench papers --frames 2", "inputs"},
+        {"bench growth --check-error 1", "papers, cycles"},
+        {"bench papers --converged 2", "cycles"},
+        {"bench drag --runs 1", "kernel, growth, papers, deform, cycles, inputs, hdr, load"}}) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.status, 2) << words;
     expect_one_line(outcome.err);
