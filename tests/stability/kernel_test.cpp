@@ -2,7 +2,10 @@
 // number that is not finite.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "tests/compositing/made_shot.h"
 
@@ -15,14 +18,9 @@ using render::FrameResult;
 FrameResult render(const MadeShot& shot) {
   FrameResult result;
   render_frame(shot.inputs(), shot.job, shot.plate, result);
-  for (const capture::Half half : result.rgba.pixels) {
-    EXPECT_TRUE(std::isfinite(float_from_half(half)));
-    if (!std::isfinite(float_from_half(half))) break;
-  }
-  for (const capture::Half half : result.matte.pixels) {
-    EXPECT_TRUE(std::isfinite(float_from_half(half)));
-    if (!std::isfinite(float_from_half(half))) break;
-  }
+  const auto is_finite = [](capture::Half half) { return std::isfinite(float_from_half(half)); };
+  EXPECT_TRUE(std::ranges::all_of(result.rgba.pixels, is_finite));
+  EXPECT_TRUE(std::ranges::all_of(result.matte.pixels, is_finite));
   return result;
 }
 
@@ -79,11 +77,37 @@ TEST(KernelAtTheEdge, RendersPicturesOfOnePixelAndOddSizes) {
   }
 }
 
-TEST(KernelAtTheEdge, RendersAnEightKPicture) {
-  MadeShot shot = made_shot(7680, 4320, shot_scene(), 2);
+// Some rows of a shot as a shot of its own, with the same scene.
+MadeShot strip_of(MadeShot whole, int first, int rows) {
+  const auto cut = [&](auto& values, int count, int per_row) {
+    const auto begin = values.begin() + std::ptrdiff_t{first} * per_row;
+    values = std::vector(begin, begin + std::ptrdiff_t{count} * per_row);
+  };
+  calibrate::DirectionTable& d = whole.directions;
+  for (std::vector<float>* values : {&d.x, &d.y, &d.z}) cut(*values, rows + 2, d.width + 2);
+  cut(whole.plate.pixels, rows, 3 * d.width);
+  d.height = whole.plate.height = rows;
+  return whole;
+}
+
+// Where nothing looks beyond a cell, a strip of whole cells is the same alone; in the middle, for
+// it is the middle's pixels that tell how wide all are.
+TEST(KernelAtTheEdge, RendersAnEightKPictureAsItsPartsAlone) {
+  constexpr int width = 7680, height = 4320, first = 2144, rows = 32;
+  MadeShot shot = made_shot(width, height, shot_scene(), 2);
   shot.job.effort.aa_samples = 1;
-  const FrameResult result = render(shot);
-  EXPECT_GT(result.statistics.virtual_pixels, 1000000U);
+  const FrameResult whole = render(shot);
+  EXPECT_GT(whole.statistics.virtual_pixels, 1000000U);
+  const FrameResult alone = render(strip_of(std::move(shot), first, rows));
+  EXPECT_GT(alone.statistics.virtual_pixels, 10000U);
+  EXPECT_GT(alone.statistics.affected_pixels, alone.statistics.virtual_pixels);
+  const auto of_whole = [](const capture::HalfImage& image) {
+    const auto row = std::ptrdiff_t{image.width} * image.channels;
+    return std::vector(image.pixels.begin() + first * row,
+                       image.pixels.begin() + (first + rows) * row);
+  };
+  EXPECT_TRUE(alone.rgba.pixels == of_whole(whole.rgba));
+  EXPECT_TRUE(alone.matte.pixels == of_whole(whole.matte));
 }
 
 TEST(KernelAtTheEdge, TakesAThousandInstances) {

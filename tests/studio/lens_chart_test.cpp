@@ -47,16 +47,16 @@ TEST(LensPeers, AreNoMoreAccurateThanOursOnAFisheye) {
 // cv::fisheye starts each board from a plane that its corners at 90 degrees do not meet.
 TEST(LensPeers, ThrowWhereOursAnswers) {
   const auto truth = made_fisheye(0.0008);
-  std::size_t thrown = 0;
-  for (unsigned seed = 1; seed <= 6; ++seed) {
+  bool thrown = false;
+  for (unsigned seed = 1; !thrown && seed <= 6; ++seed) {
     MadeBoards boards;
     boards.seed = seed;
     const LensProblem problem = make_board_views(truth, boards);
     if (calibrate_with(LensPeer::opencv_fisheye, problem).status == "ok") continue;
-    ++thrown;
+    thrown = true;
     EXPECT_LE(ray_error_mrad(truth, calibrate_lens(problem).lens, 89), 1) << seed;
   }
-  EXPECT_GE(thrown, 1u);
+  EXPECT_TRUE(thrown);
 }
 
 TEST(LensPeers, AreNotBetterOnANormalLensAndTenTimesWorseIfTheBoardIsBent) {
