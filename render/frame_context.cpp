@@ -251,13 +251,7 @@ std::array<Effort, refinement_stages> efforts_of(const Effort& effort) {
   return efforts;
 }
 
-}  // namespace
-
-FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) {
-  if (!inputs.scene || !inputs.directions || !inputs.environment) {
-    throw std::invalid_argument("a frame needs a scene, a lens and an environment");
-  }
-  const Effort& e = job.effort;
+void check_effort(const Effort& e) {
   if (e.aa_samples < 1 || e.aa_samples > samples_max) {
     throw std::invalid_argument("aa_samples must be 1 to " + std::to_string(samples_max));
   }
@@ -278,37 +272,72 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   if (e.tile_size < cell_size || e.tile_size % cell_size != 0) {
     throw std::invalid_argument("tile_size must be a multiple of 16");
   }
-  const auto finite = [](Vec3f v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-  };
-  if (job.lights.lights.size() > most_lights) {
+}
+
+void check_table(const LightTable& table) {
+  if (table.lights.size() > most_lights) {
     throw std::invalid_argument("a table holds at most " + std::to_string(most_lights) + " lights");
   }
-  for (const DirectionalLight& light : job.lights.lights) {
-    if (!finite(light.direction) || !finite(light.irradiance) || !finite(light.planned)) {
+  std::size_t compact = 0;
+  for (const DirectionalLight& light : table.lights) {
+    if (!is_finite(light.direction) || !is_finite(light.irradiance) || !is_finite(light.planned)) {
       throw std::invalid_argument("a light of the table is not finite");
     }
+    compact += light.compact != 0 ? 1 : 0;
   }
-  if (job.lights.parts.size() > job.lights.lights.size()) {
+  if (compact > most_compact_lights) {
+    throw std::invalid_argument("a table marks at most " + std::to_string(most_compact_lights) +
+                                " lights as compact");
+  }
+  if (table.parts.size() > table.lights.size()) {
     throw std::invalid_argument("a table has parts of more lights than it holds");
   }
-  for (const RegionParts& parts : job.lights.parts) {
-    if (!std::ranges::all_of(parts.directions, finite)) {
+  for (const RegionParts& parts : table.parts) {
+    if (!std::ranges::all_of(parts.directions, [](Vec3f v) { return is_finite(v); })) {
       throw std::invalid_argument("a part of a light of the table is not finite");
     }
   }
-  if (job.lights.lamps.size() > most_lights) {
+  if (table.lamps.size() > most_lights) {
     throw std::invalid_argument("a table holds at most " + std::to_string(most_lights) + " lamps");
   }
-  for (const LocalLight& lamp : job.lights.lamps) {
-    if (!finite(lamp.position) || !finite(lamp.normal) || !finite(lamp.intensity) ||
-        !finite(lamp.planned) || !(lamp.area_m2 >= 0) || !std::isfinite(lamp.area_m2)) {
+  for (const LocalLight& lamp : table.lamps) {
+    if (!is_finite(lamp.position) || !is_finite(lamp.normal) || !is_finite(lamp.intensity) ||
+        !is_finite(lamp.planned) || !(lamp.area_m2 >= 0) || !std::isfinite(lamp.area_m2)) {
       throw std::invalid_argument("a lamp is not finite");
     }
   }
+}
+
+// Throws std::invalid_argument for what no frame can be rendered with.
+void check_frame(const FrameInputs& inputs, const FrameJob& job) {
+  if (!inputs.scene || !inputs.directions || !inputs.environment) {
+    throw std::invalid_argument("a frame needs a scene, a lens and an environment");
+  }
+  check_effort(job.effort);
+  check_table(job.lights);
   check_levels(*inputs.environment);
   if (inputs.planned) check_levels(*inputs.planned);
-  FrameContext context;
+  if (!is_finite(calibrate::to_float(calibrate::position_of(job.cam_from_set)))) {
+    throw std::invalid_argument("the camera's pose is not finite");
+  }
+}
+
+// The table with its planned intensities, where it has any.
+LightTable as_planned(const LightTable& table) {
+  LightTable planned = table;
+  for (DirectionalLight& light : planned.lights) {
+    if (light.planned != Vec3f{}) light.irradiance = light.planned;
+  }
+  for (LocalLight& lamp : planned.lamps) {
+    if (lamp.planned != Vec3f{}) lamp.intensity = lamp.planned;
+  }
+  return planned;
+}
+
+// What rays look up: the environment, as planned and as it is, the plate behind clear bodies, the
+// live textures.
+void add_levels(FrameContext& context) {
+  const FrameInputs& inputs = context.inputs;
   context.planned = inputs.planned && alike(*inputs.planned, *inputs.environment)
                         ? inputs.planned
                         : inputs.environment;
@@ -319,49 +348,52 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
       inputs.kept ? inputs.kept->bordered_levels() : std::make_shared<BorderedLevels>();
   bordered->begin(context.levels);
   context.bordered = bordered;
-  for (const DirectionalLight& light : job.lights.lights) {
-    context.irradiances.push_back(four_of(light.irradiance));
-  }
-  auto planned_table = std::make_shared<LightTable>(job.lights);
-  for (std::size_t i = 0; i < planned_table->lights.size(); ++i) {
-    DirectionalLight& light = planned_table->lights[i];
-    if (light.planned != Vec3f{}) light.irradiance = light.planned;
-    if (light.compact != 0) context.compact.push_back(static_cast<std::uint32_t>(i));
-  }
-  for (LocalLight& lamp : planned_table->lamps) {
-    if (lamp.planned != Vec3f{}) lamp.intensity = lamp.planned;
-  }
-  if (context.compact.size() > most_compact_lights) {
-    throw std::invalid_argument("a table marks at most " + std::to_string(most_compact_lights) +
-                                " lights as compact");
-  }
-  if (!context.planned->compact_apart) context.compact.clear();
-  context.pattern = sample_pattern();
-  context.inputs = inputs;
-  context.job = &job;
   if (inputs.scene->has_glass() && inputs.plate != nullptr && inputs.lens != nullptr) {
     context.plate_levels = plate_levels_of(*inputs.plate);
     context.lens = *inputs.lens;
     for (const capture::Image& level : context.plate_levels) context.levels.push_back(&level);
   }
   add_videos(context);
-  context.turn = CameraTurn(job.cam_from_set.R);
-  context.camera = calibrate::to_float(calibrate::position_of(job.cam_from_set));
-  if (!finite(context.camera)) throw std::invalid_argument("the camera's pose is not finite");
-  const auto& d = *inputs.directions;
+}
+
+void add_camera(FrameContext& context) {
+  const calibrate::Pose& cam_from_set = context.job->cam_from_set;
+  const calibrate::DirectionTable& d = *context.inputs.directions;
+  context.turn = CameraTurn(cam_from_set.R);
+  context.camera = calibrate::to_float(calibrate::position_of(cam_from_set));
   const std::size_t a = d.index(d.height / 2, d.width / 2),
                     b = d.index(d.height / 2, d.width / 2 + 1);
   context.pixel_angle =
       std::clamp(length(Vec3f{d.x[a] - d.x[b], d.y[a] - d.y[b], d.z[a] - d.z[b]}), 1e-6F, 1.0F);
-  context.small_lights = find_small_lights(inputs.scene->glowing_parts(), context.camera,
+  context.small_lights = find_small_lights(context.inputs.scene->glowing_parts(), context.camera,
                                            context.turn, context.pixel_angle);
-  add_caustics(context, *planned_table);
-  context.light_rows = LightRows(planned_table->lights);
-  context.soft_lights = SoftLights(*planned_table, e.soft_lights);
-  context.planned_table = std::move(planned_table);
   context.columns = (d.width + cell_size - 1) / cell_size;
   context.rows = (d.height + cell_size - 1) / cell_size;
-  context.efforts = efforts_of(e);
+}
+
+}  // namespace
+
+FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) {
+  check_frame(inputs, job);
+  FrameContext context;
+  context.inputs = inputs;
+  context.job = &job;
+  add_levels(context);
+  for (std::size_t i = 0; i < job.lights.lights.size(); ++i) {
+    const DirectionalLight& light = job.lights.lights[i];
+    context.irradiances.push_back(four_of(light.irradiance));
+    if (light.compact != 0 && context.planned->compact_apart) {
+      context.compact.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  context.pattern = sample_pattern();
+  add_camera(context);
+  auto planned_table = std::make_shared<LightTable>(as_planned(job.lights));
+  add_caustics(context, *planned_table);
+  context.light_rows = LightRows(planned_table->lights);
+  context.soft_lights = SoftLights(*planned_table, job.effort.soft_lights);
+  context.planned_table = std::move(planned_table);
+  context.efforts = efforts_of(job.effort);
   check_stages(context);
   if (inputs.kept) inputs.kept->begin_frame(keys_of(context, *inputs.kept), context);
   return context;
