@@ -224,7 +224,62 @@ std::vector<NamedEffort> efforts() {
   return all;
 }
 
-Json compare(const std::string& name, const CyclesBench& bench, Console& console) {
+// What was measured of one scene.
+struct Comparison {
+  std::string name;
+  Json blender;       // what it tells of itself
+  Pair ours, theirs;  // converged
+  std::vector<Point> our_points, their_points;
+  std::map<std::string, std::vector<bool>> regions;
+  Difference all() const { return difference(ours, theirs, nullptr); }
+};
+
+std::vector<Point> measure_theirs(const Comparison& made,
+                                  const fs::path& directory,
+                                  const Image& plate) {
+  std::vector<Point> points;
+  for (const Json& rendered : made.blender["pictures"]) {
+    if (rendered["seed"] != 1) continue;
+    const Image picture = over_plate(directory / std::string(rendered["file"]), plate);
+    points.push_back({fmt::format("{} samples", int{rendered["samples"]}),
+                      1000 * double{rendered["cpu_s"]}, 1000 * double{rendered["render_s"]},
+                      rms_error(picture, made.theirs), rms_error(picture, made.ours)});
+  }
+  return points;
+}
+
+// One effort, the best of so many runs. Its light is the shot's then.
+Point measure_ours(const NamedEffort& named,
+                   const render::Environment& sky,
+                   int runs,
+                   const Comparison& made,
+                   BenchScene& shot,
+                   render::FrameInputs inputs) {
+  render::LightFollower follower;
+  BenchLight light = follow_bench_sky(follower, sky, {.count = named.effort.light_samples});
+  shot.environment = std::move(light.environment);
+  shot.job.lights = std::move(light.table);
+  shot.job.effort = named.effort;
+  inputs.environment = &shot.environment;
+  render::FrameResult result;
+  Point point{named.name, 1e30, 1e30};
+  for (int run = 0; run < runs; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    const double cpu = cpu_ms_so_far();
+    render_frame(inputs, shot.job, shot.half_plate, result);
+    point.cpu_ms = std::min(point.cpu_ms, cpu_ms_so_far() - cpu);
+    point.wall_ms =
+        std::min(point.wall_ms,
+                 std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+                     .count());
+  }
+  const Image picture = capture::to_float(result.rgba);
+  point.error = rms_error(picture, made.ours);
+  point.error_to_other = rms_error(picture, made.theirs);
+  return point;
+}
+
+Comparison compare(const std::string& name, const CyclesBench& bench) {
   const fs::path directory = fs::absolute(fs::path(bench.directory) / name);
   PeerScene scene = make_peer_scene(name, width, height);
   BenchScene& shot = scene.shot;
@@ -232,96 +287,88 @@ Json compare(const std::string& name, const CyclesBench& bench, Console& console
   std::vector<int> counts;
   for (int count = 1; count <= std::min(bench.converged, 256); count *= 4) counts.push_back(count);
   run_blender(directory, bench.runs, bench.converged, counts);
-  Json theirs;
-  std::ifstream(directory / "cycles.json") >> theirs;
+  Comparison made;
+  made.name = name;
+  std::ifstream(directory / "cycles.json") >> made.blender;
 
   render::FrameInputs inputs = shot.inputs();
   inputs.lens = &shot.lens;
   inputs.plate = &shot.half_plate;
-  Pair ours_converged, theirs_converged;
   for (std::uint32_t i = 0; i < 2; ++i) {
-    ours_converged[i] =
+    made.ours[i] =
         render_reference(inputs, shot.job, shot.plate, {.samples = bench.check, .seed = i + 1});
-    theirs_converged[i] =
+    made.theirs[i] =
         over_plate(directory / fmt::format("cycles_{}_{}.exr", bench.converged, i + 2), shot.plate);
   }
-  write_display_png(directory / "platelight.png", ours_converged[0]);
-  write_display_png(directory / "cycles.png", theirs_converged[0]);
+  write_display_png(directory / "platelight.png", made.ours[0]);
+  write_display_png(directory / "cycles.png", made.theirs[0]);
 
-  std::vector<Point> their_points, our_points;
-  for (const Json& made : theirs["pictures"]) {
-    if (made["seed"] != 1) continue;
-    const Image picture = over_plate(directory / std::string(made["file"]), shot.plate);
-    their_points.push_back({fmt::format("{} samples", int{made["samples"]}),
-                            1000 * double{made["cpu_s"]}, 1000 * double{made["render_s"]},
-                            rms_error(picture, theirs_converged),
-                            rms_error(picture, ours_converged)});
-  }
-  render::Environment sky = std::move(shot.environment);
+  made.their_points = measure_theirs(made, directory, shot.plate);
+  const render::Environment sky = std::move(shot.environment);
   for (const NamedEffort& named : efforts()) {
-    render::LightFollower follower;
-    BenchLight light = follow_bench_sky(follower, sky, {.count = named.effort.light_samples});
-    shot.environment = std::move(light.environment);
-    shot.job.lights = std::move(light.table);
-    shot.job.effort = named.effort;
-    inputs.environment = &shot.environment;
-    render::FrameResult result;
-    Point point{named.name, 1e30, 1e30};
-    for (int run = 0; run < bench.runs; ++run) {
-      const auto start = std::chrono::steady_clock::now();
-      const double cpu = cpu_ms_so_far();
-      render_frame(inputs, shot.job, shot.half_plate, result);
-      point.cpu_ms = std::min(point.cpu_ms, cpu_ms_so_far() - cpu);
-      point.wall_ms = std::min(point.wall_ms, std::chrono::duration<double, std::milli>(
-                                                  std::chrono::steady_clock::now() - start)
-                                                  .count());
-    }
-    const Image picture = capture::to_float(result.rgba);
-    point.error = rms_error(picture, ours_converged);
-    point.error_to_other = rms_error(picture, theirs_converged);
-    our_points.push_back(point);
+    made.our_points.push_back(measure_ours(named, sky, bench.runs, made, shot, inputs));
   }
-  std::ranges::sort(our_points, {}, &Point::cpu_ms);
+  std::ranges::sort(made.our_points, {}, &Point::cpu_ms);
+  made.regions = regions_of(shot);
+  return made;
+}
 
-  const Difference all = difference(ours_converged, theirs_converged, nullptr);
+// How many times the CPU time Cycles takes to come to a point's error.
+struct Faster {
+  double times = 0;
+  bool at_least = false;
+};
+Faster faster_than(const std::vector<Point>& theirs, const Point& ours) {
+  const auto [cycles_ms, at_least] = time_at(theirs, ours.error);
+  return {cycles_ms / ours.cpu_ms, at_least};
+}
+
+void print(const Comparison& made, Console& console) {
+  const Difference all = made.all();
   console.say(fmt::format("\n{}: converged pictures differ by {:+.5f} in the mean, {:.4f} rms",
-                          name, all.mean, all.rms));
-  Json regions = Json::object();
-  for (const auto& [material, region] : regions_of(shot)) {
-    const Difference there = difference(ours_converged, theirs_converged, &region);
-    regions[material] = {{"share", there.share}, {"mean", there.mean}, {"rms", there.rms}};
-    if (there.share > 0.002) {
-      console.say(fmt::format("  {:<12} {:5.1f} % of the picture  {:+.4f} mean  {:.4f} rms",
-                              material, 100 * there.share, there.mean, there.rms));
-    }
+                          made.name, all.mean, all.rms));
+  for (const auto& [material, region] : made.regions) {
+    const Difference there = difference(made.ours, made.theirs, &region);
+    if (there.share <= 0.002) continue;
+    console.say(fmt::format("  {:<12} {:5.1f} % of the picture  {:+.4f} mean  {:.4f} rms", material,
+                            100 * there.share, there.mean, there.rms));
   }
   console.say(fmt::format("  {:<44} {:>10} {:>10} {:>8} {:>10}", "Cycles", "CPU ms", "wall ms",
                           "RMSE", "to ours"));
-  for (const Point& p : their_points) {
+  for (const Point& p : made.their_points) {
     console.say(fmt::format("  {:<44} {:>10.0f} {:>10.0f} {:>8.4f} {:>10.4f}", p.name, p.cpu_ms,
                             p.wall_ms, p.error, p.error_to_other));
   }
   console.say(fmt::format("  {:<44} {:>10} {:>10} {:>8} {:>10} {:>8}", "Platelight", "CPU ms",
                           "wall ms", "RMSE", "to theirs", "faster"));
-  Json ours = Json::array();
-  for (const Point& p : our_points) {
-    const auto [cycles_ms, at_least] = time_at(their_points, p.error);
-    const double faster = cycles_ms / p.cpu_ms;
+  for (const Point& p : made.our_points) {
+    const Faster faster = faster_than(made.their_points, p);
     console.say(fmt::format("  {:<44} {:>10.0f} {:>10.0f} {:>8.4f} {:>10.4f} {:>2}{:>5.0f}x",
                             p.name, p.cpu_ms, p.wall_ms, p.error, p.error_to_other,
-                            at_least ? ">" : "", faster));
-    ours.push_back(json_of(p));
-    ours.back()["times_faster"] = faster;
+                            faster.at_least ? ">" : "", faster.times));
   }
-  Json cycles = Json::array();
-  for (const Point& p : their_points) cycles.push_back(json_of(p));
-  return {{"scene", name},
+}
+
+Json json_of(const Comparison& made) {
+  Json regions = Json::object();
+  for (const auto& [material, region] : made.regions) {
+    const Difference there = difference(made.ours, made.theirs, &region);
+    regions[material] = {{"share", there.share}, {"mean", there.mean}, {"rms", there.rms}};
+  }
+  Json ours = Json::array(), theirs = Json::array();
+  for (const Point& p : made.our_points) {
+    ours.push_back(json_of(p));
+    ours.back()["times_faster"] = faster_than(made.their_points, p).times;
+  }
+  for (const Point& p : made.their_points) theirs.push_back(json_of(p));
+  const Difference all = made.all();
+  return {{"scene", made.name},
           {"mean_difference", all.mean},
           {"rms_difference", all.rms},
           {"materials", regions},
-          {"blender", theirs["version"]},
-          {"cycles_preparing_cpu_s", theirs["preparing_cpu_s"]},
-          {"cycles", cycles},
+          {"blender", made.blender["version"]},
+          {"cycles_preparing_cpu_s", made.blender["preparing_cpu_s"]},
+          {"cycles", theirs},
           {"platelight", ours}};
 }
 
@@ -333,7 +380,9 @@ void bench_cycles(const CyclesBench& bench, Console& console) {
   Json rows = Json::array();
   for (const std::string& name : peer_scene_names()) {
     if (!bench.scene.empty() && bench.scene != name) continue;
-    rows.push_back(compare(name, bench, console));
+    const Comparison made = compare(name, bench);
+    print(made, console);
+    rows.push_back(json_of(made));
   }
   if (rows.empty()) make_peer_scene(bench.scene, width, height);  // throws, naming those there are
   give_rows(rows, console);

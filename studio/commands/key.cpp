@@ -144,6 +144,107 @@ void spare_what_is_read(const KeyOptions& options, const VideoSource& source, Co
   spare_files(files, console.figures_file());
 }
 
+// What keying a clip came to.
+struct KeyedClip {
+  std::string colour;  // of the screen
+  double known = 0;    // share of the plate
+  std::int64_t frames = 0, lost = 0, keyed = 0;
+  double confidence_sum = 0, least_confidence = 1;
+  std::string_view why = "good";  // of the least
+  double key_ms = 0;              // in all
+  Json rows = Json::array();
+  double confidence() const { return confidence_sum / static_cast<double>(keyed); }
+};
+
+Json lost_row(std::int64_t frame) { return {{"frame", frame}, {"status", "lost"}}; }
+
+Json row_of(std::int64_t frame, const compositing::KeyReport& report) {
+  Json row{{"frame", frame},
+           {"confidence", report.confidence},
+           {"status", compositing::name_of(report.status)},
+           {"screen_in_sight", report.sight.screen},
+           {"gain", report.sight.gain},
+           {"mismatch", report.sight.mismatch},
+           {"clipped", report.sight.clipped},
+           {"soft", report.soft}};
+  if (report.moved) row["moved_px"] = {report.shift.right_px, report.shift.down_px};
+  return row;
+}
+
+void add(const compositing::KeyReport& report, std::int64_t frame, KeyedClip& clip) {
+  ++clip.keyed;
+  if (report.confidence < clip.least_confidence) clip.why = compositing::name_of(report.status);
+  clip.least_confidence = std::min(clip.least_confidence, double{report.confidence});
+  clip.confidence_sum += report.confidence;
+  clip.rows.push_back(row_of(frame, report));
+}
+
+capture::HalfImage matte_of(const capture::HalfImage& keyed) {
+  capture::HalfImage matte{keyed.height, keyed.width, {}, 1};
+  matte.pixels.reserve(keyed.pixels.size() / 4);
+  for (std::size_t i = 3; i < keyed.pixels.size(); i += 4) matte.pixels.push_back(keyed.pixels[i]);
+  return matte;
+}
+
+// Keys the camera's frames into the sequence.
+void key_frames(const KeyOptions& options,
+                capture::Camera& camera,
+                compositing::Keyer& keyer,
+                const compositing::ExrSequence& sequence,
+                KeyedClip& clip) {
+  compositing::KeyedFrame keyed;
+  for (; clip.frames < options.frames.value_or(INT64_MAX); ++clip.frames) {
+    const auto frame = camera.next();
+    if (!frame) return;
+    const std::int64_t number = clip.frames + options.first.value_or(0);
+    // Its picture is the one before, if there is any.
+    const bool is_lost = frame->status == capture::FrameStatus::lost;
+    if (is_lost || !frame->image) {
+      ++clip.lost;
+      clip.rows.push_back(lost_row(number));
+      if (!frame->image) continue;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    const compositing::KeyReport report = keyer.key(*frame->image, keyed);
+    clip.key_ms +=
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    sequence.write(clip.frames, keyed.image(), matte_of(keyed.image()), {});
+    if (!is_lost) add(report, number, clip);
+  }
+}
+
+Json json_of(const KeyedClip& clip) {
+  return {{"frames", clip.frames},
+          {"lost", clip.lost},
+          {"colour", clip.colour},
+          {"plate_known", clip.known},
+          {"confidence_mean", clip.confidence()},
+          {"confidence_least", clip.least_confidence},
+          {"key_ms", clip.key_ms / static_cast<double>(clip.keyed)},
+          {"rows", clip.rows}};
+}
+
+// `before`: frames that the directory had already.
+void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Console& console) {
+  console.say(
+      fmt::format("{}: {} frames before a {} screen, confidence {:.2f} in the mean, {:.2f} at "
+                  "least; {:.1f} ms a frame",
+                  out, clip.frames, clip.colour, clip.confidence(), clip.least_confidence,
+                  clip.key_ms / static_cast<double>(clip.keyed)));
+  if (before > 0) {
+    console.warn(fmt::format("{} had {} frames already: those with other numbers are still there",
+                             out, before));
+  }
+  if (clip.lost > 0) {
+    console.warn(fmt::format(
+        "{} of {} frames were lost: the picture before stands in their place, if there is one",
+        clip.lost, clip.frames));
+  }
+  if (clip.confidence() < unsure) {
+    console.warn(fmt::format("the key is unsure ({}): look at it before it is used", clip.why));
+  }
+}
+
 void key_clip(const KeyOptions& options, Console& console) {
   const VideoSource source = source_of(options, options.what.front());
   spare_what_is_read(options, source, console);
@@ -151,8 +252,9 @@ void key_clip(const KeyOptions& options, Console& console) {
   const compositing::KeySettings settings = settings_of(options);
   compositing::CleanPlate plate =
       read_clean_plate(options.plate, source, settings.method, {first, first + plate_footage - 1});
-  const double known = plate.known;
-  const std::string colour(compositing::name_of(plate.colour));
+  KeyedClip clip;
+  clip.colour = compositing::name_of(plate.colour);
+  clip.known = plate.known;
   const auto camera = open_video(source);
   // Before the masks, which are for the video too.
   const auto [width, height] = std::pair(camera->info().width, camera->info().height);
@@ -169,78 +271,10 @@ void key_clip(const KeyOptions& options, Console& console) {
   take.pixel_aspect = camera->info().pixel_aspect;
   const std::int64_t before = compositing::ExrSequence::frames_in(options.out);
   const compositing::ExrSequence sequence(take);
-  compositing::KeyedFrame frame_keyed;
-  const capture::HalfImage& keyed = frame_keyed.image();
-  capture::HalfImage matte;
-  Json rows = Json::array();
-  double least = 1, sum = 0, key_ms = 0;
-  std::string_view why = "good";  // of the least
-  std::int64_t number = 0, lost = 0, keyed_frames = 0;
-  for (; number < options.frames.value_or(INT64_MAX); ++number) {
-    const auto frame = camera->next();
-    if (!frame) break;
-    // Its picture is the one before, if there is any.
-    const bool is_lost = frame->status == capture::FrameStatus::lost;
-    if (is_lost || !frame->image) {
-      ++lost;
-      rows.push_back({{"frame", number + options.first.value_or(0)}, {"status", "lost"}});
-      if (!frame->image) continue;
-    }
-    const auto start = std::chrono::steady_clock::now();
-    const compositing::KeyReport report = keyer.key(*frame->image, frame_keyed);
-    key_ms +=
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    matte = {keyed.height, keyed.width, {}, 1};
-    matte.pixels.reserve(keyed.pixels.size() / 4);
-    for (std::size_t i = 3; i < keyed.pixels.size(); i += 4) {
-      matte.pixels.push_back(keyed.pixels[i]);
-    }
-    sequence.write(number, keyed, matte, {});
-    if (is_lost) continue;
-    ++keyed_frames;
-    if (report.confidence < least) why = compositing::name_of(report.status);
-    least = std::min(least, double{report.confidence});
-    sum += report.confidence;
-    rows.push_back({{"frame", number + options.first.value_or(0)},
-                    {"confidence", report.confidence},
-                    {"status", compositing::name_of(report.status)},
-                    {"screen_in_sight", report.sight.screen},
-                    {"gain", report.sight.gain},
-                    {"mismatch", report.sight.mismatch},
-                    {"clipped", report.sight.clipped},
-                    {"soft", report.soft}});
-    if (report.moved) {
-      rows.back()["moved_px"] = {report.shift.right_px, report.shift.down_px};
-    }
-  }
-  if (number == 0) throw std::runtime_error(source.uri + " gives no picture");
-  if (keyed_frames == 0) throw std::runtime_error(source.uri + " gives no picture");
-  const auto count = static_cast<double>(keyed_frames);
-  console.figures(json_text(Json{{"frames", number},
-                                 {"lost", lost},
-                                 {"colour", colour},
-                                 {"plate_known", known},
-                                 {"confidence_mean", sum / count},
-                                 {"confidence_least", least},
-                                 {"key_ms", key_ms / count},
-                                 {"rows", rows}}));
-  console.say(
-      fmt::format("{}: {} frames before a {} screen, confidence {:.2f} in the mean, {:.2f} at "
-                  "least; {:.1f} ms a "
-                  "frame",
-                  options.out, number, colour, sum / count, least, key_ms / count));
-  if (before > 0) {
-    console.warn(fmt::format("{} had {} frames already: those with other numbers are still there",
-                             options.out, before));
-  }
-  if (lost > 0) {
-    console.warn(fmt::format(
-        "{} of {} frames were lost: the picture before stands in their place, if there is one",
-        lost, number));
-  }
-  if (sum / count < unsure) {
-    console.warn(fmt::format("the key is unsure ({}): look at it before it is used", why));
-  }
+  key_frames(options, *camera, keyer, sequence, clip);
+  if (clip.keyed == 0) throw std::runtime_error(source.uri + " gives no picture");
+  console.figures(json_text(json_of(clip)));
+  tell(clip, options.out, before, console);
 }
 
 void key(const KeyOptions& options, Console& console) {
