@@ -35,6 +35,8 @@ compositing::RecorderSettings Recording::settings_of(const RecordSettings& setti
   recorder.height = form_.height;
   recorder.pixel_aspect = form_.pixel_aspect;
   if (!settings.codec.empty()) recorder.codec = settings.codec;
+  if (settings.crf) recorder.crf = *settings.crf;
+  if (!settings.exr_compression.empty()) recorder.exr_compression = settings.exr_compression;
   if (!settings.timecode.empty()) {
     recorder.start = compositing::parse_timecode(settings.timecode, form_.rate);
   }

@@ -123,6 +123,10 @@ RecordSettings read_record_section(Section section,
   if (!section.has("key") && section.has("fill")) section.fault("fill", "comes with record.key");
   if (!section.has("fill") && section.has("key")) section.fault("key", "comes with record.fill");
   section.word("codec", record.codec, {"h264", "lossless"});
+  int crf = 0;
+  if (section.integer("crf", crf, 0, 51)) record.crf = crf;
+  section.of_use_only(record.codec != "lossless", "crf", "record.codec = \"h264\"");
+  section.word("exr_compression", record.exr_compression, {"none", "rle", "zip", "piz"});
   section.text("timecode", record.timecode);
   check_timecode(section, record, show);
   section.finish();

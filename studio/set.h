@@ -240,8 +240,10 @@ struct RecordSettings {
   std::string exr;   // directory; "" = no EXR
   std::string fill;  // videos for an external keyer, both or none
   std::string key;
-  std::string codec;     // "" = compositing's default
-  std::string timecode;  // of the first frame; "" = 00:00:00:00
+  std::string codec;            // "" = compositing's default
+  std::optional<int> crf;       // H.264's constant rate factor; nothing = compositing's default
+  std::string exr_compression;  // "" = compositing's default
+  std::string timecode;         // of the first frame; "" = 00:00:00:00
   Place place;
 
   bool is_empty() const { return file.empty() && exr.empty() && fill.empty() && key.empty(); }

@@ -150,7 +150,8 @@ std::vector<const char*> changed_at_start(const Set& on_air, const Set& changed)
   if (d.display != e.display || d.view != e.view || d.tone != e.tone) sections.push_back("display");
   const RecordSettings &r = on_air.record, &s = changed.record;
   if (r.file != s.file || r.exr != s.exr || r.fill != s.fill || r.key != s.key ||
-      r.codec != s.codec || r.timecode != s.timecode) {
+      r.codec != s.codec || r.crf != s.crf || r.exr_compression != s.exr_compression ||
+      r.timecode != s.timecode) {
     sections.push_back("record");
   }
   if (on_air.show.frames != changed.show.frames || on_air.show.sharpen != changed.show.sharpen) {

@@ -140,6 +140,8 @@ exr = "take"
 fill = "fill.mkv"
 key = "key.mkv"
 codec = "h264"
+crf = 23
+exr_compression = "piz"
 timecode = "10:00:00:00"
 )"));
   EXPECT_EQ(set.show.fps, (capture::Rational{30000, 1001}));
@@ -187,6 +189,8 @@ timecode = "10:00:00:00"
   EXPECT_EQ(set.record.file, (dir_ / "take.mkv").string());
   EXPECT_EQ(set.record.fill, (dir_ / "fill.mkv").string());
   EXPECT_EQ(set.record.key, (dir_ / "key.mkv").string());
+  EXPECT_EQ(set.record.crf, 23);
+  EXPECT_EQ(set.record.exr_compression, "piz");
   EXPECT_EQ(set.record.timecode, "10:00:00:00");
 }
 

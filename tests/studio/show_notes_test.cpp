@@ -228,6 +228,22 @@ TEST_F(ShowNotes, TellsOnceThatTheProbesCameraRefusesExposures) {
   EXPECT_THAT(show_figures(set, status, {}), HasSubstr(figure));
 }
 
+TEST_F(ShowNotes, RecordsAsFineAndAsSmallAsItsSetSays) {
+  const auto sizes_of = [&](const std::string& more) {
+    const std::filesystem::path video = dir_ / "take.mkv", frames = dir_ / "take";
+    Show show(made_set("grey:4,25,0", "[record]\nfile = \"" + video.string() + "\"\nexr = \"" +
+                                          frames.string() + "\"\n" + more));
+    show.run();
+    EXPECT_EQ(show.status()->recorder.written, 4);
+    return std::pair(file_size(video), file_size(frames / "frame.000003.exr"));
+  };
+  const auto usual = sizes_of("");
+  EXPECT_EQ(sizes_of("crf = 18\nexr_compression = \"none\"\n"), usual);
+  const auto small = sizes_of("crf = 45\nexr_compression = \"zip\"\n");
+  EXPECT_LT(small.first, usual.first);
+  EXPECT_LT(small.second, usual.second);
+}
+
 TEST_F(ShowNotes, RecordsFromOneFrameToAnother) {
   ShowOptions options;
   options.frames = 12;
