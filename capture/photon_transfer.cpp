@@ -306,16 +306,6 @@ NoiseModel PhotonTransfer::noise() const {
   return noise;
 }
 
-LinearCodes PhotonTransfer::codes(int width, int height) const {
-  LinearCodes codes{.width = width, .height = height};
-  for (std::size_t c = 0; c < 3; ++c) {
-    const ChannelTransfer& channel = channels[channels.size() == 3 ? c : 0];
-    codes.black[c] = channel.black.value;
-    codes.white[c] = channel.saturation;
-  }
-  return codes;
-}
-
 PhotonTransfer measure_photon_transfer(std::span<const SensorShot> shots,
                                        int bits,
                                        double exposure_error) {

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "capture/hdr.h"
-#include "capture/live_merge.h"
 #include "capture/raw.h"
 
 namespace capture {
@@ -52,7 +51,6 @@ struct PhotonTransfer {
 
   // For linear values, black = 0, saturation = 1; of colours, the mean.
   NoiseModel noise() const;
-  LinearCodes codes(int width, int height) const;
 };
 
 // The shots are not those of a linear sensor: a response curve (response.h) is what they need.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "capture/camera_response.h"
 #include "capture/live_merge.h"
 #include "capture/made_sensor.h"
 #include "capture/make_hdr.h"
@@ -105,17 +106,22 @@ TEST(OwnResponse, MergesALiveBracketOf14StopsTo3HundredthsOfAStop) {
                             exposures_s[i % 5]});
   }
   const PhotonTransfer transfer = measure_photon_transfer(sensor_shots, 12);
-  std::vector<MadeShot> made;
-  std::vector<CodedShot16> shots;
+  // As a camera with this response reads its pictures, and the show merges them.
+  const double full_code = 4095;
+  const CameraResponse response = response_of(transfer, full_code);
+  std::vector<Image> light;
   for (std::size_t i = 0; i < exposures_s.size(); ++i) {
-    made.push_back(codes_at(exposures_s[i], 100 + i));
+    const MadeShot shot = codes_at(exposures_s[i], 100 + i);
+    light.push_back(make_image(truth.height, truth.width));
+    for (std::size_t k = 0; k < shot.codes.size(); ++k) {
+      light.back().pixels[k] =
+          static_cast<float>(response.light(static_cast<int>(k % 3), shot.codes[k] / full_code));
+    }
   }
-  for (std::size_t i = 0; i < made.size(); ++i) {
-    shots.push_back({made[i].codes, exposures_s[i]});
-  }
+  std::vector<LiveShot> shots;
+  for (std::size_t i = 0; i < light.size(); ++i) shots.push_back({&light[i], exposures_s[i]});
   MergedFrame frame;
-  merge_window(shots, transfer.codes(truth.width, truth.height), {.noise = transfer.noise()},
-               frame);
+  merge_window(shots, {.noise = response.linear->noise}, frame);
   const double error = error_stops(frame.radiance, truth);
   const double stops = range_stops(frame.radiance);
   std::printf("live bracket: %.1f stops, error %.4f stops\n", stops, error);

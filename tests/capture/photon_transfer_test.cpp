@@ -9,6 +9,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "capture/camera_response.h"
 #include "capture/made_sensor.h"
 
 namespace capture::photon_transfer_test {
@@ -139,7 +140,7 @@ TEST(MeasurePhotonTransfer, TellsEverySensorWithinItsDeviations) {
   }
 }
 
-TEST(MeasurePhotonTransfer, GivesTheMergeItsNoiseModelAndCodes) {
+TEST(MeasurePhotonTransfer, GivesTheMergeItsNoiseModelAndTheResponseItsCodes) {
   const MadeSensor sensor{.full_well_e = 15'000, .read_noise_e = 6, .bits = 12, .pedestal = 100};
   const Shots shots = take(sensor, patches(320, 320, 1, 4, 3), bracket, 3);
   const PhotonTransfer transfer = measure_photon_transfer(shots.sensor_shots(), 12);
@@ -148,8 +149,9 @@ TEST(MeasurePhotonTransfer, GivesTheMergeItsNoiseModelAndCodes) {
   EXPECT_NEAR(transfer.noise().read / truth.read, 1, 0.05);
   EXPECT_GT(transfer.noise().saturation, 0.9);
   EXPECT_LE(transfer.noise().saturation, 0.98);
-  EXPECT_NEAR(transfer.codes(320, 320).black[2], 100, 0.5);
-  EXPECT_EQ(transfer.codes(320, 320).white[1], 4095);
+  const CameraResponse response = response_of(transfer, 4095);
+  EXPECT_NEAR(response.linear->black[2], 100, 0.5);
+  EXPECT_EQ(response.linear->white[1], 4095);
   EXPECT_TRUE(transfer.warnings.empty());
 }
 
