@@ -12,6 +12,7 @@ namespace capture {
 namespace {
 
 constexpr double no_bound = std::numeric_limits<double>::infinity();
+constexpr std::size_t table_codes = Response::codes;
 
 void require_exposure(double exposure_s) {
   if (!(exposure_s > 0) || !std::isfinite(exposure_s)) {
@@ -19,15 +20,11 @@ void require_exposure(double exposure_s) {
   }
 }
 
-const Image& picture_of(const Shot& shot) { return shot.linear; }
-const Image& picture_of(const LiveShot& shot) { return *shot.linear; }
-
-template <class AnyShot>
-void require_one_size(std::span<const AnyShot> shots) {
+void require_one_size(std::span<const Shot> shots) {
   if (shots.empty()) throw std::invalid_argument("there are no shots to merge");
-  const Image& first = picture_of(shots[0]);
-  for (const AnyShot& shot : shots) {
-    const Image& picture = picture_of(shot);
+  const Image& first = shots[0].linear;
+  for (const Shot& shot : shots) {
+    const Image& picture = shot.linear;
     require_exposure(shot.exposure_s);
     if (picture.width != first.width || picture.height != first.height ||
         picture.channels != first.channels || picture.empty()) {
@@ -110,111 +107,15 @@ Image merge_shots(std::span<const Shot> shots, const NoiseModel& noise, Image* d
   return radiance;
 }
 
-namespace {
-
-// Weighted sums of a stretch of samples. Functions of their own, so that the compiler knows what
-// does not overlap, and vectorises them.
-struct Stretch {
-  static constexpr std::size_t most = 1024;  // stays in the first cache from shot to shot
-  std::array<float, most> weighted;
-  std::array<float, most> weights;
-};
-
-// Values of the shortest shot, with a weight that is less than a float's last bit beside any other.
-void start_stretch(const float* __restrict value,
-                   std::size_t count,
-                   float per_s,
-                   Stretch& __restrict sums) {
-  constexpr float negligible = 1e-30F;
-  constexpr float largest = std::numeric_limits<float>::max();
-  for (std::size_t i = 0; i < count; ++i) {
-    const float bound = std::abs(value[i]) <= largest ? value[i] : 0.0F;
-    sums.weighted[i] = negligible * (bound * per_s);
-    sums.weights[i] = negligible;
-  }
-}
-
-struct ShotWeight {
-  float per_s;    // 1 / exposure
-  float squared;  // of the exposure over the longest one: keeps weights in a float's range
-  float read, shot, relative_squared, saturation;
-};
-
-void add_stretch(const float* __restrict value,
-                 std::size_t count,
-                 const ShotWeight& of,
-                 Stretch& __restrict sums) {
-  constexpr float lowest = std::numeric_limits<float>::lowest();
-  const auto [per_s, squared, read, shot, relative_squared, saturation] = of;
-  std::array<float, Stretch::most> sample;
-  std::array<float, Stretch::most> share;
-  for (std::size_t i = 0; i < count; ++i) {
-    const bool counts = (value[i] < saturation) & (value[i] >= lowest);
-    sample[i] = counts ? value[i] : 0.0F;
-    share[i] = counts ? squared : 0.0F;
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    const float light = std::max(sample[i], 0.0F);
-    const float weight = share[i] / (read + light * (shot + relative_squared * light));
-    sums.weighted[i] += weight * (per_s * sample[i]);
-    sums.weights[i] += weight;
-  }
-}
-
-}  // namespace
-
-void merge_live_shots(std::span<const LiveShot> shots, const NoiseModel& noise, Image& radiance) {
-  require_one_size(shots);
-  require_noise(noise);
-  const Image& first = *shots[0].linear;
-  radiance.height = first.height;
-  radiance.width = first.width;
-  radiance.channels = first.channels;
-  radiance.pixels.resize(first.pixels.size());
-  const LiveShot& shortest = *std::ranges::min_element(shots, {}, &LiveShot::exposure_s);
-  const double longest_s = std::ranges::max_element(shots, {}, &LiveShot::exposure_s)->exposure_s;
-  const auto per_s = [](const LiveShot& shot) { return static_cast<float>(1 / shot.exposure_s); };
-  Stretch sums;
-  for (std::size_t begin = 0; begin < radiance.pixels.size(); begin += Stretch::most) {
-    const std::size_t count = std::min(Stretch::most, radiance.pixels.size() - begin);
-    start_stretch(&shortest.linear->pixels[begin], count, per_s(shortest), sums);
-    for (const LiveShot& shot : shots) {
-      const double t = shot.exposure_s / longest_s;
-      add_stretch(
-          &shot.linear->pixels[begin], count,
-          {per_s(shot), static_cast<float>(t * t), static_cast<float>(noise.read),
-           static_cast<float>(noise.shot), static_cast<float>(noise.relative * noise.relative),
-           static_cast<float>(noise.saturation)},
-          sums);
-    }
-    float* to = &radiance.pixels[begin];
-    for (std::size_t i = 0; i < count; ++i) to[i] = sums.weighted[i] / sums.weights[i];
-  }
-}
-
-CodeTable linear_code_table(int bits, double black, double white, const NoiseModel& noise) {
-  if (bits < 8 || bits > 16 || !(white > black)) {
-    throw std::invalid_argument("a camera has codes of 8 to 16 bits, white above black");
-  }
-  CodeTable table;
-  for (std::size_t code = 0; code < (std::size_t{1} << bits); ++code) {
-    const double value = (static_cast<double>(code) - black) / (white - black);
-    table.value.push_back(value);
-    table.variance.push_back(value < noise.saturation ? noise.variance(value) : no_bound);
-  }
-  return table;
-}
-
 CodeTable response_code_table(const Response& response, int channel, double code_sigma) {
-  constexpr int codes = Response::codes;
   constexpr int saturated = 250;       // JPEG's ringing reaches some codes below 255
   constexpr int reach = 2;             // codes over which the slope is taken
   constexpr double least_step = 1e-5;  // of light between codes: a flat foot is not exact
   const auto& light = response.light.at(static_cast<std::size_t>(channel));
   CodeTable table;
-  for (int code = 0; code < codes; ++code) {
+  for (int code = 0; code < Response::codes; ++code) {
     const int low = std::max(0, code - reach);
-    const int high = std::min(codes - 1, code + reach);
+    const int high = std::min(Response::codes - 1, code + reach);
     const double step = std::max(
         least_step, (light[static_cast<std::size_t>(high)] - light[static_cast<std::size_t>(low)]) /
                         (high - low));
@@ -230,10 +131,9 @@ MergeTables::MergeTables(std::array<CodeTable, 3> channels, int shots)
     : channels_(std::move(channels)) {
   if (shots < 1) throw std::invalid_argument("there are no shots to merge");
   shots_ = static_cast<std::size_t>(shots);
-  codes_ = channels_[0].value.size();
   for (const CodeTable& channel : channels_) {
-    if (channel.value.size() != codes_ || channel.variance.size() != codes_) {
-      throw std::invalid_argument("the channels' code tables need one size");
+    if (channel.value.size() != table_codes || channel.variance.size() != table_codes) {
+      throw std::invalid_argument("a channel's table has 256 codes");
     }
     bool unsaturated = false;
     for (const double variance : channel.variance) {
@@ -242,7 +142,7 @@ MergeTables::MergeTables(std::array<CodeTable, 3> channels, int shots)
     }
     if (!unsaturated) throw std::invalid_argument("every code is saturated");
   }
-  entries_.resize(shots_ * channels_.size() * codes_);
+  entries_.resize(shots_ * channels_.size() * table_codes);
 }
 
 void MergeTables::set_exposures(std::span<const double> exposures_s) {
@@ -259,10 +159,10 @@ void MergeTables::set_exposures(std::span<const double> exposures_s) {
     double lightest = no_bound;  // weight of any code that counts
     for (std::size_t s = 0; s < shots_; ++s) {
       const double t = exposures_s[s] / longest;  // keeps weights in a float's range
-      for (std::size_t code = 0; code < codes_; ++code) {
+      for (std::size_t code = 0; code < table_codes; ++code) {
         const double weight = t * t * least / table.variance[code];  // 0 if saturated
         if (weight > 0) lightest = std::min(lightest, weight);
-        entries_[(s * channels_.size() + c) * codes_ + code] = {
+        entries_[(s * channels_.size() + c) * table_codes + code] = {
             static_cast<float>(weight * table.value[code] / exposures_s[s]),
             static_cast<float>(weight)};
       }
@@ -270,37 +170,33 @@ void MergeTables::set_exposures(std::span<const double> exposures_s) {
     // Saturated in every shot: the shortest one's value alone counts. Beside any other it weighs
     // less than a float's last bit.
     constexpr double negligible = 1e-9;
-    for (std::size_t code = 0; code < codes_; ++code) {
+    for (std::size_t code = 0; code < table_codes; ++code) {
       if (table.variance[code] < no_bound) continue;
       const double weight = negligible * lightest;
-      entries_[(shortest * channels_.size() + c) * codes_ + code] = {
+      entries_[(shortest * channels_.size() + c) * table_codes + code] = {
           static_cast<float>(weight * table.value[code] / exposures_s[shortest]),
           static_cast<float>(weight)};
     }
   }
 }
 
-template <class Code>
-void MergeTables::merge_codes(std::span<const Code* const> shots,
-                              int width,
-                              int first_row,
-                              int last_row,
-                              float* radiance) const {
+void MergeTables::merge(std::span<const std::uint8_t* const> shots,
+                        int width,
+                        int first_row,
+                        int last_row,
+                        float* radiance) const {
   constexpr std::size_t channels = 3;
   if (shots.size() != shots_) {
     throw std::invalid_argument("the tables are for another number of shots");
-  }
-  if (sizeof(Code) == 1 && codes_ < 256) {
-    throw std::invalid_argument("8-bit codes need tables of 256 entries");
   }
   const std::size_t begin = static_cast<std::size_t>(first_row) * static_cast<std::size_t>(width);
   const std::size_t end = static_cast<std::size_t>(last_row) * static_cast<std::size_t>(width);
   const auto merge_pixels = [&](auto shot_count) {
     for (std::size_t i = begin * channels; i < end * channels; i += channels) {
       for (std::size_t c = 0; c < channels; ++c) {
-        const Entry* table = entries_.data() + c * codes_;
+        const Entry* table = entries_.data() + c * table_codes;
         Entry sum;
-        for (std::size_t s = 0; s < shot_count; ++s, table += channels * codes_) {
+        for (std::size_t s = 0; s < shot_count; ++s, table += channels * table_codes) {
           const Entry& entry = table[shots[s][i + c]];
           sum.weighted += entry.weighted;
           sum.weight += entry.weight;
@@ -320,22 +216,6 @@ void MergeTables::merge_codes(std::span<const Code* const> shots,
     default:
       return merge_pixels(shots_);
   }
-}
-
-void MergeTables::merge(std::span<const std::uint8_t* const> shots,
-                        int width,
-                        int first_row,
-                        int last_row,
-                        float* radiance) const {
-  merge_codes(shots, width, first_row, last_row, radiance);
-}
-
-void MergeTables::merge(std::span<const std::uint16_t* const> shots,
-                        int width,
-                        int first_row,
-                        int last_row,
-                        float* radiance) const {
-  merge_codes(shots, width, first_row, last_row, radiance);
 }
 
 }  // namespace capture

@@ -46,38 +46,23 @@ Image merge_shots(std::span<const Shot> shots,
                   const NoiseModel& noise = {},
                   Image* deviation = nullptr);
 
-// A shot whose picture is someone else's.
-struct LiveShot {
-  const Image* linear = nullptr;  // as Shot::linear, three channels
-  double exposure_s = 0;          // > 0
-};
-
-// Merges frame after frame of a live bracket. As merge_shots, but with weights of each sample's own
-// value, and in floats: a sample of three shots takes about a nanosecond. Fills `radiance`, which
-// may have had any size, and allocates nothing if it had this one. Throws std::invalid_argument as
-// merge_shots.
-void merge_live_shots(std::span<const LiveShot> shots, const NoiseModel& noise, Image& radiance);
-
-// What each code of a channel means: its linear value, and the variance of that value; infinite for
-// saturated codes.
+// What each of the 256 codes of a channel means: its linear value, and the variance of that value;
+// infinite for saturated codes.
 struct CodeTable {
   std::vector<double> value;
   std::vector<double> variance;
 };
 
-// Codes of a linear camera: `black` means 0, `white` means 1. `bits` is 8 to 16.
-CodeTable linear_code_table(int bits, double black, double white, const NoiseModel& noise);
-
 // 8-bit codes through a response, each uncertain by `code_sigma` codes.
 CodeTable response_code_table(const Response& response, int channel, double code_sigma = 1);
 
-// Merges shots through tables: response, exposure, weight and saturation of a code are looked up at
-// once. Weights are those of each sample's own value, so
-// merge_shots is the more accurate one in deep shadow; this one is the faster.
+// Merges shots of 8-bit codes through tables: response, exposure, weight and saturation of a code
+// are looked up at once. Weights are those of each sample's own value, so merge_shots is the more
+// accurate one in deep shadow; this one is the faster.
 class MergeTables {
  public:
   // Room for `shots` exposures of three channels. Throws std::invalid_argument for no shots, tables
-  // of differing or odd sizes, variances that are not above 0, or no unsaturated code.
+  // of another size than 256, variances that are not above 0, or no unsaturated code.
   MergeTables(std::array<CodeTable, 3> channels, int shots);
 
   // The exposures of the shots that follow. Allocates nothing. Throws std::invalid_argument unless
@@ -86,16 +71,9 @@ class MergeTables {
 
   // Merges the rows first_row..last_row - 1 of interleaved RGB codes, each shot (height, width, 3)
   // without gaps between rows, into `radiance` of the same layout (sensor units per second).
-  // Allocates nothing; different rows may be merged by different threads at once. Codes beyond the
-  // tables' size must not occur. 16-bit codes of cameras with fewer bits are right-aligned.
-  // Throws std::invalid_argument if the shots are not as many as tables, or 8-bit codes meet tables
-  // of fewer than 256 entries.
+  // Allocates nothing; different rows may be merged by different threads at once. Throws
+  // std::invalid_argument if the shots are not as many as tables.
   void merge(std::span<const std::uint8_t* const> shots,
-             int width,
-             int first_row,
-             int last_row,
-             float* radiance) const;
-  void merge(std::span<const std::uint16_t* const> shots,
              int width,
              int first_row,
              int last_row,
@@ -107,17 +85,10 @@ class MergeTables {
     float weighted = 0;
     float weight = 0;
   };
-  template <class Code>
-  void merge_codes(std::span<const Code* const> shots,
-                   int width,
-                   int first_row,
-                   int last_row,
-                   float* radiance) const;
 
   std::array<CodeTable, 3> channels_;
   std::size_t shots_ = 0;
-  std::size_t codes_ = 0;
-  std::vector<Entry> entries_;  // (shots, 3, codes)
+  std::vector<Entry> entries_;  // (shots, 3, 256)
 };
 
 }  // namespace capture

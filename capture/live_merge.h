@@ -39,6 +39,12 @@ struct WindowMergeSettings {
   bool widest_registers = true;
 };
 
+// A shot whose picture is someone else's.
+struct LiveShot {
+  const Image* linear = nullptr;  // as Shot::linear, three channels
+  double exposure_s = 0;          // > 0
+};
+
 // One shot of a linear camera's codes: (height, width, 3), interleaved.
 struct CodedShot8 {
   std::span<const std::uint8_t> codes;

@@ -197,7 +197,7 @@ class HdrChart {
     chart.variant_name = "input";
     add_window(8);
     add_window(12);
-    add_older();
+    add_tables();
     add_peers();
     time_points();
     const double memory = memory_ms();
@@ -266,15 +266,16 @@ class HdrChart {
     }
   }
 
-  // The merges without status: of floats, through tables, and the reference.
-  void add_older() {
-    add(
-        point_of("merge_live_shots", "floats", members),
-        [this] { merge_live_shots(wide_.live(), noise_of(wide_.sensor), radiance_); },
-        [this]() -> const Image& { return radiance_; });
-    const capture::CodeTable table =
-        linear_code_table(8, coded_.sensor.pedestal, 255, noise_of(coded_.sensor));
-    tables_.emplace(std::array<capture::CodeTable, 3>{table, table, table},
+  // The merge of files, which tells no status: `platelight hdr` makes its tables so.
+  void add_tables() {
+    capture::Response response;
+    for (auto& channel : response.light) {
+      for (int code = 0; code < capture::Response::codes; ++code) {
+        channel[static_cast<std::size_t>(code)] = light_of_code(coded_.sensor, code);
+      }
+    }
+    tables_.emplace(std::array{response_code_table(response, 0), response_code_table(response, 1),
+                               response_code_table(response, 2)},
                     static_cast<int>(members));
     tables_->set_exposures(coded_.exposures_s);
     add(

@@ -142,27 +142,34 @@ TEST(MergeShots, RefusesNoShotsAndExposuresThatAreNotAboveZero) {
   }
 }
 
-// A frame of a live bracket: 12-bit linear codes.
-struct LiveFrame {
-  std::vector<std::vector<std::uint16_t>> codes;
-  std::vector<const std::uint16_t*> pointers;
+// A frame of a bracket: 8-bit linear codes.
+struct CodedFrame {
+  std::vector<std::vector<std::uint8_t>> codes;
+  std::vector<const std::uint8_t*> pointers;
 };
 
-constexpr double black_code = 64;
-constexpr double white_code = 4095;
+constexpr double black_code = 4;
+constexpr double white_code = 255;
 
-LiveFrame live_frame(const made::Scene& scene, std::span<const double> exposures_s) {
-  LiveFrame frame;
+// Of the codes' values.
+NoiseModel noise_of_codes() {
+  NoiseModel noise;
+  noise.read += std::pow(white_code - black_code, -2) / 12;  // rounding
+  return noise;
+}
+
+CodedFrame coded_frame(const made::Scene& scene, std::span<const double> exposures_s) {
+  CodedFrame frame;
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   const NoiseModel noise;
   for (const double exposure_s : exposures_s) {
-    std::vector<std::uint16_t> codes;
+    std::vector<std::uint8_t> codes;
     for (const double radiance : scene.radiance) {
       const double mean = radiance * exposure_s;
       const double value = mean + normal(random) * std::sqrt(noise.variance(mean));
       const double code = black_code + value * (white_code - black_code);
-      codes.push_back(static_cast<std::uint16_t>(std::clamp(std::round(code), 0.0, white_code)));
+      codes.push_back(static_cast<std::uint8_t>(std::clamp(std::round(code), 0.0, white_code)));
     }
     frame.codes.push_back(std::move(codes));
   }
@@ -170,12 +177,20 @@ LiveFrame live_frame(const made::Scene& scene, std::span<const double> exposures
   return frame;
 }
 
-MergeTables live_tables(int shots) {
-  const CodeTable table = linear_code_table(12, black_code, white_code, {});
+// Weights by the noise, as merge_shots has them.
+MergeTables tables_of_noise(int shots) {
+  CodeTable table;
+  const NoiseModel noise = noise_of_codes();
+  for (int code = 0; code < Response::codes; ++code) {
+    const double value = (code - black_code) / (white_code - black_code);
+    table.value.push_back(value);
+    table.variance.push_back(value < noise.saturation ? noise.variance(value)
+                                                      : std::numeric_limits<double>::infinity());
+  }
   return {{table, table, table}, shots};
 }
 
-std::vector<Shot> linear_shots(const LiveFrame& frame,
+std::vector<Shot> linear_shots(const CodedFrame& frame,
                                const made::Scene& scene,
                                std::span<const double> exposures_s) {
   std::vector<Shot> shots;
@@ -190,59 +205,6 @@ std::vector<Shot> linear_shots(const LiveFrame& frame,
   return shots;
 }
 
-std::vector<LiveShot> live_shots(std::span<const Shot> shots) {
-  std::vector<LiveShot> live;
-  for (const Shot& shot : shots) live.push_back({&shot.linear, shot.exposure_s});
-  return live;
-}
-
-TEST(MergeLiveShots, AgreesWithMergeShotsWithinTheNoise) {
-  const made::Scene scene = made::patches(67, 48, 6);  // no whole number of stretches
-  Image fast;
-  for (const std::vector<double>& exposures_s :
-       {std::vector<double>{0.1}, {1, 0.1}, {0.01, 1, 0.1}, {2, 1, .5, .1, .01}}) {
-    const auto shots = linear_shots(live_frame(scene, exposures_s), scene, exposures_s);
-    Image deviation;
-    const Image exact = merge_shots(shots, {}, &deviation);
-    merge_live_shots(live_shots(shots), {}, fast);
-    ASSERT_EQ(fast.pixels.size(), exact.pixels.size());
-    for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
-      const float allowed =
-          std::isinf(deviation.pixels[i]) ? exact.pixels[i] * 1e-6F : deviation.pixels[i];
-      ASSERT_NEAR(fast.pixels[i], exact.pixels[i], allowed);
-    }
-  }
-}
-
-TEST(MergeLiveShots, TakesTheShortestShotWhereAllAreSaturated) {
-  const std::vector<Shot> shots{{Image{1, 1, {1, 1, 0.5F}}, 1}, {Image{1, 1, {1, 1, 0.05F}}, 0.1}};
-  Image merged;
-  merge_live_shots(live_shots(shots), {}, merged);
-  EXPECT_FLOAT_EQ(merged.at(0, 0, 0), 10);
-  EXPECT_FLOAT_EQ(merged.at(0, 0, 2), 0.5F);
-}
-
-TEST(MergeLiveShots, LeavesOutValuesThatAreNotFinite) {
-  const float nan = std::numeric_limits<float>::quiet_NaN();
-  const float infinity = std::numeric_limits<float>::infinity();
-  const std::vector<Shot> shots{{Image{1, 1, {nan, nan, -infinity}}, 1},
-                                {Image{1, 1, {0.25F, nan, 0.5F}}, 1}};
-  Image merged;
-  merge_live_shots(live_shots(shots), {}, merged);
-  EXPECT_FLOAT_EQ(merged.at(0, 0, 0), 0.25F);
-  EXPECT_EQ(merged.at(0, 0, 1), 0);
-  EXPECT_FLOAT_EQ(merged.at(0, 0, 2), 0.5F);
-}
-
-TEST(MergeLiveShots, RefusesWhatMergeShotsRefuses) {
-  Image merged;
-  EXPECT_THROW(merge_live_shots({}, {}, merged), std::invalid_argument);
-  const std::vector<Shot> sizes{{Image{1, 1, {0, 0, 0}}, 1}, {Image{}, 1}};
-  EXPECT_THROW(merge_live_shots(live_shots(sizes), {}, merged), std::invalid_argument);
-  const std::vector<Shot> no_time{{Image{1, 1, {0, 0, 0}}, 0}};
-  EXPECT_THROW(merge_live_shots(live_shots(no_time), {}, merged), std::invalid_argument);
-}
-
 TEST(MergeTables, AgreeWithMergeShotsWithinTheNoise) {
   const made::Scene scene = made::patches(64, 48, 6);
   for (const std::vector<double>& exposures_s : {std::vector<double>{0.1},
@@ -250,15 +212,15 @@ TEST(MergeTables, AgreeWithMergeShotsWithinTheNoise) {
                                                  {1, 0.1, 0.01},
                                                  {1, 0.2, 0.04, 0.01},
                                                  {2, 1, .5, .1, .01}}) {
-    const LiveFrame frame = live_frame(scene, exposures_s);
-    MergeTables tables = live_tables(static_cast<int>(exposures_s.size()));
+    const CodedFrame frame = coded_frame(scene, exposures_s);
+    MergeTables tables = tables_of_noise(static_cast<int>(exposures_s.size()));
     tables.set_exposures(exposures_s);
     Image fast = make_image(scene.height, scene.width);
     tables.merge(frame.pointers, scene.width, 0, scene.height, fast.pixels.data());
 
     const std::vector<Shot> shots = linear_shots(frame, scene, exposures_s);
     Image deviation;
-    const Image exact = merge_shots(shots, {}, &deviation);
+    const Image exact = merge_shots(shots, noise_of_codes(), &deviation);
     for (std::size_t i = 0; i < exact.pixels.size(); ++i) {
       const float allowed =
           std::isinf(deviation.pixels[i]) ? exact.pixels[i] * 1e-4F : deviation.pixels[i];
@@ -270,8 +232,8 @@ TEST(MergeTables, AgreeWithMergeShotsWithinTheNoise) {
 TEST(MergeTables, GiveTheSameBitsForAnyDivisionIntoRows) {
   const made::Scene scene = made::patches(40, 30, 7);
   const std::vector<double> exposures_s{1, 0.1, 0.01};
-  const LiveFrame frame = live_frame(scene, exposures_s);
-  MergeTables tables = live_tables(3);
+  const CodedFrame frame = coded_frame(scene, exposures_s);
+  MergeTables tables = tables_of_noise(3);
   tables.set_exposures(exposures_s);
   Image whole = make_image(scene.height, scene.width);
   tables.merge(frame.pointers, scene.width, 0, scene.height, whole.pixels.data());
@@ -284,10 +246,10 @@ TEST(MergeTables, GiveTheSameBitsForAnyDivisionIntoRows) {
 
 TEST(MergeTables, FollowExposuresThatChangeFromFrameToFrame) {
   const made::Scene scene = made::patches(16, 16, 8);
-  MergeTables tables = live_tables(2);
+  MergeTables tables = tables_of_noise(2);
   for (const double step : {0.5, 0.1, 0.01}) {
     const std::vector<double> exposures_s{0.01, 0.01 * step};
-    const LiveFrame frame = live_frame(scene, exposures_s);
+    const CodedFrame frame = coded_frame(scene, exposures_s);
     tables.set_exposures(exposures_s);
     Image merged = make_image(scene.height, scene.width);
     tables.merge(frame.pointers, scene.width, 0, scene.height, merged.pixels.data());
@@ -363,12 +325,13 @@ TEST(MergeTables, ErrLessThanTheWeightsOfDebevecAndOfRobertson) {
 }
 
 TEST(MergeTables, RefuseWhatDoesNotFit) {
-  const CodeTable table = linear_code_table(8, 0, 255, {});
+  const CodeTable table = response_code_table(linear_response(), 0);
   EXPECT_THROW(MergeTables({table, table, table}, 0), std::invalid_argument);
-  EXPECT_THROW(MergeTables({table, table, linear_code_table(10, 0, 1023, {})}, 1),
-               std::invalid_argument);
-  EXPECT_THROW(linear_code_table(7, 0, 127, {}), std::invalid_argument);
-  EXPECT_THROW(linear_code_table(8, 255, 255, {}), std::invalid_argument);
+  CodeTable other = table;
+  other.value.push_back(1);
+  other.variance.push_back(1);
+  EXPECT_THROW(MergeTables({table, table, other}, 1), std::invalid_argument);
+  EXPECT_THROW(MergeTables({other, other, other}, 1), std::invalid_argument);
   MergeTables tables({table, table, table}, 2);
   EXPECT_THROW(tables.set_exposures(std::vector<double>{1}), std::invalid_argument);
   EXPECT_THROW(tables.set_exposures(std::vector<double>{1, 0}), std::invalid_argument);
@@ -386,7 +349,7 @@ TEST(MergeTables, MergeThreeShotsOf512x512In1500Microseconds) {
     for (int i = 0; i < side * side * 3; ++i) shot.push_back(static_cast<std::uint8_t>(random()));
     codes.push_back(shot.data());
   }
-  const CodeTable table = linear_code_table(8, 0, 255, {});
+  const CodeTable table = response_code_table(linear_response(), 0);
   MergeTables tables({table, table, table}, 3);
   Image radiance = make_image(side, side);
   auto best = std::chrono::steady_clock::duration::max();
