@@ -46,6 +46,7 @@ struct LiveShot {
 };
 
 // One shot of a linear camera's codes: (height, width, 3), interleaved.
+// Charts and tests have them; a show merges floats (hdr.md).
 struct CodedShot8 {
   std::span<const std::uint8_t> codes;
   double exposure_s = 0;

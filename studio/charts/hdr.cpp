@@ -240,7 +240,7 @@ class HdrChart {
     return p;
   }
 
-  // Ours, with and without the test for motion.
+  // Ours, with and without the test for motion. A show merges floats (RollingBracket).
   void add_window(int bits) {
     const Shots& shots = bits == 8 ? coded_ : wide_;
     for (const double consistency : {capture::WindowMergeSettings{}.consistency, 0.0}) {
@@ -250,7 +250,7 @@ class HdrChart {
         ChartPoint p =
             point_of(consistency > 0 ? "window" : "window, no motion test", input, members);
         p.settings.emplace_back("consistency", consistency);
-        p.by_default = consistency > 0 && bits == 8;
+        p.by_default = consistency > 0 && floats;
         p.label = p.by_default ? "default" : "";
         const capture::WindowMergeSettings settings{.noise = noise_of(shots.sensor),
                                                     .consistency = consistency};

@@ -44,6 +44,10 @@ TEST(HdrChart, HasMergesThatErrNoMoreThanOpenCvsAndTellTheirDeviation) {
     }
   }
   EXPECT_EQ(std::ranges::count(quick_chart().points, true, &ChartPoint::by_default), 1);
+  // What a show merges (RollingBracket::add).
+  const auto ours = std::ranges::find(quick_chart().points, true, &ChartPoint::by_default);
+  EXPECT_EQ(ours->method, "window");
+  EXPECT_EQ(ours->variant, "floats");
 }
 
 // The worst sample of each says so: by its status, or by a deviation as large as its error.
