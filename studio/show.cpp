@@ -228,10 +228,16 @@ class Show::Stages {
 
   // Waits for a live frame's time. A frame whose successor is due as well is left out: returns the
   // one that is to be made.
-  std::int64_t wait_until_due(std::int64_t number, Clock::time_point start) const {
+  std::int64_t wait_until_due(std::int64_t number, Clock::time_point start) {
     const auto due = [&](std::int64_t n) {
       return start + capture::time_of_frame(n - options_.first, maker_.rate());
     };
+    if (const Clock::duration late = Clock::now() - due(number); late > options_.longest_gap) {
+      start += late;
+      paused_for_ += late;
+      note(fmt::format("held up for {:.1f} s before frame {}: the show goes on where it was",
+                       std::chrono::duration<double>(late).count(), number));
+    }
     while (Clock::now() >= due(number + 1)) ++number;
     std::this_thread::sleep_until(due(number));
     return number;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -116,6 +117,10 @@ struct ShowOptions {
   std::optional<std::int64_t> frames;     // show at most so many; nothing = as the set says
   std::optional<capture::Rational> rate;  // in place of the set's
   bool record = true;                     // as the set says, from the first frame on
+  // Of a live show of files: what it is held up for longer is no time of it, and left out is
+  // nothing then. Else sources that are read more slowly than time goes by would be later in each
+  // frame.
+  std::chrono::milliseconds longest_gap{5000};
 };
 
 // Opens all that a show of the set would, and looks whether it could be displayed and recorded.

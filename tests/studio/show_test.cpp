@@ -114,6 +114,24 @@ TEST_F(ShowTest, DropsLateFramesWhenLiveAndKeepsToTheClock) {
   EXPECT_EQ(show.status()->frames + show.status()->dropped, numbers.back() + 1);
 }
 
+// As by a machine that slept.
+TEST_F(ShowTest, GoesOnWhereItWasAfterItWasHeldUpForLong) {
+  ShowOptions options;
+  options.live = true;
+  options.frames = 8;
+  options.longest_gap = 400ms;
+  std::vector<std::int64_t> numbers;
+  Show show(made_set("grey:100000,25,0"), options);
+  show.run([&](const ShownFrame& shown) {
+    numbers.push_back(shown.prepared.job.frame);
+    if (numbers.size() == 4) std::this_thread::sleep_for(1500ms);
+  });
+  ASSERT_EQ(numbers.size(), 8U);
+  // Of what is ready already, and of the 38 frames of that time.
+  EXPECT_LT(numbers[5] - numbers[3], 25);
+  EXPECT_THAT(show.status()->notes, testing::Contains(testing::HasSubstr("held up for")));
+}
+
 TEST_F(ShowTest, FollowsALivePlate) {
   Show show(made_set("live_grey:40,50"));
   std::vector<std::int64_t> numbers;
