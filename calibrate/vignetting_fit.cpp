@@ -20,21 +20,25 @@ constexpr int most_terms = 4;
 constexpr double least_sensitivity = 0.02;  // whose logarithm is taken
 constexpr int folds = 5;
 
-// Samples of one place follow each other.
+// Samples of one place follow each other; places have two or more.
 struct Places {
   std::vector<VignettingSample> samples;
   std::vector<std::size_t> begins;  // of each place, and the end
 };
 
+// Without places that are seen once: their light takes up all that they tell.
 Places by_place(std::span<const VignettingSample> samples) {
+  std::vector<VignettingSample> sorted(samples.begin(), samples.end());
+  std::ranges::stable_sort(sorted, {}, &VignettingSample::place);
   Places places;
-  places.samples.assign(samples.begin(), samples.end());
-  std::stable_sort(places.samples.begin(), places.samples.end(),
-                   [](const auto& a, const auto& b) { return a.place < b.place; });
-  for (std::size_t i = 0; i < places.samples.size(); ++i) {
-    if (i == 0 || places.samples[i].place != places.samples[i - 1].place) {
-      places.begins.push_back(i);
+  for (auto first = sorted.begin(); first != sorted.end();) {
+    const auto last = std::find_if(first, sorted.end(),
+                                   [&](const auto& other) { return other.place != first->place; });
+    if (last - first > 1) {
+      places.begins.push_back(places.samples.size());
+      places.samples.insert(places.samples.end(), first, last);
     }
+    first = last;
   }
   places.begins.push_back(places.samples.size());
   return places;
@@ -279,7 +283,7 @@ VignettingFit fit_vignetting(std::span<const VignettingSample> samples) {
         "no terms explain the shots: check that the field is even, or that poses belong to the "
         "shots and the scene stands still, and that the lens is this camera's");
   }
-  for (const VignettingSample& sample : samples) {
+  for (const VignettingSample& sample : places.samples) {
     fit.max_angle_rad = std::max(fit.max_angle_rad, sample.angle_rad);
   }
   return fit;

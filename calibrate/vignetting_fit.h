@@ -27,7 +27,7 @@ struct VignettingCandidate {
 struct VignettingFit {
   std::vector<double> terms;  // as sensitivity() takes them, and sets' `vignetting`
   double heldout_error = 0;
-  double max_angle_rad = 0;  // that was seen; beyond it the terms are a guess
+  double max_angle_rad = 0;  // of places seen twice or more; beyond it the terms are a guess
   std::vector<VignettingCandidate> candidates;
   std::vector<std::string> warnings;  // for people; held-out errors of 10 % and more have one
 };
@@ -37,7 +37,8 @@ struct VignettingFit {
 // of terms starts from the one before, and its steps are halved while the loss rises. An even
 // field is a single place (then angles are held out). Differences of logarithms between samples of
 // one place tell the sensitivity: Goldman, "Vignette and Exposure Calibration and Compensation",
-// IEEE PAMI 32(12), 2010, section 3, with our even polynomial of the angle.
+// IEEE PAMI 32(12), 2010, section 3, with our even polynomial of the angle. Places with a single
+// sample tell nothing and take no part.
 // Throws std::invalid_argument for values that are not finite or above 0, std::runtime_error if
 // places are seen at too few different angles.
 VignettingFit fit_vignetting(std::span<const VignettingSample> samples);

@@ -144,6 +144,23 @@ TEST(FitVignetting, GivesAnEvenLensNoTerms) {
   EXPECT_LT(fit.heldout_error, 0.02);
 }
 
+TEST(FitVignetting, DoesNotMindPlacesThatAreSeenOnce) {
+  const std::vector<double> truth{-0.15};
+  const Turned made = turned(truth, 0.02);
+  std::vector<VignettingSample> samples = turned_samples(made.shots(), fish_eye(), 100);
+  std::erase_if(samples, [](const auto& sample) { return sample.angle_rad > 70 * degree; });
+  const VignettingFit without = fit_vignetting(samples);
+  const std::size_t twice_as_many = 3 * samples.size();
+  for (std::size_t place = 100000; samples.size() < twice_as_many; ++place) {
+    samples.push_back({place, 80 * degree, 1});
+  }
+  const VignettingFit with = fit_vignetting(samples);
+  EXPECT_EQ(with.terms, without.terms);
+  EXPECT_EQ(with.heldout_error, without.heldout_error);
+  EXPECT_LT(with.max_angle_rad, 70 * degree + 1e-9);
+  EXPECT_GT(with.heldout_error, 0.003);  // of noise, not of places that explain themselves
+}
+
 TEST(FitVignetting, DoesNotMindWhatMovesOrClips) {
   const std::vector<double> truth{-0.15};
   Turned made = turned(truth, 0.01);
