@@ -23,12 +23,25 @@ Marker marker_of(const TomlReader& reader, const toml::table& table) {
   marker.name = reader.text(reader.required(table, "name"), "name");
   const auto p = reader.numbers<3>(reader.required(table, "position"), "position");
   marker.p_set = {p[0], p[1], p[2]};
-  const auto q = reader.numbers<2>(reader.required(table, "pixel"), "pixel");
+  const toml::node& pixel = reader.required(table, "pixel");
+  const auto q = reader.numbers<2>(pixel, "pixel");
   marker.q = {q[0], q[1]};
+  marker.line = static_cast<int>(pixel.source().begin.line);
   if (const toml::node* picture = table.get("picture")) {
     marker.picture = reader.text(*picture, "picture");
   }
   return marker;
+}
+
+// Where pixels are counted from the corner of the first, the last one ends at the picture's size.
+bool is_in_picture(const Lens& lens, Vec2 q) {
+  return q.x >= -1 && q.y >= -1 && q.x <= lens.width && q.y <= lens.height;
+}
+
+[[noreturn]] void fail_at(const Marker& marker, const std::string& why) {
+  throw std::runtime_error("marker " + in_quotes(marker.name) +
+                           (marker.line > 0 ? " of line " + std::to_string(marker.line) : "") +
+                           ": " + why);
 }
 
 std::string named(const std::string& picture) {
@@ -106,11 +119,16 @@ std::vector<Sight> sights_of(const Lens& lens, std::span<const Marker> markers) 
   std::vector<Sight> sights;
   for (const Marker& marker : markers) {
     const auto sight = sight_of(lens, marker.q, marker.p_set);
+    const std::string pixel = "[" + to_text(marker.q.x) + ", " + to_text(marker.q.y) + "]";
     if (!sight) {
-      throw std::runtime_error("marker " + in_quotes(marker.name) + ": the lens sees nothing at [" +
-                               to_text(marker.q.x) + ", " + to_text(marker.q.y) +
-                               "]; check the pixel, that the lens is this camera's, and that its " +
-                               "boards reached so far out");
+      fail_at(marker, "the lens sees nothing at " + pixel +
+                          "; check the pixel, that the lens is this camera's, and that its boards "
+                          "reached so far out");
+    }
+    if (!is_in_picture(lens, marker.q)) {
+      fail_at(marker, pixel + " lies outside of the lens's picture, " + std::to_string(lens.width) +
+                          "x" + std::to_string(lens.height) +
+                          "; check the pixel, and that the lens is for pictures of this size");
     }
     sights.push_back(*sight);
   }

@@ -18,6 +18,7 @@ struct Marker {
   Vec3 p_set;           // metres
   Vec2 q;               // pixels
   std::string picture;  // which picture, where there are several
+  int line = 0;         // of its file, that tells the pixel; 0 = of no file
   friend bool operator==(const Marker&, const Marker&) = default;
 };
 
@@ -36,8 +37,8 @@ std::vector<Marker> markers_of(const Board& board,
                                const BoardView& view,
                                const Pose& set_from_board);
 
-// What register_camera takes. Throws std::runtime_error naming the marker whose pixel the lens does
-// not see.
+// What register_camera takes. Throws std::runtime_error naming the marker, and its line, whose pixel
+// the lens does not see, or lies outside of the lens's picture.
 std::vector<Sight> sights_of(const Lens& lens, std::span<const Marker> markers);
 
 }  // namespace calibrate

@@ -183,8 +183,10 @@ struct Agreement {
   RefinedPose refined;
 };
 
+// Four sights leave two freedoms, which a wrong pose uses up: of six to eight one may be left out.
 std::size_t fewest_agreeing(std::size_t sights) {
-  return sights < fewest + 2 ? sights : std::max(fewest, (sights + 1) / 2);
+  if (sights < fewest + 2) return sights;
+  return sights - (sights < 9 ? 1 : sights / 3);
 }
 
 Agreement fit_those(std::span<const Sight> sights, std::vector<bool> agrees, const Pose& seed) {
@@ -223,8 +225,8 @@ Agreement agree_by_spread(std::span<const Sight> sights, Pose pose, double noise
 }
 
 // Of few, a spread tells little: leaving out the worst ones always makes the rest look good.
-// Without one more, without two more, until half are left: whatever explains all at the least cost,
-// if what is left out could be anywhere within a radian.
+// Without one more, without two more, until a third are left out: whatever explains all at the
+// least cost, if what is left out could be anywhere within a radian.
 Agreement agree_by_cost(std::span<const Sight> sights, const Pose& pose, double noise_px) {
   const std::size_t n = sights.size();
   std::vector<std::size_t> order(n);

@@ -36,7 +36,7 @@ struct Registration {
   std::vector<std::string> warnings;  // for people
 };
 
-// From four sights or more, in one plane or not. A third of twelve may be wrong, one of six; all of
+// From four sights or more, in one plane or not. A third may be wrong, one of six to eight; all of
 // four or five are believed. 40 sights take below 1 ms.
 //
 // Poses of three sights each (pose_seeds.h), after Fischler and Bolles, "Random Sample Consensus",

@@ -24,8 +24,8 @@ TEST(ReadMarkers, ReadsWhatIsWritten) {
       write("[[marker]]\nname = \"door\"\nposition = [3.2, -5.01, 0]\npixel = [812.4, 1003.1]\n"
             "[[marker]]\nname = \"lamp\"\nposition = [1, 2, 3]\npixel = [-0.5, 7]\n"));
   ASSERT_EQ(markers.size(), 2U);
-  EXPECT_EQ(markers[0], (Marker{"door", {3.2, -5.01, 0}, {812.4, 1003.1}, ""}));
-  EXPECT_EQ(markers[1], (Marker{"lamp", {1, 2, 3}, {-0.5, 7}, ""}));
+  EXPECT_EQ(markers[0], (Marker{"door", {3.2, -5.01, 0}, {812.4, 1003.1}, "", 4}));
+  EXPECT_EQ(markers[1], (Marker{"lamp", {1, 2, 3}, {-0.5, 7}, "", 8}));
   EXPECT_EQ(markers_in(markers, "").size(), 2U);
 }
 
@@ -97,6 +97,20 @@ TEST(SightsOf, NamesTheMarkerThatTheLensDoesNotSee) {
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(error.what(),
                 HasSubstr("marker \"far out\": the lens sees nothing at [-900, 600]"));
+  }
+}
+
+TEST(SightsOf, NamesTheMarkerOutsideOfThePicture) {
+  const Lens lens{"pinhole", 640, 480, {600, 600, 319.5, 239.5}};
+  const std::vector<Marker> at_the_rim{{"a", {}, {-0.5, -0.5}, ""}, {"b", {}, {640, 480}, ""}};
+  EXPECT_EQ(sights_of(lens, at_the_rim).size(), 2U);
+  const std::vector<Marker> markers{{"a", {}, {600, 400}, ""}, {"off", {}, {812.5, 300}, "", 12}};
+  try {
+    sights_of(lens, markers);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("marker \"off\" of line 12: [812.5, 300] lies outside of "
+                                        "the lens's picture, 640x480"));
   }
 }
 

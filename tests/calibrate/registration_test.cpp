@@ -138,6 +138,21 @@ TEST(RegisterCamera, RefusesFiveMarkersOfWhichOneIsWrong) {
   EXPECT_GE(refused, cases - 2);
 }
 
+TEST(RegisterCamera, RefusesEightMarkersOfWhichThreeAreWrong) {
+  made::Random random(12);
+  int refused = 0;
+  for (int i = 0; i < cases; ++i) {
+    made::MarkerScene scene = made::random_markers(8, 80 * degree, noise_px, random);
+    made::mistake_markers(scene.sights, 3);
+    try {
+      register_camera(scene.sights, {noise_px});
+    } catch (const std::runtime_error&) {
+      ++refused;
+    }
+  }
+  EXPECT_GE(refused, cases - 10);
+}
+
 TEST(RegisterCamera, IsExactWithoutNoise) {
   made::Random random(3);
   for (int i = 0; i < cases; ++i) {
