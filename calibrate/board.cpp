@@ -30,6 +30,11 @@ void check(const Board& board) {
   }
 }
 
+int quarters_alike(const Board& board) {
+  if (board.kind == Board::Kind::charuco || (board.columns + board.rows) % 2 != 0) return 0;
+  return board.columns == board.rows && board.columns % 2 == 0 ? 1 : 2;
+}
+
 Vec3 corner_of(const Board& board, std::size_t index) {
   const auto columns = static_cast<std::size_t>(board.columns);
   return {static_cast<double>(index % columns) * board.square_m,

@@ -34,6 +34,10 @@ struct Board {
 // above 0 and below 10 m, a marker that does not fit into it.
 void check(const Board& board);
 
+// The least turn, in quarters, after which a picture of the board looks the same, so that corners
+// may be counted from elsewhere: 2, of squares of an even number of corners 1; 0 = none.
+int quarters_alike(const Board& board);
+
 // A corner in the board's frame, metres, if the board is flat.
 Vec3 corner_of(const Board& board, std::size_t index);
 

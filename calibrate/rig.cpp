@@ -86,7 +86,7 @@ std::vector<Pose> countings(const Board& board) {
   if (board.kind != Board::Kind::chessboard) return result;
   const Vec3 last = corner_of(board, board.corner_count() - 1);
   result.push_back({{{-1, 0, 0, 0, -1, 0, 0, 0, 1}}, last});
-  if (board.columns == board.rows && board.columns % 2 == 0) {
+  if (quarters_alike(board) == 1) {
     result.push_back({{{0, -1, 0, 1, 0, 0, 0, 0, 1}}, {last.x, 0, 0}});
     result.push_back({{{0, 1, 0, -1, 0, 0, 0, 0, 1}}, {0, last.y, 0}});
   }
@@ -96,6 +96,7 @@ std::vector<Pose> countings(const Board& board) {
 struct Best {
   Pose pose;
   double error_px = HUGE_VAL;
+  bool told = true;  // from the other ways to count
 };
 
 // b_from_a that explains best what camera b saw at all instants, from one of them. Of a board that
@@ -108,6 +109,7 @@ Best relation(const std::vector<std::optional<Seen>>& a,
   for (std::size_t i = 0; i < a.size(); ++i) {
     if (!a[i] || !b[i]) continue;
     Best of_instant;
+    std::vector<double> errors;
     for (const Pose& counting : countings) {
       const Pose b_from_a = b[i]->cam_from_board * counting * inverse(a[i]->cam_from_board);
       double error = 0;
@@ -120,7 +122,11 @@ Best relation(const std::vector<std::optional<Seen>>& a,
         error += least;
       }
       if (error < clearly * of_instant.error_px) of_instant = {b_from_a, error};
+      errors.push_back(error);
     }
+    of_instant.told = std::ranges::count_if(errors, [&](double error) {
+                        return !(of_instant.error_px < clearly * error);
+                      }) == 1;
     if (of_instant.error_px < best.error_px) best = of_instant;
   }
   return best;
@@ -133,13 +139,19 @@ std::size_t shared_views(const std::vector<std::optional<Seen>>& a,
   return count;
 }
 
+struct PlacedCameras {
+  std::vector<Pose> cam_from_rig;
+  std::vector<std::size_t> untold;  // placed as one of several ways to count has it
+};
+
 // Camera by camera, the next one that shares the most views with one that is placed.
-std::vector<Pose> start_cameras(const RigProblem& problem,
-                                const AllSeen& seen,
-                                const std::vector<Pose>& countings) {
+PlacedCameras start_cameras(const RigProblem& problem,
+                            const AllSeen& seen,
+                            const std::vector<Pose>& countings) {
   const std::size_t count = problem.cameras.size();
   std::vector<std::optional<Pose>> cam_from_rig(count);
   cam_from_rig[0] = Pose{};
+  PlacedCameras placed;
   for (;;) {
     std::size_t most = 0, from = 0, to = 0;
     for (std::size_t a = 0; a < count; ++a) {
@@ -154,20 +166,21 @@ std::vector<Pose> start_cameras(const RigProblem& problem,
       }
     }
     if (most == 0) break;
-    cam_from_rig[to] = relation(seen[from], seen[to], countings).pose * *cam_from_rig[from];
+    const Best found = relation(seen[from], seen[to], countings);
+    cam_from_rig[to] = found.pose * *cam_from_rig[from];
+    if (!found.told) placed.untold.push_back(to);
   }
   std::string lost;
-  std::vector<Pose> result;
   for (std::size_t i = 0; i < count; ++i) {
     if (!cam_from_rig[i]) lost += (lost.empty() ? "" : ", ") + problem.cameras[i].name;
-    result.push_back(cam_from_rig[i].value_or(Pose{}));
+    placed.cam_from_rig.push_back(cam_from_rig[i].value_or(Pose{}));
   }
   if (!lost.empty()) {
     throw std::runtime_error("no board is seen at one instant by " + problem.cameras[0].name +
                              "'s group of cameras and by these: " + lost +
                              "; take pictures of the board where their views overlap");
   }
-  return result;
+  return placed;
 }
 
 // The corners of all boards that two cameras or more see, counted from the same end.
@@ -175,12 +188,15 @@ struct Start {
   RigBundle bundle;
   std::vector<RigCorner> corners;
   std::vector<std::size_t> instants;  // of the bundle's boards
+  std::vector<std::size_t> untold;    // cameras, of PlacedCameras
 };
 
 Start start_rig(const RigProblem& problem, const AllSeen& seen) {
   const std::vector<Pose> ways = countings(problem.board);
   Start start;
-  start.bundle.cam_from_rig = start_cameras(problem, seen, ways);
+  PlacedCameras placed = start_cameras(problem, seen, ways);
+  start.bundle.cam_from_rig = std::move(placed.cam_from_rig);
+  start.untold = std::move(placed.untold);
   for (std::size_t instant = 0; instant < problem.cameras[0].views.size(); ++instant) {
     std::vector<std::size_t> who;
     for (std::size_t c = 0; c < seen.size(); ++c) {
@@ -323,6 +339,19 @@ void judge(RigFit& fit,
   if (!worst.empty()) throw std::runtime_error(worst);
 }
 
+// Of boards that pictures do not tell the turn of.
+void warn_of_countings(RigFit& fit, const RigProblem& problem, const Start& start) {
+  const int quarters = quarters_alike(problem.board);
+  if (quarters == 0) return;
+  for (const std::size_t camera : start.untold) {
+    fit.warnings.push_back(problem.cameras[camera].name + ": the board looks alike after " +
+                           (quarters == 1 ? "a quarter of a turn" : "half a turn") +
+                           ", and no instant tells from which corner this camera's was counted: "
+                           "its pose may be wrong; tilt the board and move it about, or take one "
+                           "of an odd and an even number of corners");
+  }
+}
+
 // The camera's own part of everything's covariance.
 void tell_uncertainty(RigCameraFit& fit,
                       const RigCovariance& all,
@@ -362,6 +391,7 @@ RigFit fit_rig(const RigProblem& problem, const RigOptions& options) {
     fit.rig_from_board[start.instants[b]] = start.bundle.rig_from_board[b];
   }
   judge(fit, problem, start, used);
+  warn_of_countings(fit, problem, start);
   double squares = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < used.size(); ++i) {

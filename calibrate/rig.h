@@ -57,7 +57,7 @@ struct RigFit {
 // a start from pairs of cameras that share the most views. Robust at first (Cauchy's loss), then
 // plain squares over corners within 4.5 standard deviations. A chessboard that looks the same after
 // half a turn may be counted from either end, one of as many rows as columns, if they are even,
-// from any of its four corners: that is found out.
+// from any of its four corners: that is found out, or warned of where the instants do not tell it.
 // The uncertainty counts what lenses are off by where they tell it (Lens::error_px); a turn of all
 // of a lens's directions is none of it.
 //

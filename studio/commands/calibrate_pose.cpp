@@ -83,6 +83,17 @@ std::vector<calibrate::Marker> find_board(const PoseOptions& options, const cali
   return markers_of(board, better ? refined : *found.view, inverse(board_from_set));
 }
 
+void warn_of_turned_board(const BoardOptions& options, calibrate::Registration& found) {
+  const int quarters = quarters_alike(board_of(options));
+  if (quarters == 0) return;
+  found.warnings.push_back(fmt::format(
+      "a chessboard of {} corners looks alike after {}: the pose may be turned about it by as "
+      "much; "
+      "check its position, or lay a board of an odd and an even number of corners, or a ChArUco "
+      "board",
+      options.corners, quarters == 1 ? "a quarter of a turn" : "half a turn"));
+}
+
 void say_markers(const std::vector<calibrate::Marker>& markers,
                  const calibrate::Registration& found,
                  bool all,
@@ -110,7 +121,7 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   const calibrate::Lens lens = calibrate::read_lens(options.lens);
   const std::vector<calibrate::Marker> markers =
       by_board ? find_board(options, lens) : read_markers_of(options.markers, options.picture);
-  const calibrate::Registration found = [&] {
+  calibrate::Registration found = [&] {
     try {
       return calibrate::register_camera(
           calibrate::sights_of(lens, markers),
@@ -119,6 +130,7 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
       throw std::runtime_error(fmt::format("{}: {}", source, error.what()));
     }
   }();
+  if (by_board) warn_of_turned_board(options.board, found);
   const double sigma_deg = found.turn_sigma_rad / degree;
   const double sigma_mm = 1000 * found.position_sigma_m;
   Json figures = pose_json(found.cam_from_set);

@@ -41,6 +41,18 @@ TEST(Board, KnowsItsMiddleFromThoseCornersThatWereSeen) {
   EXPECT_FALSE(middle_of(board, view));
 }
 
+TEST(Board, KnowsAfterWhichTurnItLooksTheSame) {
+  const auto of = [](int columns, int rows) {
+    return quarters_alike({Board::Kind::chessboard, columns, rows, .025, 0, ""});
+  };
+  EXPECT_EQ(of(9, 6), 0);
+  EXPECT_EQ(of(8, 6), 2);
+  EXPECT_EQ(of(9, 7), 2);
+  EXPECT_EQ(of(7, 7), 2);
+  EXPECT_EQ(of(8, 8), 1);
+  EXPECT_EQ(quarters_alike({Board::Kind::charuco, 8, 6, .025, .018, "DICT_5X5_100"}), 0);
+}
+
 TEST(Board, IsRefusedIfItCannotBe) {
   const Board good{Board::Kind::charuco, 9, 6, .025, .018, "DICT_5X5_100"};
   EXPECT_NO_THROW(check(good));

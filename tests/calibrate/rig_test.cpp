@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "tests/calibrate/made_markers.h"
 
@@ -159,6 +160,26 @@ TEST(FitRig, FindsOutFromWhichCornerASquareBoardWasCounted) {
   EXPECT_LT(error.turn_rad, 0.1 * degree);
   EXPECT_LT(error.position_m, 0.003);
   EXPECT_EQ(fit.cameras[1].left_out, 0U);
+}
+
+TEST(FitRig, WarnsWhereNothingTellsFromWhichEndABoardWasCounted) {
+  const Board alike{Board::Kind::chessboard, 8, 6, .05, 0, ""};
+  const auto of_still = [](const Board& board) {
+    MadeRig rig = made_rig(12, 0.2, 4, board);
+    rig.problem.cameras.pop_back();
+    const auto sees_all = [](const RigCamera& camera, std::size_t i) {
+      return count_corners(camera.views[i]) == camera.views[i].corners.size();
+    };
+    std::size_t shown = 0;
+    while (!sees_all(rig.problem.cameras[0], shown) || !sees_all(rig.problem.cameras[1], shown)) {
+      if (++shown == 12) throw std::runtime_error("no board is seen whole by both");
+    }
+    for (RigCamera& camera : rig.problem.cameras) camera.views = {camera.views[shown]};
+    return fit_rig(rig.problem).warnings;
+  };
+  EXPECT_THAT(of_still(alike), testing::ElementsAre(HasSubstr("side: the board looks alike")));
+  EXPECT_TRUE(of_still(made_board()).empty());
+  EXPECT_TRUE(fit_rig(made_rig(12, 0.2, 4, alike).problem).warnings.empty());
 }
 
 TEST(FitRig, ChainsCamerasThatNeverSeeTheSame) {

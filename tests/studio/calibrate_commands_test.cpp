@@ -216,6 +216,22 @@ TEST_F(CalibrateCommands, PoseComesFromABoardThatLiesInTheSet) {
   EXPECT_EQ(run("calibrate pose --lens " + path("lens.toml") + " -o " + path("a.toml")).status, 2);
 }
 
+TEST_F(CalibrateCommands, PoseWarnsOfABoardThatLooksAlikeAfterHalfATurn) {
+  const calibrate::Lens lens{"LENSMODEL_PINHOLE", 640, 480, {600, 600, 319.5, 239.5}};
+  const calibrate::Board board{calibrate::Board::Kind::chessboard, 8, 6, 0.05, 0, ""};
+  const calibrate::Pose truth = calibrate::look_at({0.3, -0.8, 0.6}, {0.2, -0.12, 0}, 0.05);
+  const calibrate::Pose set_from_board{{{1, 0, 0, 0, -1, 0, 0, 0, -1}}, {}};
+  const auto picture = made::render_board(board, truth * set_from_board, lens, {.noise = 1});
+  capture::write_png(dir_ / "board.png", lens.width, lens.height, 1, picture.pixels);
+  calibrate::write_lens(path("lens.toml"), lens);
+  const Outcome outcome =
+      run_with_figures("calibrate pose " + path("board.png") + " --lens " + path("lens.toml") +
+                       " --board 8x6 --square 0.05 -o " + path("pose.toml"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("8x6 corners looks alike after half a turn"));
+  EXPECT_EQ(figures()["warnings"].size(), 1U);
+}
+
 TEST_F(CalibrateCommands, PoseSaysWhatIsMissing) {
   calibrate::write_lens(path("lens.toml"), made::fish_eye());
   const std::string markers = write(
