@@ -275,14 +275,18 @@ CameraModel read_camera_model(const std::string& path) {
   return model;
 }
 
-void write_camera_model(const std::string& path, const CameraModel& model) {
-  check(model.lens);
-  const bool pinhole = model.lens.model == "pinhole";
-  if ((!pinhole && !is_mrcal_model(model.lens.model)) ||
-      model.lens.max_angle_rad < Lens{}.max_angle_rad) {
-    throw std::invalid_argument("a .cameramodel cannot hold a lens of model " + model.lens.model +
+void check_fits_camera_model(const Lens& lens) {
+  check(lens);
+  if ((lens.model != "pinhole" && !is_mrcal_model(lens.model)) ||
+      lens.max_angle_rad < Lens{}.max_angle_rad) {
+    throw std::invalid_argument("a .cameramodel cannot hold a lens of model " + lens.model +
                                 " with its largest angle: write a .toml");
   }
+}
+
+void write_camera_model(const std::string& path, const CameraModel& model) {
+  check_fits_camera_model(model.lens);
+  const bool pinhole = model.lens.model == "pinhole";
   std::vector<double> rt(6);
   if (model.cam_from_ref) {
     const Vec3 r = rotation_vector(model.cam_from_ref->R);

@@ -19,9 +19,12 @@ struct CameraModel {
 // locale. Throws std::runtime_error with path, line and reason.
 CameraModel read_camera_model(const std::string& path);
 
-// Writes one that mrcal reads, with every digit. Only pinholes and mrcal's models, with no largest
-// angle of their own, fit into the format: std::invalid_argument for others.
-// Throws std::runtime_error if the file cannot be written.
+// Throws std::invalid_argument unless the lens fits into the format: pinholes and mrcal's models,
+// with no largest angle of their own.
+void check_fits_camera_model(const Lens& lens);
+
+// Writes one that mrcal reads, with every digit. Throws as check_fits_camera_model, and
+// std::runtime_error if the file cannot be written.
 void write_camera_model(const std::string& path, const CameraModel& model);
 
 }  // namespace calibrate

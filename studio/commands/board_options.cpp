@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "calibrate/board_drawing.h"
+
 namespace studio {
 namespace {
 
@@ -49,7 +51,7 @@ calibrate::Board board_of(const BoardOptions& options) {
     throw UsageError("--marker and --dictionary are of ChArUco boards: add --charuco");
   }
   try {
-    check(board);
+    black_parts(board);  // its dictionary, too
   } catch (const std::invalid_argument& error) {
     throw UsageError(error.what());
   }

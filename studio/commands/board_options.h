@@ -20,7 +20,7 @@ struct BoardOptions {
 // --board, --square, --charuco, --marker and --dictionary.
 void declare(Arguments& arguments, BoardOptions& options);
 
-// Throws UsageError for what is no board.
+// Throws UsageError for what is no board, or a dictionary that is unknown or has too few markers.
 calibrate::Board board_of(const BoardOptions& options);
 
 }  // namespace studio

@@ -23,6 +23,7 @@
 #include "studio/calibration_report.h"
 #include "studio/commands/board_options.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/pose_report.h"
 #include "studio/json_text.h"
 
 namespace studio {
@@ -299,12 +300,7 @@ void calibrate_lens(const LensOptions& options, Console& console) {
   adjusted.fisheye = options.model == "fisheye";
   const LensCalibrationOptions models = models_of(options);
   // Before all the work.
-  for (const std::string& file : {options.out, options.report}) {
-    const auto directory = std::filesystem::path(file).parent_path();
-    if (!directory.empty() && !std::filesystem::is_directory(directory)) {
-      throw std::runtime_error(fmt::format("{}: there is no such directory", directory.string()));
-    }
-  }
+  for (const std::string& file : {options.out, options.report}) check_directory_of(file);
   const std::vector<Picture> pictures = read_pictures(options, console);
 
   const auto begin = std::chrono::steady_clock::now();

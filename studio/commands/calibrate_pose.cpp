@@ -1,8 +1,8 @@
 // platelight calibrate pose: where a camera stands and looks, from surveyed markers or a board.
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -115,10 +115,14 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   }
   const std::string& source = by_board ? options.board_picture : options.markers;
   const std::string what = by_board ? "corners" : "markers";
-  const ReadFile read{"what the pose is found by", source};
-  spare_files(std::span(&read, 1), options.out);
+  spare_files(
+      std::array{ReadFile{"what the pose is found by", source}, ReadFile{"the lens", options.lens},
+                 ReadFile{"the board's pose", options.board_pose}},
+      options.out);
   const double usual_noise_px = by_board ? 0.2 : 0.5;
+  check_directory_of(options.out);
   const calibrate::Lens lens = calibrate::read_lens(options.lens);
+  check_pose_file_takes(options.out, lens);
   const std::vector<calibrate::Marker> markers =
       by_board ? find_board(options, lens) : read_markers_of(options.markers, options.picture);
   calibrate::Registration found = [&] {

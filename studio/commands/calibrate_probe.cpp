@@ -22,6 +22,7 @@
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
 #include "studio/json_text.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -203,7 +204,18 @@ void calibrate_probe(const ProbeOptions& options, Console& console) {
                      options.plate_pose.empty())) {
     throw UsageError("bright sources need --light, --plate, --plate-lens and --plate-pose");
   }
+  spare_files(
+      std::array{ReadFile{"the lens", options.lens},
+                 ReadFile{"what the pose is found by", options.markers},
+                 ReadFile{"the probe's picture", options.light},
+                 ReadFile{"its response", options.response}, ReadFile{"the plate", options.plate},
+                 ReadFile{"the plate's response", options.plate_response},
+                 ReadFile{"the plate's lens", options.plate_lens},
+                 ReadFile{"the plate's pose", options.plate_pose}},
+      options.out);
+  check_directory_of(options.out);
   const calibrate::Lens lens = calibrate::read_lens(options.lens);
+  check_pose_file_takes(options.out, lens);
   const Found found = by_sources ? find_by_sources(options, lens) : find_by_markers(options, lens);
   write_pose_file(options.out, found.probe_from_set, lens,
                   fmt::format("by platelight calibrate probe, from {}: +- {:.2g} degrees",

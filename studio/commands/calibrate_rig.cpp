@@ -28,6 +28,7 @@
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
 #include "studio/json_text.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -237,6 +238,13 @@ calibrate::RigProblem problem_of(const std::vector<Source>& sources,
 void calibrate_rig(const RigOptions& options, Console& console) {
   if (!options.out.ends_with(".toml")) throw UsageError("--out must end in .toml");
   const std::vector<Source> sources = sources_of(options);
+  std::vector<ReadFile> read;
+  for (const Source& source : sources) {
+    read.push_back({"the lens of camera " + source.name, source.lens_file});
+    read.push_back({"the response of camera " + source.name, source.response});
+  }
+  spare_files(read, options.out);
+  check_directory_of(options.out);
   const calibrate::Board board = board_of(options.board);
   std::vector<calibrate::Lens> lenses;
   for (const Source& source : sources) lenses.push_back(calibrate::read_lens(source.lens_file));

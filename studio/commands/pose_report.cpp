@@ -2,12 +2,14 @@
 #include "studio/commands/pose_report.h"
 
 #include <cmath>
+#include <filesystem>
 #include <stdexcept>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "calibrate/angles.h"
+#include "calibrate/camera_model.h"
 #include "calibrate/pose_file.h"
 #include "studio/arguments.h"
 
@@ -35,16 +37,28 @@ void check_pose_file_name(const std::string& path) {
   }
 }
 
-void write_pose_file(const std::string& path,
-                     const calibrate::Pose& cam_from_set,
-                     const calibrate::Lens& lens,
-                     const std::string& comment) {
+void check_directory_of(const std::string& path) {
+  const std::filesystem::path directory = std::filesystem::path(path).parent_path();
+  if (directory.empty() || std::filesystem::is_directory(directory)) return;
+  throw std::runtime_error(fmt::format("{}: there is no such directory", directory.string()));
+}
+
+void check_pose_file_takes(const std::string& path, const calibrate::Lens& lens) {
+  if (!path.ends_with(".cameramodel")) return;
   try {
-    calibrate::write_pose(path, cam_from_set, lens, comment);
+    calibrate::check_fits_camera_model(lens);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(
         fmt::format("{}: {}; a .toml file takes the pose of any lens", path, error.what()));
   }
+}
+
+void write_pose_file(const std::string& path,
+                     const calibrate::Pose& cam_from_set,
+                     const calibrate::Lens& lens,
+                     const std::string& comment) {
+  check_pose_file_takes(path, lens);
+  calibrate::write_pose(path, cam_from_set, lens, comment);
 }
 
 std::vector<calibrate::Marker> read_markers_of(const std::string& path,

@@ -16,6 +16,12 @@ namespace studio {
 // Throws UsageError unless a pose can be written to a file of that name.
 void check_pose_file_name(const std::string& path);
 
+// Throws std::runtime_error unless the file's directory is there: for before the work.
+void check_directory_of(const std::string& path);
+
+// Throws std::runtime_error if a pose cannot be written there because of its lens.
+void check_pose_file_takes(const std::string& path, const calibrate::Lens& lens);
+
 // As calibrate::write_pose; what the lens does not fit into is a std::runtime_error that says so.
 void write_pose_file(const std::string& path,
                      const calibrate::Pose& cam_from_set,

@@ -232,6 +232,55 @@ TEST_F(CalibrateCommands, PoseWarnsOfABoardThatLooksAlikeAfterHalfATurn) {
   EXPECT_EQ(figures()["warnings"].size(), 1U);
 }
 
+TEST_F(CalibrateCommands, WhatWasReadIsNotWrittenOver) {
+  calibrate::write_lens(path("lens.toml"), made::fish_eye());
+  const calibrate::Pose truth = calibrate::look_at({0.4, -0.3, 1.2}, {2, 1, 0}, 0.1);
+  write("markers.toml", markers_text(made::fish_eye(), truth, 9, "a"));
+  const std::string of_both =
+      " --lens " + path("lens.toml") + " --markers " + path("markers.toml") + " -o ";
+  const std::string lenses =
+      " a=none b=none --lens a=" + path("lens.toml") + " --lens b=" + path("other.toml") + " -o ";
+  calibrate::write_lens(path("other.toml"), made::fish_eye());
+  for (const std::string& words : {"calibrate pose" + of_both + path("lens.toml"),
+                                   "calibrate probe" + of_both + path("lens.toml"),
+                                   "calibrate probe" + of_both + path("markers.toml"),
+                                   "calibrate rig" + lenses + path("lens.toml"),
+                                   "calibrate rig" + lenses + path("other.toml")}) {
+    const std::string lens = content_of(path("lens.toml"));
+    const std::string markers = content_of(path("markers.toml"));
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 1) << words;
+    expect_one_line(outcome.err);
+    EXPECT_THAT(outcome.err, HasSubstr("would be lost")) << words;
+    EXPECT_EQ(content_of(path("lens.toml")), lens) << words;
+    EXPECT_EQ(content_of(path("markers.toml")), markers) << words;
+  }
+}
+
+// With sources that are not there: what is wrong with the result is said before they are looked at.
+TEST_F(CalibrateCommands, WhatCannotBeWrittenIsRefusedBeforeTheWork) {
+  calibrate::write_lens(path("lens.toml"), made::fish_eye());
+  const std::string nowhere = path("nowhere/pose.toml");
+  const auto reason = [&](const std::string& words, int status) {
+    const Outcome outcome = run("calibrate " + words);
+    EXPECT_EQ(outcome.status, status) << words;
+    expect_one_line(outcome.err);
+    return outcome.err;
+  };
+  const std::string lens = " --lens " + path("lens.toml");
+  for (const std::string command : {"pose", "probe"}) {
+    const std::string words = command + lens + " --markers none -o ";
+    EXPECT_THAT(reason(words + nowhere, 1), HasSubstr("no such directory"));
+    EXPECT_THAT(reason(words + path("pose.cameramodel"), 1),
+                HasSubstr("a .toml file takes the pose of any lens"));
+  }
+  const std::string lenses =
+      " --lens a=" + path("lens.toml") + " --lens b=" + path("lens.toml") + " -o ";
+  EXPECT_THAT(reason("rig a=none b=none" + lenses + nowhere, 1), HasSubstr("no such directory"));
+  EXPECT_THAT(reason("offset none none --board 10x7 --charuco --dictionary NOPE", 2),
+              HasSubstr("there is no dictionary of markers \"NOPE\""));
+}
+
 TEST_F(CalibrateCommands, PoseSaysWhatIsMissing) {
   calibrate::write_lens(path("lens.toml"), made::fish_eye());
   const std::string markers = write(
