@@ -100,6 +100,12 @@ void warn_of_views(const LensCalibration& c, std::vector<std::string>& warnings)
   }
 }
 
+// Beyond the image circle of a fish-eye there is nothing to see; such lenses fill their pictures.
+bool is_perspective(const LensForm& form) {
+  return form.model == "LENSMODEL_PINHOLE" || form.model.starts_with("LENSMODEL_OPENCV") ||
+         form.model == "LENSMODEL_CAHVOR";
+}
+
 void warn_of_coverage(const LensProblem& problem,
                       const LensCalibration& c,
                       std::vector<std::string>& warnings) {
@@ -107,6 +113,7 @@ void warn_of_coverage(const LensProblem& problem,
   const int rows = std::max(1, columns * problem.height / problem.width);
   std::size_t seen = 0;
   std::size_t unknown = 0;
+  std::size_t blind = 0;
   double farthest_rad = 0;
   std::vector<double> errors;
   // Up to where the lens shows anything; its polynomial has no say on that.
@@ -116,7 +123,10 @@ void warn_of_coverage(const LensProblem& problem,
     for (int x = 0; x < columns; ++x) {
       const Vec2 q{(x + 0.5) * problem.width / columns, (y + 0.5) * problem.height / rows};
       const auto v = unproject(whole, q);
-      if (!v) continue;
+      if (!v) {
+        if (is_perspective(c.form)) ++blind;
+        continue;
+      }
       const double off_rad = std::atan2(hypotenuse(v->x, v->y), v->z);
       if (off_rad > std::max(image_circle_rad, c.coverage_deg * degree)) continue;
       ++seen;
@@ -126,6 +136,15 @@ void warn_of_coverage(const LensProblem& problem,
       if (!error) ++unknown;
     }
   }
+  if (blind > 0) {
+    warnings.push_back(text(
+        "the lens is blind in %.1f %% of the picture, for its polynomial turns back there: take "
+        "pictures with the board at the rim and in the corners, or let --model name a simpler "
+        "form",
+        100.0 * static_cast<double>(blind) / (columns * rows)));
+  }
+  seen += blind;
+  unknown += blind;
   if (static_cast<double>(unknown) > unseen_share * static_cast<double>(seen)) {
     warnings.push_back(text("no corners in %.0f %% of the picture: the lens is a guess there",
                             100 * static_cast<double>(unknown) / static_cast<double>(seen)));

@@ -111,6 +111,23 @@ TEST(CalibrateLens, ChoosesWhatFitsIntoACameraModelIfItIsAskedTo) {
                      {.models = LensCalibrationOptions::Models::perspective, .form = {}});
   EXPECT_THAT(c.lens.model, HasSubstr("LENSMODEL_OPENCV"));
   EXPECT_LE(ray_error_mrad(made_normal(), c.lens, 28), 0.4);
+  EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("blind"))));
+}
+
+TEST(CalibrateLens, SaysWhereAPolynomialTurnsBackWithinThePicture) {
+  // 551 pixels from the middle; the picture's sides are 640 away.
+  const MadeLens folded{
+      {"LENSMODEL_OPENCV4", 1280, 720, {1108.5, 1108.5, 639.5, 359.5, -.6, 0, 0, 0}},
+      0,
+      30 * degree};
+  MadeBoards boards = normal_boards();
+  boards.views = 10;
+  boards.sees_deg = 25;
+  LensCalibrationOptions options;
+  options.form = LensForm{"LENSMODEL_OPENCV4", 0, true};
+  const LensCalibration c = calibrate_lens(make_board_views(folded, boards), options);
+  ASSERT_FALSE(unproject(c.lens, {20, 20}));
+  EXPECT_THAT(c.warnings, Contains(HasSubstr("the lens is blind in ")));
 }
 
 TEST(CalibrateLens, TakesASplineIfNothingSmallerFollowsAndThereAreCornersEnough) {
