@@ -48,6 +48,13 @@ Pose read_pose(const std::string& path) {
   }
   const CameraModel model = read_camera_model(path);
   if (!model.cam_from_ref) throw std::runtime_error(path + ": has no extrinsics");
+  if (*model.cam_from_ref == Pose{}) {
+    throw std::runtime_error(
+        path +
+        ": its extrinsics are all zero, as where only a lens was found: name a file of calibrate "
+        "pose; a camera that does stand so has a .toml with pose = { position = [0, 0, 0], "
+        "rotation = [1, 0, 0, 0, 1, 0, 0, 0, 1] }");
+  }
   return *model.cam_from_ref;
 }
 

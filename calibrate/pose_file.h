@@ -9,7 +9,8 @@
 namespace calibrate {
 
 // Reads the extrinsics of a .cameramodel, or the `pose` of a .toml (files.md). Throws
-// std::runtime_error with path, line where known, and reason.
+// std::runtime_error with path, line where known, and reason; also for extrinsics of zeros, which
+// lenses without a pose are written with.
 Pose read_pose(const std::string& path);
 
 // Writes, by the file's ending, a .cameramodel of the lens with the pose as its extrinsics, or a

@@ -1,7 +1,10 @@
 // Poses in files of their own.
 #include "calibrate/pose_file.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <stdexcept>
 
 #include "tests/calibrate/made_markers.h"
 #include "tests/made_files.h"
@@ -46,6 +49,20 @@ TEST(ReadPose, RefusesEveryBadFileWithPlaceAndReason) {
        {"pose_nan.toml", ":1:25: \"position\" must be"}},
       read_pose);
   EXPECT_THROW(read_pose("pose.txt"), std::runtime_error);
+}
+
+TEST(ReadPose, TakesNoLensForAPose) {
+  const auto directory = made::make_temporary_directory();
+  const Lens pinhole{"pinhole", 640, 480, {500, 500, 319.5, 239.5}};
+  write_lens(directory / "lens.cameramodel", pinhole);
+  try {
+    read_pose(directory / "lens.cameramodel");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("its extrinsics are all zero"));
+  }
+  write_pose(directory / "pose.toml", Pose{}, pinhole, "at the origin");
+  EXPECT_EQ(read_pose(directory / "pose.toml"), Pose{});
 }
 
 }  // namespace
