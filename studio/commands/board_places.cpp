@@ -7,6 +7,7 @@
 #include <cmath>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "calibrate/board_detector.h"
@@ -29,6 +30,18 @@ calibrate::GreyPicture small_picture(const capture::Image& image) {
     }
   }
   return calibrate::grey_picture(small);
+}
+
+std::unique_ptr<capture::Camera> open_recorded(const std::string& source) {
+  const auto refuse = [&] {
+    throw std::runtime_error(source +
+                             ": is a live camera, which shows no end of pictures: record it first "
+                             "(platelight capture record), and name replay: with its folder");
+  };
+  if (capture::is_device(source)) refuse();
+  auto camera = capture::open_camera(source);
+  if (camera->info().live) refuse();
+  return camera;
 }
 
 BoardPlaces find_board_places(const std::vector<TimedPicture>& pictures,

@@ -22,6 +22,7 @@
 #include "capture/parallel_loop.h"
 #include "studio/calibration_report.h"
 #include "studio/commands/board_options.h"
+#include "studio/commands/board_places.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
 #include "studio/json_text.h"
@@ -58,7 +59,7 @@ std::vector<Picture> read_pictures(const LensOptions& options, Console& console)
     const std::string& source = options.images[i];
     console.progress(static_cast<double>(i) / static_cast<double>(options.images.size()),
                      "reading");
-    const auto camera = capture::open_camera(source, {});
+    const auto camera = open_recorded(source);
     std::int64_t frame_number = 0;
     while (const auto frame = camera->next()) {
       if (frame->image != nullptr && frame_number % every == 0) {

@@ -25,6 +25,7 @@
 #include "capture/camera.h"
 #include "capture/parallel_loop.h"
 #include "studio/commands/board_options.h"
+#include "studio/commands/board_places.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
 #include "studio/json_text.h"
@@ -152,7 +153,7 @@ Pictures read_pictures(const Source& source, std::int64_t every) {
     pictures.grey.push_back(calibrate::grey_picture(image));
   };
   if (!fs::is_directory(source.pictures)) {
-    const auto camera = capture::open_camera(source.pictures, {});
+    const auto camera = open_recorded(source.pictures);
     for (std::int64_t number = 0; const auto frame = camera->next(); ++number) {
       if (frame->image != nullptr && number % every == 0) {
         add(fmt::format("frame {:09}", number), *frame->image);

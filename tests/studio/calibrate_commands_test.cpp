@@ -281,6 +281,20 @@ TEST_F(CalibrateCommands, WhatCannotBeWrittenIsRefusedBeforeTheWork) {
               HasSubstr("there is no dictionary of markers \"NOPE\""));
 }
 
+TEST_F(CalibrateCommands, LiveCamerasAreToBeRecordedFirst) {
+  calibrate::write_lens(path("lens.toml"), made::fish_eye());
+  for (const std::string& words :
+       {"lens v4l2:/dev/video99 -o " + path("new.toml"),
+        "rig a=v4l2:/dev/video99 b=aravis:none --lens a=" + path("lens.toml") +
+            " --lens b=" + path("lens.toml") + " -o " + path("rig.toml")}) {
+    const Outcome outcome = run("calibrate " + words);
+    EXPECT_EQ(outcome.status, 1) << words;
+    expect_one_line(outcome.err);
+    EXPECT_THAT(outcome.err, HasSubstr("v4l2:/dev/video99: is a live camera")) << words;
+    EXPECT_THAT(outcome.err, HasSubstr("record it first")) << words;
+  }
+}
+
 TEST_F(CalibrateCommands, PoseSaysWhatIsMissing) {
   calibrate::write_lens(path("lens.toml"), made::fish_eye());
   const std::string markers = write(
