@@ -1,6 +1,7 @@
 // How much a lens dims towards its rim.
 #include "calibrate/vignetting.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
@@ -32,6 +33,18 @@ void check_vignetting(std::span<const double> vignetting, double max_angle_rad) 
       throw std::invalid_argument("a lens's vignetting must stay above 0.05 up to its rim");
     }
   }
+}
+
+void check_vignetting(std::span<const double> vignetting, const Lens& lens) {
+  double angle_rad = 0;
+  for (const double x : {0.0, lens.width - 1.0}) {
+    for (const double y : {0.0, lens.height - 1.0}) {
+      const auto v = unproject(lens, {x, y});
+      angle_rad =
+          std::max(angle_rad, v ? std::atan2(std::hypot(v->x, v->y), v->z) : lens.max_angle_rad);
+    }
+  }
+  check_vignetting(vignetting, angle_rad);
 }
 
 }  // namespace calibrate

@@ -17,5 +17,7 @@ void add_vignetting(std::span<const double> vignetting, DirectionTable& table);
 // Throws std::invalid_argument unless the sensitivity stays above 0.05 up to an angle: below, a
 // correction would show noise only.
 void check_vignetting(std::span<const double> vignetting, double max_angle_rad);
+// The same up to the corners of the lens's picture, or to its rim if that lies inside.
+void check_vignetting(std::span<const double> vignetting, const Lens& lens);
 
 }  // namespace calibrate

@@ -38,7 +38,7 @@ double upward_weight(int row, int height) {
   return std::max(bottom * bottom - top * top, 0.0) / 2 * pi / height;
 }
 
-void check(const ProbeSettings& settings, double max_angle_rad) {
+void check(const ProbeSettings& settings, const Lens& lens) {
   if (settings.height < least_height || settings.height > largest_height) {
     throw std::invalid_argument("an environment's height must be from 8 to 4096, not " +
                                 std::to_string(settings.height));
@@ -46,7 +46,7 @@ void check(const ProbeSettings& settings, double max_angle_rad) {
   if (!(settings.floor_albedo >= 0 && settings.floor_albedo <= 1)) {
     throw std::invalid_argument("the albedo of the floor must be from 0 to 1");
   }
-  calibrate::check_vignetting(settings.vignetting, max_angle_rad);
+  calibrate::check_vignetting(settings.vignetting, lens);
 }
 
 }  // namespace
@@ -56,7 +56,7 @@ ProbeMapper::ProbeMapper(const Lens& lens,
                          const ProbeSettings& settings)
     : width_(lens.width), height_(lens.height), settings_(settings) {
   check(lens);
-  check(settings, lens.max_angle_rad);
+  check(settings, lens);
   gather_ = make_probe_gather(lens, probe_from_set, settings.height);
   if (gather_.pixel.empty()) throw std::invalid_argument("a lightprobe's lens sees nothing");
   shrunk_ = capture::make_image(gather_.height, gather_.width, 4);

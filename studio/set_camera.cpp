@@ -1,6 +1,7 @@
 // Set files: the camera and the probe.
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <system_error>
 
@@ -139,19 +140,11 @@ void read_vignetting(Section& section, std::vector<double>& vignetting) {
   section.numbers("vignetting", vignetting, {1, 2, 3, 4}, {-1e3, 1e3});
 }
 
-// Up to the corners of the picture, or to the lens's rim if that lies inside.
-void check_vignetting(Section& section, const CameraSettings& camera) {
-  const calibrate::Lens& lens = camera.lens;
-  double angle_rad = 0;
-  for (const double x : {0.0, lens.width - 1.0}) {
-    for (const double y : {0.0, lens.height - 1.0}) {
-      const auto v = calibrate::unproject(lens, {x, y});
-      angle_rad =
-          std::max(angle_rad, v ? std::atan2(std::hypot(v->x, v->y), v->z) : lens.max_angle_rad);
-    }
-  }
+void check_vignetting(Section& section,
+                      std::span<const double> vignetting,
+                      const calibrate::Lens& lens) {
   try {
-    calibrate::check_vignetting(camera.vignetting, angle_rad);
+    calibrate::check_vignetting(vignetting, lens);
   } catch (const std::invalid_argument& error) {
     section.fault("vignetting", fmt::format("cannot be used: {}", error.what()));
   }
@@ -345,7 +338,7 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
     read_own_camera(section, context, cropped, camera);
   }
   read_vignetting(section, camera.vignetting);
-  if (camera.lens.width > 0) check_vignetting(section, camera);
+  if (camera.lens.width > 0) check_vignetting(section, camera.vignetting, camera.lens);
   section.finish();
   return camera;
 }
@@ -379,6 +372,9 @@ ProbeSettings read_probe_section(Section section, const SetContext& context) {
   read_match(section, picture, probe.match);
   read_rectangle(section, "albedo_patch", picture, probe.albedo_patch);
   read_vignetting(section, probe.vignetting);
+  if (probe.lens && probe.lens->width > 0) {
+    check_vignetting(section, probe.vignetting, *probe.lens);
+  }
   read_colour(section, probe.colour);
   section.finish();
   return probe;

@@ -38,5 +38,15 @@ TEST(CheckVignetting, RefusesALensThatIsBlindBeforeItsRim) {
   EXPECT_THROW(check_vignetting(falls, 1.5), std::invalid_argument);
 }
 
+TEST(CheckVignetting, GoesToTheCornersOfThePictureOrToTheRim) {
+  const std::vector<double> falls{-0.5};
+  Lens lens{"equisolid", 101, 101, {100, 50, 50}};  // its corners are 0.72 rad off the axis
+  EXPECT_NO_THROW(check_vignetting(falls, lens));
+  lens.parameters[0] = 40;  // 2.17 rad
+  EXPECT_THROW(check_vignetting(falls, lens), std::invalid_argument);
+  lens.max_angle_rad = 1.3;
+  EXPECT_NO_THROW(check_vignetting(falls, lens));
+}
+
 }  // namespace
 }  // namespace calibrate::vignetting_test
