@@ -163,4 +163,16 @@ BoardSheet lay_out(const Board& board, const Paper& paper) {
                            advice);
 }
 
+std::string paper_with_border(const Board& board) {
+  check(board);
+  const double half_mm = board.square_m * mm / 2;
+  for (const Paper& paper : papers) {
+    const auto sheet = fit_either_way(board, paper);
+    if (sheet && border_mm(*sheet) >= half_mm - slack_mm) return paper.name;
+  }
+  const auto whole = [](double size_mm) { return std::to_string(std::lround(std::ceil(size_mm))); };
+  return whole(width_mm(board) + 2 * half_mm) + "x" +
+         whole(height_mm(board) + 2 * (half_mm + edge_mm + strip_mm));
+}
+
 }  // namespace calibrate

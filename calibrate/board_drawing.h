@@ -47,6 +47,14 @@ struct BoardSheet {
 // saying on which paper it would.
 BoardSheet lay_out(const Board& board, const Paper& paper);
 
+// The least white around the board, to the sheet's edge or to title and ruler, millimetres. Finders
+// need half a square.
+double border_mm(const BoardSheet& sheet);
+
+// The name, as paper_of() takes it, of a paper on which half a square stays white. Throws
+// std::invalid_argument if the board cannot be.
+std::string paper_with_border(const Board& board);
+
 // The sheet with a title that tells the board's numbers, and a ruler of 100 mm to check the printer
 // with (left out on papers too small for it).
 std::string svg_of(const BoardSheet& sheet);

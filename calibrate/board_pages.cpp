@@ -1,4 +1,5 @@
 // Boards as SVG and PDF.
+#include <algorithm>
 #include <array>
 #include <cstdarg>
 #include <cstdio>
@@ -67,6 +68,17 @@ std::vector<std::array<double, 4>> ruler_lines() {
 constexpr const char* ruler_text = "100 mm: measure it, printers scale";
 
 }  // namespace
+
+double border_mm(const BoardSheet& sheet) {
+  constexpr double strip_mm = margin_mm + 2 * text_mm + line_mm;
+  const double width_mm = (sheet.board.columns + 1) * sheet.board.square_m * 1000;
+  const double height_mm = (sheet.board.rows + 1) * sheet.board.square_m * 1000;
+  const double left = sheet.left_mm - (sheet.upright_strip ? strip_mm : 0);
+  const double right = sheet.paper.width_mm - sheet.left_mm - width_mm;
+  const double bottom =
+      sheet.paper.height_mm - sheet.top_mm - height_mm - (sheet.upright_strip ? 0 : strip_mm);
+  return std::min({left, right, sheet.top_mm, bottom});
+}
 
 std::string svg_of(const BoardSheet& sheet) {
   const Paper& paper = sheet.paper;

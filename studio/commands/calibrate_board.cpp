@@ -63,22 +63,29 @@ void calibrate_board(const DrawingOptions& options, Console& console) {
                                                               mm * board.marker_m, board.dictionary)
                                                 : "",
                           sheet.paper.name));
+  if (const double border = border_mm(sheet), half = mm * board.square_m / 2; border < half) {
+    console.warn(fmt::format(
+        "only {:.1f} mm of white are left around the board, but finding it needs half a square, "
+        "{:.1f} mm: draw it with --paper {}, or glue it onto something white",
+        border, half, calibrate::paper_with_border(board)));
+  }
   console.say("print it at 100 %, and measure its ruler: it must be 100 mm long");
 }
 
 }  // namespace
 
 Command calibrate_board_command() {
-  return {"calibrate board", "Draw a board to print, at its true size",
-          "platelight calibrate board --board 10x7 --square 0.025 --charuco --pdf board.pdf",
-          [](Arguments& arguments) -> std::function<void(Console&)> {
-            auto o = std::make_shared<DrawingOptions>();
-            declare(arguments, o->board);
-            arguments.option("--paper", o->paper, "A5 to A0, or millimetres: 900x600 (A4)");
-            arguments.option("-o,--out", o->out, ".pdf or .svg file");
-            arguments.option("--pdf", o->pdf, "PDF file, whatever its name");
-            return [o](Console& console) { calibrate_board(*o, console); };
-          }};
+  return {
+      "calibrate board", "Draw a board to print, at its true size",
+      "platelight calibrate board --board 10x7 --square 0.025 --charuco --paper A3 --pdf board.pdf",
+      [](Arguments& arguments) -> std::function<void(Console&)> {
+        auto o = std::make_shared<DrawingOptions>();
+        declare(arguments, o->board);
+        arguments.option("--paper", o->paper, "A5 to A0, or millimetres: 900x600 (A4)");
+        arguments.option("-o,--out", o->out, ".pdf or .svg file");
+        arguments.option("--pdf", o->pdf, "PDF file, whatever its name");
+        return [o](Console& console) { calibrate_board(*o, console); };
+      }};
 }
 
 }  // namespace studio

@@ -114,6 +114,21 @@ TEST(LayOut, SaysWhichPaperABoardNeeds) {
   }
 }
 
+TEST(BorderMm, IsTheLeastWhiteToTheEdgeOrTheText) {
+  EXPECT_NEAR(border_mm(lay_out(chessboard, paper_of("A4"))), 4.8, 1e-9);
+  EXPECT_NEAR(border_mm(lay_out(chessboard, paper_of("A3"))), 42.3, 1e-9);
+}
+
+TEST(PaperWithBorder, LeavesHalfASquare) {
+  EXPECT_EQ(paper_with_border(chessboard), "A3");
+  for (const double square_m : {.01, .02, .025, .04, .1, .2}) {
+    Board board = chessboard;
+    board.square_m = square_m;
+    const BoardSheet sheet = lay_out(board, paper_of(paper_with_border(board)));
+    EXPECT_GE(border_mm(sheet), 500 * square_m - 1e-6) << square_m;
+  }
+}
+
 TEST(PaperOf, KnowsMillimetres) {
   EXPECT_EQ(paper_of("900x600.5").height_mm, 600.5);
   for (const char* name : {"A7", "a4", "900x", "x600", "900x600mm", "-1x5", "0x5", "nanx5", ""}) {

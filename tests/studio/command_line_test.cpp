@@ -380,7 +380,10 @@ TEST_F(CommandLine, DrawsABoard) {
   EXPECT_EQ(figures["columns"], 10);
   EXPECT_EQ(figures["paper_mm"][0], 297);
   const std::string svg = (dir_ / "board.svg").string();
-  EXPECT_EQ(run(board + "--paper 400x300 -o " + svg).status, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("--paper A3"));
+  const Outcome wide = run(board + "--paper 400x300 -o " + svg);
+  EXPECT_EQ(wide.status, 0);
+  EXPECT_EQ(wide.err, "");
   EXPECT_THAT(content_of(svg), HasSubstr("width=\"400mm\""));
 
   const Outcome large = run("calibrate board --board 10x7 --square 0.04 -o " + out);
