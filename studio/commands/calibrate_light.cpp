@@ -22,6 +22,7 @@
 #include "studio/json_text.h"
 #include "studio/light_pairs.h"
 #include "studio/section.h"
+#include "studio/set_sections.h"
 
 namespace studio {
 namespace {
@@ -41,12 +42,13 @@ struct LightOptions {
 
 // A grey card, or a patch of a chart, in the plate.
 struct PaintedPatch {
+  std::string where;  // it is described: file and line
   render::Patch place;
   std::array<float, 3> albedo{};
   calibrate::Vec3 normal{0, 0, 1};
 };
 
-std::vector<PaintedPatch> read_patches(const std::string& path) {
+std::vector<PaintedPatch> read_patches(const std::string& path, std::array<int, 2> picture) {
   Faults faults(path);
   TomlValue file;
   try {
@@ -60,10 +62,11 @@ std::vector<PaintedPatch> read_patches(const std::string& path) {
   std::vector<PaintedPatch> patches;
   for (Section& table : root.tables("patch")) {
     PaintedPatch patch;
-    std::array<int, 4> pixels{0, 0, 1, 1};
+    patch.where = fmt::format("{}:{}", path, table.place_of("pixels").line);
+    std::optional<std::array<int, 4>> pixels;
     table.need("pixels", "[x, y, width, height] in the plate");
-    table.integers("pixels", pixels, 0, 65535);
-    patch.place = {pixels[0], pixels[1], std::max(1, pixels[2]), std::max(1, pixels[3])};
+    read_rectangle(table, "pixels", picture, pixels);
+    if (pixels) patch.place = {(*pixels)[0], (*pixels)[1], (*pixels)[2], (*pixels)[3]};
     table.need("albedo", "what it reflects, 0 to 1, one number or three");
     table.colour("albedo", patch.albedo, {1e-3, 1});
     if (table.vector("normal", patch.normal) && !(length(patch.normal) > 0)) {
@@ -125,6 +128,18 @@ void add_overlap(const PreparedFrame& prepared,
   std::ranges::copy(light_pairs_of(overlap, frame), std::back_inserter(pairs));
 }
 
+// Of which no frame tells anything.
+std::vector<std::string> untold_patches(const std::vector<PaintedPatch>& patches,
+                                        std::span<const calibrate::LightPair> pairs) {
+  std::vector<std::string> untold;
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    if (std::ranges::find(pairs, p, &calibrate::LightPair::thing) != pairs.end()) continue;
+    untold.push_back(patches[p].where +
+                     ": this patch is left out: it is clipped, dark or unlit in every frame");
+  }
+  return untold;
+}
+
 // What the frames tell.
 struct Collected {
   std::vector<calibrate::LightPair> pairs;
@@ -170,6 +185,12 @@ calibrate::LightGain fit(Set set,
       set.probe->match.gain[c] = static_cast<float>(before[c]);
     }
     collected = collect(set, patches, frames);
+    if (!patches.empty() && collected.pairs.empty()) {
+      throw std::runtime_error(fmt::format(
+          "{}: none of {} patches tells anything: all are clipped, dark or unlit in every frame; "
+          "name others of the plate",
+          patches.front().where, patches.size()));
+    }
     found = calibrate::fit_light_gain(collected.pairs);
     for (std::size_t c = 0; c < 3; ++c) found.gain[c] *= before[c];
     for (std::size_t i = 0; found.matrix && i < 9; ++i) (*found.matrix)[i] *= before[i % 3];
@@ -221,7 +242,9 @@ void calibrate_light(const LightOptions& options, Console& console) {
   set.stand_ins.clear();
   set.lamps.clear();
   const auto patches =
-      options.patches.empty() ? std::vector<PaintedPatch>{} : read_patches(options.patches);
+      options.patches.empty()
+          ? std::vector<PaintedPatch>{}
+          : read_patches(options.patches, std::array{set.show.width, set.show.height});
   Collected collected;
   calibrate::LightGain found;
   try {
@@ -229,6 +252,8 @@ void calibrate_light(const LightOptions& options, Console& console) {
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", set.path, error.what()));
   }
+  const std::vector<std::string> untold = untold_patches(patches, collected.pairs);
+  found.warnings.insert(found.warnings.begin(), untold.begin(), untold.end());
   const std::size_t pairs = collected.pairs.size();
   const std::string match = match_line(found, collected.exposure_s);
   Json figures{

@@ -499,6 +499,37 @@ TEST_F(CalibrateLight, FindsTheGainFromAGreyCard) {
   const Outcome out = run("calibrate light " + path("set.toml") + " --patches " + outside);
   EXPECT_EQ(out.status, 1);
   expect_one_line(out.err);
+  EXPECT_THAT(out.err, HasSubstr("outside.toml:2:"));
+  EXPECT_THAT(out.err, HasSubstr("reaches beyond the picture of 320x240"));
+  const std::string flat = write("flat.toml", "[[patch]]\npixels = [4, 3, 0, 12]\nalbedo = 0.4\n");
+  EXPECT_THAT(run("calibrate light " + path("set.toml") + " --patches " + flat).err,
+              HasSubstr("flat.toml:2:"));
+}
+
+TEST_F(CalibrateLight, NamesPatchesThatTellNothing) {
+  capture::Image plate = capture::read_exr(path("plate.exr"));
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 40; x < 60; ++x) {
+      for (int c = 0; c < 3; ++c) plate.at(y, x, c) = 1;
+    }
+  }
+  capture::write_exr(path("plate.exr"), plate);
+  const std::string clipped = "[[patch]]\npixels = [42, 3, 10, 10]\nalbedo = 0.4\n";
+  const std::string both =
+      write("both.toml", clipped + "[[patch]]\npixels = [4, 3, 20, 12]\nalbedo = 0.4\n");
+  const Outcome outcome =
+      run_with_figures("calibrate light " + path("set.toml") + " --patches " + both);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("both.toml:2: this patch is left out"));
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("both.toml:5:")));
+  EXPECT_EQ(figures()["pairs"], 1);
+  expect_gain();
+
+  const Outcome none =
+      run("calibrate light " + path("set.toml") + " --patches " + write("clipped.toml", clipped));
+  EXPECT_EQ(none.status, 1);
+  expect_one_line(none.err);
+  EXPECT_THAT(none.err, HasSubstr("clipped.toml:2: none of 1 patches tells anything"));
 }
 
 }  // namespace
