@@ -18,6 +18,7 @@ namespace calibrate {
 namespace {
 
 constexpr std::size_t fewest_frames = 20;
+constexpr std::size_t enough_jumps = 10;
 constexpr double least_correlation = 0.4;
 // Correlation elsewhere, in parts of the best, at which the signals repeat themselves.
 constexpr double repeats_itself = 0.9;
@@ -214,8 +215,7 @@ void refine_by_edges(std::span<const SignalSample> a,
   const auto found = offset_of_edges(find_edges(a), find_edges(b), result.offset_s, reach_s);
   // Exposures other than told, or other changes, would show.
   constexpr double enough_agree = 0.85;
-  constexpr std::size_t enough_pairs = 10;
-  if (!found || found->agreeing < enough_agree || found->pairs < enough_pairs) return;
+  if (!found || found->agreeing < enough_agree || found->pairs < enough_jumps) return;
   result.offset_s = found->offset_s;
   result.sigma_s = found->sigma_s;
   result.edges = found->pairs;
@@ -224,6 +224,38 @@ void refine_by_edges(std::span<const SignalSample> a,
 double overlap_s(const auto& a, const auto& b, double offset_s) {
   return std::min(a.back().time_s, b.back().time_s - offset_s) -
          std::max(a.front().time_s, b.front().time_s - offset_s);
+}
+
+// Frames of the camera that has fewer of them while both saw.
+std::size_t frames_in_common(const auto& a, const auto& b, double offset_s) {
+  const double begin_s = std::max(a.front().time_s, b.front().time_s - offset_s);
+  const double end_s = begin_s + overlap_s(a, b, offset_s);
+  const auto within = [&](const auto& signal, double later_s) {
+    return static_cast<std::size_t>(std::ranges::count_if(signal, [&](const auto& sample) {
+      constexpr double slack_s = 1e-9;
+      const double time_s = sample.time_s - later_s;
+      return time_s > begin_s - slack_s && time_s < end_s + slack_s;
+    }));
+  };
+  return std::min(within(a, 0), within(b, offset_s));
+}
+
+void check_frames_in_common(const auto& a, const auto& b, double offset_s) {
+  const std::size_t common = frames_in_common(a, b, offset_s);
+  if (common >= fewest_frames) return;
+  refuse("the cameras have only " + std::to_string(common) + " frames in common: record " +
+         std::to_string(fewest_frames) + " or more at one time, best ten seconds");
+}
+
+// The likelihood of a few jumps is far too sure of itself: a jump's moment may be anywhere between
+// two frames.
+void doubt_few_jumps(std::span<const SignalSample> a,
+                     std::span<const SignalSample> b,
+                     double interval_s,
+                     TimeOffset& result) {
+  const std::size_t jumps = std::min(find_edges(a).size(), find_edges(b).size());
+  if (jumps < 2 || jumps >= enough_jumps) return;
+  result.sigma_s = std::max(result.sigma_s, interval_s / std::sqrt(6 * static_cast<double>(jumps)));
 }
 
 }  // namespace
@@ -239,6 +271,7 @@ TimeOffset find_time_offset(std::span<const SignalSample> a,
   const std::vector<SignalMatch> matches = match_signals(one, other, options.largest_s);
   check(matches);
   const SignalMatch& coarse = matches.front();
+  check_frames_in_common(one, other, coarse.offset_s);
 
   TimeOffset result;
   result.offset_s = coarse.offset_s;
@@ -254,6 +287,7 @@ TimeOffset find_time_offset(std::span<const SignalSample> a,
   if (!tells_exposures(one) || !tells_exposures(other)) {
     doubt_guess(one, other, coarse.gain_b, result);
   }
+  doubt_few_jumps(one, other, signals.interval_s(), result);
   if (!(result.sigma_s < signals.interval_s())) {
     refuse(only_to("change", result.sigma_s) +
            ": switch one lamp before both, often and at random, so that nothing else changes as "
@@ -281,6 +315,7 @@ TimeOffset find_time_offset(std::span<const SeenPoint> a,
            std::to_string(offsets.empty() ? 0 : offsets[0].correlation).substr(0, 5) +
            " at best): move one thing before both for longer, or look for larger offsets");
   }
+  check_frames_in_common(a, b, offsets[0].offset_s);
   TimeOffset result;
   result.offset_s = offsets[0].offset_s;
   result.correlation = offsets[0].correlation;

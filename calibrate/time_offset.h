@@ -44,8 +44,9 @@ struct TimeOffset {
 // camera does not tell its exposures, the offset is sought also with none and with whole frames'
 // time instead of half of it: sigma_s is the largest of these, and, in quadrature, by how far the
 // offset moves. Where both saw a lamp switched, and told their exposures, the moments of its
-// switching take over (signal_edges.h). Correlation of the signals, interpolated, finds the way
-// there.
+// switching take over (signal_edges.h), if they are ten or more; sigma_s is no less than a frame's
+// time over the root of six times their number if they are fewer. Correlation of the signals,
+// interpolated, finds the way there.
 //
 // Times rise strictly. Throws std::invalid_argument for values that are not finite, or times that
 // do not rise; std::runtime_error, saying what to do, if there are fewer than 20 frames in common,

@@ -342,6 +342,37 @@ TEST(FindTimeOffset, RefusesMotionsThatAreNotOneOrRepeatThemselves) {
               HasSubstr("do not show the same motion"));
 }
 
+TEST(FindTimeOffset, DoubtsALampThatIsSwitchedAFewTimes) {
+  for (unsigned seed = 0; seed < 8; ++seed) {
+    made::Random random(seed);
+    std::vector<double> switched;
+    for (int i = 0; i < 6; ++i) switched.push_back(0.5 + 14 * (i + random.uniform(0.15, 0.85)) / 6);
+    const auto lamp = [&](double t) {
+      double on_s = 0;
+      for (std::size_t k = 0; k < switched.size(); k += 2) {
+        on_s += std::clamp(t, switched[k], switched[k + 1]) - switched[k];
+      }
+      return on_s;
+    };
+    const auto a = record(lamp, {random.uniform(0, frame_s), 0}, 15, 0.003, random);
+    const auto b = record(lamp, {random.uniform(0, frame_s), 0.0137}, 15, 0.003, random);
+    try {
+      const TimeOffset found = find_time_offset(a, b, {.largest_s = 2});
+      EXPECT_GE(found.sigma_s, frame_s / 6 - 1e-9) << seed;
+      EXPECT_LT(std::abs(found.offset_s - 0.0137), 4 * found.sigma_s) << seed;
+    } catch (const std::runtime_error&) {  // as well
+    }
+  }
+}
+
+TEST(FindTimeOffset, RefusesWhatHasFewFramesInCommon) {
+  made::Random random(2);
+  const auto lamp = random_lamp(0.15, random);
+  const auto a = record(lamp, {0, 0}, 1, 0.002, random);
+  const auto b = record(lamp, {0.4, 0}, 1, 0.002, random);  // 15 of 25 frames
+  EXPECT_NE(refusal(a, b, {.largest_s = 0.1}), "accepted");
+}
+
 TEST(FindTimeOffset, RefusesALampThatFlashesRegularly) {
   made::Random random(7);
   const auto regular = [](double t) {
