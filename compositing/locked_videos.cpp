@@ -32,9 +32,7 @@ LockedVideos::LockedVideos(const VideoSettings& first, const VideoSettings& seco
     : pictures_between_(std::max<std::int64_t>(
           1, std::llround(checked(first, second).rate.value() / checkpoints_a_second))),
       first_(first),
-      second_(second) {
-  checkpoint();
-}
+      second_(second) {}
 
 void LockedVideos::checkpoint() {
   first_.checkpoint();
@@ -45,7 +43,7 @@ void LockedVideos::write_pictures(std::int64_t index,
                                   std::span<const std::uint8_t> first,
                                   std::span<const std::uint8_t> second) {
   // Before the picture, so that sound which came with those before it is in.
-  if (index - checkpoint_ >= pictures_between_) {
+  if (!checkpoint_ || index - *checkpoint_ >= pictures_between_) {
     checkpoint();
     checkpoint_ = index;
   }
@@ -60,6 +58,7 @@ void LockedVideos::write_sound(std::int64_t first, std::span<const float> sample
 }
 
 void LockedVideos::close() {
+  if (!checkpoint_) return;
   checkpoint();
   // All pictures are in both before either is finished: what fails until then is cut back in both.
   first_.drain();

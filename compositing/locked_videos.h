@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "compositing/video_writer.h"
@@ -23,8 +24,8 @@ class LockedVideos {
                       std::span<const std::uint8_t> second);
   void write_sound(std::int64_t first, std::span<const float> samples);
 
-  // Finishes both. Throws std::runtime_error like VideoWriter::close, once both are whole if it is
-  // an index that cannot be written.
+  // Finishes both, if they have pictures. Throws std::runtime_error like VideoWriter::close, once
+  // both are whole if it is an index that cannot be written.
   void close();
 
   // After a failure, here or elsewhere: finishes both with the same pictures, as many as are whole
@@ -34,9 +35,9 @@ class LockedVideos {
  private:
   void checkpoint();
 
-  std::int64_t pictures_between_;  // from checkpoint to checkpoint
-  std::int64_t checkpoint_ = 0;    // picture of the last one
-  bool broken_ = false;            // one may have a picture that the other has not
+  std::int64_t pictures_between_;           // from checkpoint to checkpoint
+  std::optional<std::int64_t> checkpoint_;  // picture of the last one
+  bool broken_ = false;                     // one may have a picture that the other has not
   VideoWriter first_;
   VideoWriter second_;
 };

@@ -2,6 +2,7 @@
 #include "compositing/output_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -25,13 +26,35 @@ namespace {
 constexpr int buffer_size = 1 << 16;
 constexpr std::size_t marks_kept = 8;
 
-int open_to_write(const std::string& path, int how) {
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | how, 0666);
-  if (descriptor < 0) {
-    throw std::runtime_error(path +
-                             ": cannot be written: " + std::generic_category().message(errno));
+struct Opened {
+  int descriptor = -1;
+  bool made = false;  // it was not there
+};
+
+// As it is, and locked until it is closed: two who write to one file destroy it for each other.
+// Whoever removes it holds the lock.
+Opened open_to_write(const std::string& path) {
+  constexpr int how = O_WRONLY | O_CREAT | O_CLOEXEC;
+  while (true) {
+    int descriptor = ::open(path.c_str(), how | O_EXCL, 0666);
+    const bool made = descriptor >= 0;
+    if (!made && errno == EEXIST) descriptor = ::open(path.c_str(), how, 0666);
+    if (descriptor < 0) {
+      throw std::runtime_error(path +
+                               ": cannot be written: " + std::generic_category().message(errno));
+    }
+    struct stat found {};
+    if (::fstat(descriptor, &found) != 0 || !S_ISREG(found.st_mode)) return {descriptor, made};
+    // Any other failure is a file system that has no locks.
+    if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+      ::close(descriptor);
+      throw std::runtime_error(path +
+                               ": is being written by another program: name another file, or wait "
+                               "until that one has ended");
+    }
+    if (::fstat(descriptor, &found) != 0 || found.st_nlink > 0) return {descriptor, made};
+    ::close(descriptor);  // who asked whether it could be written has removed it meanwhile
   }
-  return descriptor;
 }
 
 }  // namespace
@@ -48,10 +71,9 @@ bool is_one_file(const std::string& a, const std::string& b) {
 }
 
 void require_writable(const std::string& path) {
-  struct stat found;
-  const bool there = ::lstat(path.c_str(), &found) == 0;
-  ::close(open_to_write(path, 0));
-  if (!there) ::unlink(path.c_str());
+  const Opened opened = open_to_write(path);
+  if (opened.made) ::unlink(path.c_str());
+  ::close(opened.descriptor);
 }
 
 void require_writable_folder(const std::string& path) {
@@ -71,7 +93,10 @@ void require_writable_folder(const std::string& path) {
   }
 }
 
-OutputFile::OutputFile(const std::string& path) : descriptor_(open_to_write(path, O_TRUNC)) {
+OutputFile::OutputFile(const std::string& path) : path_(path) {
+  const Opened opened = open_to_write(path);
+  descriptor_ = opened.descriptor;
+  made_ = opened.made;
   auto* const buffer = static_cast<unsigned char*>(av_malloc(buffer_size));
   if (buffer != nullptr) {
     context_ = avio_alloc_context(buffer, buffer_size, 1, this, nullptr, &OutputFile::write,
@@ -79,7 +104,7 @@ OutputFile::OutputFile(const std::string& path) : descriptor_(open_to_write(path
   }
   if (context_ == nullptr) {
     av_free(buffer);
-    ::close(descriptor_);
+    leave();
     throw std::bad_alloc();
   }
 }
@@ -87,12 +112,24 @@ OutputFile::OutputFile(const std::string& path) : descriptor_(open_to_write(path
 OutputFile::~OutputFile() {
   av_freep(&context_->buffer);
   avio_context_free(&context_);
+  leave();
+}
+
+void OutputFile::leave() noexcept {
+  if (made_ && !begun_) ::unlink(path_.c_str());
   ::close(descriptor_);
 }
 
+// EINVAL is a device or pipe, of which nothing can be cut.
+bool OutputFile::begin() noexcept {
+  if (!begun_) begun_ = ::ftruncate(descriptor_, 0) == 0 || errno == EINVAL;
+  return begun_;
+}
+
 int OutputFile::write(void* file, std::uint8_t* data, int size) {
-  const auto* const self = static_cast<OutputFile*>(file);
+  auto* const self = static_cast<OutputFile*>(file);
   if (self->discarding_) return size;
+  if (!self->begin()) return AVERROR(errno);
   const int descriptor = self->descriptor_;
   for (int done = 0; done < size;) {
     const ssize_t count = ::write(descriptor, data + done, static_cast<std::size_t>(size - done));

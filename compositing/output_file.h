@@ -12,8 +12,9 @@ namespace compositing {
 // Whether two paths name one file, there or yet to be written, links followed.
 bool is_one_file(const std::string& a, const std::string& b);
 
-// Whether a file could be written here. What is there stays as it is, and what is not is not left
-// there. Throws std::runtime_error with path and reason if it could not.
+// Whether a file could be written here, and nobody else writes it now. What is there stays as it
+// is, and what is not is not left there. Throws std::runtime_error with path and reason if it could
+// not.
 void require_writable(const std::string& path);
 
 // Whether a folder is there that can be written to, or can be made. Makes nothing. Throws as
@@ -22,7 +23,9 @@ void require_writable_folder(const std::string& path);
 
 class OutputFile {
  public:
-  // Creates or replaces the file. Throws std::runtime_error with path and reason.
+  // Creates or replaces the file, and keeps others of its kind, of any program, from it. What was
+  // there is lost by the first bytes that are written; without any, nothing new is left there.
+  // Throws std::runtime_error with path and reason.
   explicit OutputFile(const std::string& path);
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -49,10 +52,15 @@ class OutputFile {
 
  private:
   static int write(void* file, std::uint8_t* data, int size);
+  bool begin() noexcept;
+  void leave() noexcept;
   bool has_room(std::int64_t place, std::int64_t room) noexcept;
   static std::int64_t seek(void* file, std::int64_t offset, int whence);
 
+  std::string path_;
   int descriptor_ = -1;
+  bool made_ = false;   // it was not there
+  bool begun_ = false;  // what was there is gone
   AVIOContext* context_ = nullptr;
   std::vector<std::int64_t> marks_;
   bool discarding_ = false;

@@ -36,8 +36,8 @@ void validate(const VideoSettings& settings);
 // that a file whose writer was killed plays up to about its last half second.
 class VideoWriter {
  public:
-  // Opens the file. Throws like validate; std::runtime_error with path and reason if it cannot be
-  // written.
+  // Opens the file, in which what was there stays until the first picture. Throws like validate;
+  // std::runtime_error with path and reason if it cannot be written, or another program writes it.
   explicit VideoWriter(const VideoSettings& settings);
   VideoWriter(VideoWriter&&) noexcept;
   VideoWriter& operator=(VideoWriter&&) noexcept;
@@ -60,7 +60,7 @@ class VideoWriter {
   // Writes all that is held back: no pictures or sound may follow. Throws like write_picture.
   void drain();
 
-  // Finishes the file. Throws std::runtime_error like write_picture.
+  // Finishes the file, if there is anything in it. Throws std::runtime_error like write_picture.
   void close();
 
   // After a failure: keeps what was written whole, gives up the rest, and finishes the file.

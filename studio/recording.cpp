@@ -52,10 +52,10 @@ void Recording::check(const RecordSettings& settings) const {
 
 void Recording::start(const RecordSettings& settings) {
   const compositing::RecorderSettings recorder = settings_of(settings);
-  compositing::check(recorder);  // else the take that runs goes on
   for (const std::string* written : {&settings.file, &settings.fill, &settings.key}) {
     if (recorder_) spare_take(settings_, *written);
   }
+  compositing::check(recorder);  // else the take that runs goes on
   stop();
   recorder_ = std::make_unique<compositing::Recorder>(recorder);
   settings_ = settings;
@@ -74,10 +74,14 @@ void Recording::record(const ShownFrame& shown, bool wait) {
   compositing::RecordedFrame frame;
   frame.number = shown.prepared.job.frame;
   frame.time = shown.prepared.job.time;
-  frame.rgba = {shown.result, &shown.result->rgba};
-  frame.matte = {shown.result, &shown.result->matte};
-  frame.display_rgb8 = shown.rgb8;
-  frame.plate = shown.prepared.plate;
+  // What waits is kept: only what is written.
+  const bool has_pair = !settings_.fill.empty();
+  if (has_pair || !settings_.exr.empty()) {
+    frame.rgba = {shown.result, &shown.result->rgba};
+    frame.matte = {shown.result, &shown.result->matte};
+  }
+  if (has_pair) frame.plate = shown.prepared.plate;
+  if (has_pair || !settings_.file.empty()) frame.display_rgb8 = shown.rgb8;
   frame.tone = compositing::curve_of(shown.prepared.job.tone);
   frame.sound = joined(shown.prepared.sound);
   recorder_->push(std::move(frame));

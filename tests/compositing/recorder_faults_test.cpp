@@ -9,6 +9,8 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <memory>
 #include <stdexcept>
 #include <thread>
 
@@ -177,6 +179,55 @@ TEST_F(RecorderFaultsTest, KeepsATakeThatIsThereWhereAnotherFileCannotBeWritten)
   std::ifstream in(take);
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "a take of before");
   EXPECT_FALSE(fs::exists(fill)) << "nothing is begun";
+}
+
+TEST_F(RecorderFaultsTest, RefusesAFileThatAnotherRecorderWrites) {
+  const std::string take = path("take.mkv");
+  const RecorderSettings settings = small_take(take);
+  {
+    Recorder first(settings);
+    for (int n = 0; n < 5; ++n) EXPECT_TRUE(first.push(picture(n, textured(64, 48, n))));
+    for (const auto& second : {std::function<void()>([&] { check(settings); }),
+                               std::function<void()>([&] { Recorder recorder(settings); })}) {
+      try {
+        second();
+        ADD_FAILURE() << "two takes in one file";
+      } catch (const std::runtime_error& error) {
+        EXPECT_NE(std::string(error.what()).find(take + ": is being written by another program"),
+                  std::string::npos)
+            << error.what();
+      }
+    }
+    first.close();
+    EXPECT_EQ(first.status().error, "");
+  }
+  EXPECT_EQ(picture_times_s(take).size(), 5U);
+  EXPECT_EQ(record(settings, {picture(0, textured(64, 48, 0))}).error, "");
+  EXPECT_EQ(picture_times_s(take).size(), 1U) << "an earlier take is replaced";
+}
+
+TEST_F(RecorderFaultsTest, KeepsATakeThatIsThereUntilTheFirstPicture) {
+  const auto content = [](const std::string& file) {
+    std::ifstream in(file);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  RecorderSettings settings = small_take(path("take.mkv"));
+  settings.display = std::make_shared<const Display>(DisplaySettings{});
+  settings.fill_file = path("fill.mkv");
+  settings.key_file = path("key.mkv");
+  const std::array there{settings.file, settings.fill_file};
+  for (const std::string& file : there) std::ofstream(file) << "a take of before";
+  EXPECT_EQ(record(settings, {}).error, "");
+  for (const std::string& file : there) EXPECT_EQ(content(file), "a take of before") << file;
+  EXPECT_FALSE(fs::exists(settings.key_file)) << "nothing was begun";
+  RecordedFrame frame = half_picture(0, 64, 48);
+  frame.display_rgb8 = flat(64, 48, 100);
+  frame.plate = std::make_shared<capture::HalfImage>(
+      capture::HalfImage{48, 64, std::vector<capture::Half>(48 * 64 * 3), 3});
+  EXPECT_EQ(record(settings, {frame}).error, "");
+  for (const std::string& file : {settings.file, settings.fill_file, settings.key_file}) {
+    EXPECT_EQ(picture_times_s(file).size(), 1U) << file;
+  }
 }
 
 TEST_F(RecorderFaultsTest, RefusesHostileSettings) {
