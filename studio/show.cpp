@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <filesystem>
 #include <future>
 #include <mutex>
 #include <thread>
@@ -433,7 +434,16 @@ class Show::Stages {
   void start_recording(const RecordSettings& record) {
     const std::int64_t before =
         record.exr.empty() ? 0 : compositing::ExrSequence::frames_in(record.exr);
+    std::vector<std::string> replaced;
+    for (const std::string& file : {record.file, record.fill, record.key}) {
+      std::error_code none;  // where nothing is there
+      const auto size = std::filesystem::file_size(file, none);
+      if (!none && size > 0) replaced.push_back(file);
+    }
     recording_.start(record);
+    for (const std::string& file : replaced) {
+      note(file + " was there already: it is replaced from the first frame on");
+    }
     if (before == 0) return;
     note(record.exr + " has " + std::to_string(before) +
          " frames already: those with numbers that are not recorded now stay among them");

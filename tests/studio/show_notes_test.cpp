@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "studio/figures.h"
+#include "studio/recording.h"
 #include "studio/show.h"
 #include "tests/capture/made_light_camera.h"
 #include "tests/studio/made_show.h"
@@ -23,6 +25,7 @@ namespace {
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 using ShowNotes = MadeShowTest;
 
@@ -92,6 +95,21 @@ TEST_F(ShowNotes, RecordsNoTakeOverTheOneThatRuns) {
   });
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("take.mkv is what is recorded to")));
   EXPECT_EQ(show.status()->recorder.written, 8);
+}
+
+TEST_F(ShowNotes, NotesThatAnEarlierTakeIsReplaced) {
+  ShowOptions options;
+  options.frames = 2;
+  RecordSettings take;
+  take.fill = (dir_ / "fill.mkv").string();
+  take.key = (dir_ / "key.mkv").string();
+  std::ofstream(take.key) << "a take of before";
+  Show show(made_set("grey:1,25,0"), options);
+  show.post(StartRecording{take});
+  show.run();
+  EXPECT_THAT(show.status()->notes, Contains(HasSubstr(take.key + " was there already")));
+  EXPECT_THAT(show.status()->notes, Not(Contains(HasSubstr(take.fill))));
+  EXPECT_EQ(show.status()->recorder.written, 2);
 }
 
 // What is told of every frame does not hide what is told once.
