@@ -112,6 +112,30 @@ TEST_F(ShowNotes, NotesThatAnEarlierTakeIsReplaced) {
   EXPECT_EQ(show.status()->recorder.written, 2);
 }
 
+// A disk that stalls must not fill the memory with what is not recorded.
+TEST_F(ShowNotes, KeepNoPicturesThatATakeDoesNotWrite) {
+  RecordingForm form;
+  form.width = 320;
+  form.height = 240;
+  form.rate = {25, 1};
+  Recording recording(form);
+  RecordSettings take;
+  take.file = (dir_ / "take.mkv").string();
+  recording.start(take);
+  ShownFrame shown;
+  shown.result = std::make_shared<const render::FrameResult>();
+  shown.prepared.plate = std::make_shared<const capture::HalfImage>();
+  shown.rgb8 = std::make_shared<const std::vector<std::uint8_t>>(320 * 240 * 3, std::uint8_t{90});
+  for (int n = 0; n < 20; ++n) {
+    shown.prepared.job.frame = n;
+    recording.record(shown, true);
+    EXPECT_EQ(shown.result.use_count(), 1) << n;
+    EXPECT_EQ(shown.prepared.plate.use_count(), 1) << n;
+  }
+  recording.stop();
+  EXPECT_EQ(recording.status().written, 20);
+}
+
 // What is told of every frame does not hide what is told once.
 TEST_F(ShowNotes, KeepsNotesOfEveryKind) {
   Show show(
