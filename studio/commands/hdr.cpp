@@ -16,6 +16,7 @@
 #include "studio/commands/commands.h"
 #include "studio/commands/exposure_list.h"
 #include "studio/json_text.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -67,8 +68,21 @@ void save_response(const HdrCommandOptions& options, const capture::HdrResult& r
   }
 }
 
+// Throws if anything that is to be written is what is read.
+void spare_shots(const HdrCommandOptions& options, const Console& console) {
+  std::vector<ReadFile> files;
+  for (const std::string& shot : options.shots) files.push_back({"one of the shots", shot});
+  if (options.response.ends_with(".rsp") || options.response.ends_with(".toml")) {
+    files.push_back({"the response that the shots are read by", options.response});
+  }
+  for (const std::string& written : {options.out, options.response_out, console.figures_file()}) {
+    spare_files(files, written);
+  }
+}
+
 void hdr(const HdrCommandOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) throw UsageError("-o must name an .exr file");
+  spare_shots(options, console);
   const capture::HdrResult result =
       capture::make_hdr(options.shots, {stated_exposures(options), options.response});
   if (!options.response_out.empty()) save_response(options, result);

@@ -363,3 +363,10 @@ TEST_F(Runs, ConvertAnHdrPicture) {
 
 }  // namespace
 }  // namespace studio::command_line_runs_test
+  const std::string before = content_of(out);
+  for (const std::string& lossy : {" -o " + out, " -o " + json + ".exr --json " + out}) {
+    const Outcome refused = run("hdr " + out + lossy);
+    EXPECT_EQ(refused.status, 1) << lossy;
+    EXPECT_THAT(refused.err, HasSubstr("would be lost")) << lossy;
+  }
+  EXPECT_EQ(content_of(out), before);
