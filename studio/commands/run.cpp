@@ -45,6 +45,12 @@ struct RunOptions {
 std::string absolute(const std::string& path) { return std::filesystem::absolute(path).string(); }
 
 void apply_options(const RunOptions& options, Set& set) {
+  if (!(options.record + options.exr + options.fill).empty()) {
+    for (std::string* place :
+         {&set.record.file, &set.record.exr, &set.record.fill, &set.record.key}) {
+      place->clear();
+    }
+  }
   if (!options.record.empty()) set.record.file = absolute(options.record);
   if (!options.exr.empty()) set.record.exr = absolute(options.exr);
   if (!options.fill.empty()) {
@@ -276,45 +282,47 @@ void run(const RunOptions& options, Console& console) {
 }  // namespace
 
 Command run_command() {
-  return {"run", "Put a set on air, and record it",
-          "platelight run studio/sets/real_car.toml --frames 50 --record take.mkv --json run.json",
-          [](Arguments& arguments) -> std::function<void(Console&)> {
-            auto o = std::make_shared<RunOptions>();
-            arguments.positional("SET", o->set, "set file");
-            arguments.flag("--live", o->live, "keep to the clock: leave late frames out");
-            arguments.option("--frames", o->frames, 1, 100'000'000, "show so many frames");
-            arguments.option("--record", o->record, "record video to this .mkv file");
-            arguments.option("--exr", o->exr, "record EXR frames to this directory");
-            arguments.option("--fill", o->fill,
-                             "record what an external keyer adds to the plate to this .mkv file; "
-                             "with --key");
-            arguments.option("--key", o->key,
-                             "record what of the plate it hides to this .mkv file");
-            arguments.flag("--watch", o->watch, "take the set file over whenever it changes");
-            arguments.option("--check-error", o->check_error, 2, 1 << 20,
-                             "render the reference of the last frame with so many samples and "
-                             "report the error");
-            arguments.option("--fps", o->fps, 0.01, 1000,
-                             "the most accurate effort that holds so many frames per second here, "
-                             "by the chart of this set");
-            arguments.option("--error", o->error, 0, 1,
-                             "the fastest effort within this error (.01 = 1 %), by the chart of "
-                             "this set");
-            arguments.choice("--view", o->view, render::ray_view_names(),
-                             "show what pixels take, in false colours, in place of the picture; "
-                             "what is recorded stays");
-            arguments.option("--view-png", o->view_png, "write the last frame's view to this file");
-            return [o](Console& console) {
-              if (!o->view_png.empty() && o->view.empty()) {
-                throw UsageError("--view-png: which --view?");
-              }
-              if (o->fill.empty() != o->key.empty()) {
-                throw UsageError("--fill and --key: only both make a pair");
-              }
-              if (o->fps && o->error) throw UsageError("--fps and --error: only one can be held");
-              run(*o, console);
-            };
-          }};
+  return {
+      "run", "Put a set on air, and record it",
+      "platelight run studio/sets/real_car.toml --frames 50 --record take.mkv --json run.json",
+      [](Arguments& arguments) -> std::function<void(Console&)> {
+        auto o = std::make_shared<RunOptions>();
+        arguments.positional("SET", o->set, "set file");
+        arguments.flag("--live", o->live, "keep to the clock: leave late frames out");
+        arguments.option("--frames", o->frames, 1, 100'000'000, "show so many frames");
+        arguments.option("--record", o->record,
+                         "record video to this .mkv file, which is replaced; the set's [record] "
+                         "then names no other");
+        arguments.option("--exr", o->exr, "record EXR frames to this directory");
+        arguments.option("--fill", o->fill,
+                         "record what an external keyer adds to the plate to this .mkv file; "
+                         "with --key");
+        arguments.option("--key", o->key, "record what of the plate it hides to this .mkv file");
+        arguments.flag("--watch", o->watch, "take the set file over whenever it changes");
+        arguments.option("--check-error", o->check_error, 2, 1 << 20,
+                         "render the reference of the last frame with so many samples and "
+                         "report the error");
+        arguments.option("--fps", o->fps, 0.01, 1000,
+                         "the most accurate effort that holds so many frames per second here, "
+                         "by the chart of this set");
+        arguments.option("--error", o->error, 0, 1,
+                         "the fastest effort within this error (.01 = 1 %), by the chart of "
+                         "this set");
+        arguments.choice("--view", o->view, render::ray_view_names(),
+                         "show what pixels take, in false colours, in place of the picture; "
+                         "what is recorded stays");
+        arguments.option("--view-png", o->view_png, "write the last frame's view to this file");
+        return [o](Console& console) {
+          if (!o->view_png.empty() && o->view.empty()) {
+            throw UsageError("--view-png: which --view?");
+          }
+          if (o->fill.empty() != o->key.empty()) {
+            throw UsageError("--fill and --key: only both make a pair");
+          }
+          if (o->fps && o->error) throw UsageError("--fps and --error: only one can be held");
+          run(*o, console);
+        };
+      }};
 }
 
 }  // namespace studio

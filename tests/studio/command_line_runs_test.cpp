@@ -151,6 +151,20 @@ TEST_F(Runs, RecordVideoAndExr) {
   EXPECT_EQ(std::distance(fs::directory_iterator(dir_ / "take"), fs::directory_iterator()), 3);
 }
 
+TEST_F(Runs, RecordToWhatTheirOptionsNameAndNothingElse) {
+  write_set();  // its plate
+  const std::string set =
+      write_made_set(dir_, "file:plate_%d.png",
+                     "[record]\nexr = \"re\"\nfile = \"set.mkv\"\ncodec = \"lossless\"\n");
+  const std::string take = (dir_ / "take.mkv").string();
+  const Outcome outcome = run("run " + set + " --record " + take);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("3 frames to " + take));
+  EXPECT_TRUE(fs::exists(take));
+  EXPECT_FALSE(fs::exists(dir_ / "re"));
+  EXPECT_FALSE(fs::exists(dir_ / "set.mkv"));
+}
+
 TEST_F(Runs, RecordFillAndKeyForAnExternalKeyer) {
   const auto path = [&](const char* name) { return (dir_ / name).string(); };
   const Outcome outcome = run("run " + write_set() + " --fill " + path("fill.mkv") + " --key " +
@@ -358,11 +372,6 @@ TEST_F(Runs, ConvertAnHdrPicture) {
     EXPECT_TRUE(nlohmann::json::parse(content_of(json)).contains(key)) << key;
   }
   EXPECT_EQ(run("hdr " + (dir_ / "sky.exr").string() + " -o out.jpg").status, 2);
-  EXPECT_EQ(run("hdr " + (dir_ / "absent.jpg").string() + " -o " + out).status, 1);
-}
-
-}  // namespace
-}  // namespace studio::command_line_runs_test
   const std::string before = content_of(out);
   for (const std::string& lossy : {" -o " + out, " -o " + json + ".exr --json " + out}) {
     const Outcome refused = run("hdr " + out + lossy);
@@ -370,3 +379,8 @@ TEST_F(Runs, ConvertAnHdrPicture) {
     EXPECT_THAT(refused.err, HasSubstr("would be lost")) << lossy;
   }
   EXPECT_EQ(content_of(out), before);
+  EXPECT_EQ(run("hdr " + (dir_ / "absent.jpg").string() + " -o " + out).status, 1);
+}
+
+}  // namespace
+}  // namespace studio::command_line_runs_test
