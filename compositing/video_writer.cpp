@@ -123,7 +123,7 @@ void validate(const VideoSettings& settings) {
           "a take's pictures have 1 or 3 channels, not " + std::to_string(settings.channels));
   require(is_lossless(settings) || (settings.width % 2 == 0 && settings.height % 2 == 0),
           "H.264 needs an even width and height, not " + std::to_string(settings.width) + " x " +
-              std::to_string(settings.height) + "; \"lossless\" takes any");
+              std::to_string(settings.height) + "; [record] codec = \"lossless\" takes any");
   require(settings.crf >= 0 && settings.crf <= 51,
           "H.264's rate factor lies in 0..51, not " + std::to_string(settings.crf));
   require(
@@ -152,6 +152,8 @@ struct VideoWriter::State {
   explicit State(const VideoSettings& given)
       : settings(given), encoder(open_encoder(given)), file(given.file) {}
 
+  void begin();
+  bool is_open() const { return begun && !finished; }
   void open_streams();
   void write_packet(AVPacket* packet, const AVStream* stream, AVRational time_base);
   void encode(const AVFrame* picture_or_end);
@@ -174,8 +176,15 @@ struct VideoWriter::State {
   std::int64_t last_index = -1;
   std::int64_t next_sample = 0;
   std::vector<Checkpoint> checkpoints;  // the last few
-  bool drained = false, finished = false;
+  bool begun = false, drained = false, finished = false;
 };
+
+// The header. Until then what was in the file stays.
+void VideoWriter::State::begin() {
+  if (begun) return;
+  open_streams();
+  begun = true;
+}
 
 void VideoWriter::State::open_streams() {
   AVFormatContext* context = nullptr;
@@ -275,7 +284,6 @@ VideoWriter::VideoWriter(const VideoSettings& settings) {
   capture::libav::gather_log();
   state_ = std::make_unique<State>(settings);
   State& state = *state_;
-  state.open_streams();
   state.picture->format = state.encoder->pix_fmt;
   state.picture->width = settings.width;
   state.picture->height = settings.height;
@@ -310,6 +318,7 @@ void VideoWriter::write_picture(std::int64_t index, std::span<const std::uint8_t
                   picture.data[0] + static_cast<std::ptrdiff_t>(y) * picture.linesize[0]);
     }
   }
+  state.begin();
   state.last_index = index;
   picture.pts = index;
   state.encode(&picture);
@@ -317,12 +326,13 @@ void VideoWriter::write_picture(std::int64_t index, std::span<const std::uint8_t
 
 void VideoWriter::write_sound(std::int64_t first, std::span<const float> samples) {
   State& state = *state_;
-  require(state.sound_stream != nullptr, "this take was opened without sound");
+  require(state.settings.sound_channels > 0, "this take was opened without sound");
   const auto channels = static_cast<std::size_t>(state.settings.sound_channels);
   require(samples.size() % channels == 0 && first == state.next_sample,
           "sound from sample " + std::to_string(first) + " does not follow sample " +
               std::to_string(state.next_sample));
   if (samples.empty()) return;
+  state.begin();
   if (av_new_packet(state.packet.get(), static_cast<int>(samples.size() * 3)) < 0) {
     throw std::bad_alloc();
   }
@@ -340,6 +350,7 @@ void VideoWriter::write_sound(std::int64_t first, std::span<const float> samples
 void VideoWriter::checkpoint() {
   State& state = *state_;
   if (state.finished) return;
+  state.begin();
   state.write_gathered();
   std::vector<Checkpoint>& kept = state.checkpoints;
   if (kept.size() == checkpoints_kept) kept.erase(kept.begin());
@@ -348,7 +359,7 @@ void VideoWriter::checkpoint() {
 
 void VideoWriter::drain() {
   State& state = *state_;
-  if (state.drained) return;
+  if (state.drained || !state.begun) return;
   state.encode(nullptr);
   state.write_gathered();
   state.drained = true;
@@ -356,7 +367,7 @@ void VideoWriter::drain() {
 
 void VideoWriter::close() {
   State& state = *state_;
-  if (state.finished) return;
+  if (!state.is_open()) return;
   drain();
   state.finished = true;
   if (const int error = av_write_trailer(state.muxer.get()); error < 0) {
@@ -367,7 +378,7 @@ void VideoWriter::close() {
 
 void VideoWriter::salvage() noexcept {
   State& state = *state_;
-  if (state.finished) return;
+  if (!state.is_open()) return;
   state.finished = true;
   state.give_gathered_up();
   if (state.file.cut_back(state.room_for_index())) av_write_trailer(state.muxer.get());
@@ -376,7 +387,7 @@ void VideoWriter::salvage() noexcept {
 void VideoWriter::salvage_together(VideoWriter& a, VideoWriter& b) noexcept {
   State& one = *a.state_;
   State& other = *b.state_;
-  if (one.finished || other.finished) return;
+  if (!one.is_open() || !other.is_open()) return;
   one.finished = other.finished = true;
   one.give_gathered_up();
   other.give_gathered_up();

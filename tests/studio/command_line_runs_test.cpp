@@ -165,6 +165,18 @@ TEST_F(Runs, RecordToWhatTheirOptionsNameAndNothingElse) {
   EXPECT_FALSE(fs::exists(dir_ / "set.mkv"));
 }
 
+TEST_F(Runs, SayWhichCodecTakesAnOddSize) {
+  const std::vector<std::uint8_t> grey(63 * 48 * 3, 120);
+  capture::write_png(dir_ / "odd.png", 63, 48, 3, grey);
+  std::string set = content_of(write_made_set(dir_, "file:odd.png"));
+  set.replace(set.find("width = 64"), 10, "width = 63");
+  const std::string odd = write("odd.toml", set);
+  const std::string record = "run " + odd + " --frames 1 --record " + (dir_ / "take.mkv").string();
+  EXPECT_THAT(run(record).err, HasSubstr("[record] codec = \"lossless\" takes any"));
+  write("odd.toml", set + "[record]\ncodec = \"lossless\"\n");
+  EXPECT_EQ(run(record).status, 0);
+}
+
 TEST_F(Runs, RecordFillAndKeyForAnExternalKeyer) {
   const auto path = [&](const char* name) { return (dir_ / name).string(); };
   const Outcome outcome = run("run " + write_set() + " --fill " + path("fill.mkv") + " --key " +
