@@ -3,7 +3,9 @@
 
 namespace studio {
 
-// Registers the shaders of compositing. Call once, before threads.
+// Registers shaders and made cameras. From then on writing fails, and ends nothing, where nobody
+// reads or a file may not grow; OpenColorIO's variables in the environment are gone. Call once,
+// before threads.
 void start();
 
 }  // namespace studio

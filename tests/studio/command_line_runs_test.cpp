@@ -177,6 +177,26 @@ TEST_F(Runs, SayWhichCodecTakesAnOddSize) {
   EXPECT_EQ(run(record).status, 0);
 }
 
+TEST_F(Runs, SayThatTheirTakeMayGrowNoLarger) {
+  const std::string take = (dir_ / "take.mkv").string();
+  const Outcome outcome = run("run --quiet " + write_set() + " --record " + take, "ulimit -f 1 &&");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr(take));
+  EXPECT_THAT(outcome.err, HasSubstr("File too large"));
+}
+
+// A facility may have its own displays and views.
+TEST_F(Runs, AreShownTheSameWhateverTheEnvironmentSaysOfColour) {
+  const std::string set = write_set();
+  const std::string plain = (dir_ / "plain.png").string(), other = (dir_ / "other.png").string();
+  ASSERT_EQ(run("still " + set + " -o " + plain).status, 0);
+  const Outcome outcome = run("still " + set + " -o " + other,
+                              "OCIO_ACTIVE_DISPLAYS=sRGB OCIO_ACTIVE_VIEWS=Film "
+                              "OCIO_OPTIMIZATION_FLAGS=0");
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(content_of(other), content_of(plain));
+}
+
 TEST_F(Runs, RecordFillAndKeyForAnExternalKeyer) {
   const auto path = [&](const char* name) { return (dir_ / name).string(); };
   const Outcome outcome = run("run " + write_set() + " --fill " + path("fill.mkv") + " --key " +
