@@ -208,7 +208,7 @@ void key_frames(const KeyOptions& options,
     const compositing::KeyReport report = keyer.key(*frame->image, keyed);
     clip.key_ms +=
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    sequence.write(clip.frames, keyed.image(), matte_of(keyed.image()), {});
+    sequence.write(number, keyed.image(), matte_of(keyed.image()), {});
     if (!is_lost) add(report, number, clip);
   }
 }
@@ -301,7 +301,7 @@ Command key_command() {
                               "camera that sees the empty screen");
         arguments.option("-o,--out", o->out,
                          "of a clip: directory for EXR files (premultiplied R, G, B, A, and "
-                         "matte); of a plate: EXR file");
+                         "matte), numbered as the clip's frames are; of a plate: EXR file");
         arguments.required("--out");
         arguments.option("--plate", o->plate,
                          "picture of the empty screen; without it, from the footage alone");

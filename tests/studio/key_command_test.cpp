@@ -217,10 +217,14 @@ TEST_F(KeyCommand, JudgesAClipByWhatItBeginsWith) {
   for (int i = 1; i < 500; ++i) {
     fs::create_hard_link(in("late_0000.png"), in(fmt::format("late_{:04}.png", i)));
   }
-  const Outcome keyed =
-      run("key " + in("late_%04d.png") + " --colour sRGB --first 500 -o " + in("keyed"));
+  const Outcome keyed = run("key " + in("late_%04d.png") + " --colour sRGB --first 500 -o " +
+                            in("keyed") + " --json " + in("key.json"));
   EXPECT_EQ(keyed.status, 0) << keyed.err;
   EXPECT_THAT(keyed.out, HasSubstr("4 frames before a green screen"));
+  // Files and figures have the clip's numbers.
+  EXPECT_EQ(nlohmann::json::parse(content_of(in("key.json")))["rows"][0]["frame"], 500);
+  EXPECT_TRUE(fs::exists(in("keyed/frame.000500.exr")));
+  EXPECT_FALSE(fs::exists(in("keyed/frame.000000.exr")));
 }
 
 TEST_F(KeyCommand, WritesTheClipsPixelAspect) {
