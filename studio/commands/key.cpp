@@ -20,6 +20,7 @@
 #include "compositing/keyer.h"
 #include "studio/clean_plates.h"
 #include "studio/commands/commands.h"
+#include "studio/commands/interruptible.h"
 #include "studio/json_text.h"
 #include "studio/key_masks.h"
 #include "studio/set_files.h"
@@ -193,7 +194,9 @@ void key_frames(const KeyOptions& options,
                 const compositing::ExrSequence& sequence,
                 KeyedClip& clip) {
   compositing::KeyedFrame keyed;
-  for (; clip.frames < options.frames.value_or(INT64_MAX); ++clip.frames) {
+  const Interruptible ctrl_c;  // what is keyed by then is reported
+  for (; clip.frames < options.frames.value_or(INT64_MAX) && !ctrl_c.is_interrupted();
+       ++clip.frames) {
     const auto frame = camera.next();
     if (!frame) return;
     const std::int64_t number = clip.frames + options.first.value_or(0);
@@ -311,8 +314,9 @@ Command key_command() {
                          "by the screen's colour, or by the distance from any still background");
         arguments.option("--colour", o->colour, "the clip's transfer curve, as in a set");
         arguments.option("--first", o->first, 0, 1'000'000'000, "begin at this frame");
-        arguments.option("--frames", o->frames, 1, 1'000'000'000,
-                         "at most so many (of a plate: 50)");
+        arguments.option(
+            "--frames", o->frames, 1, 1'000'000'000,
+            "at most so many (of a plate: 50); Ctrl-C ends a clip with its figures too");
         arguments.option("--screen", o->screen, 0, 0.9, "alpha below which the screen is clear");
         arguments.option("--core", o->core, 0.1, 1, "alpha above which the person is whole");
         arguments.option("--garbage", o->masks.garbage,

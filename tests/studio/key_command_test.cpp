@@ -227,6 +227,27 @@ TEST_F(KeyCommand, JudgesAClipByWhatItBeginsWith) {
   EXPECT_FALSE(fs::exists(in("keyed/frame.000000.exr")));
 }
 
+// As an operator ends a camera that has no end.
+TEST_F(KeyCommand, EndsOnASignalWithItsFigures) {
+  capture::Image screen = capture::make_image(32, 24);
+  for (std::size_t i = 0; i < screen.pixels.size(); ++i) {
+    screen.pixels[i] = std::array{0.04F, 0.42F, 0.1F}[i % 3];
+  }
+  capture::write_exr(in("screen.exr"), screen);
+  const std::string until_keyed =
+      write("end.sh", "\"$@\" & program=$!\nuntil [ -e '" + in("keyed/frame.000001.exr") +
+                          "' ]; do kill -0 $program || break; sleep 0.02; done\n"
+                          "kill -TERM $program\nwait $program\n");
+  const Outcome keyed =
+      run("key 'made_walker:width=24&height=32&detail=1' --colour sRGB --plate " +
+              in("screen.exr") + " -o " + in("keyed") + " --json " + in("key.json"),
+          "sh " + until_keyed);
+  ASSERT_EQ(keyed.status, 0) << keyed.err;
+  const auto figures = nlohmann::json::parse(content_of(in("key.json")));
+  EXPECT_GE(figures["frames"], 2);
+  EXPECT_EQ(figures["rows"].size(), figures["frames"]);
+}
+
 TEST_F(KeyCommand, WritesTheClipsPixelAspect) {
   run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr"));
   independent::ffmpeg("-i '" + in("take_%04d.png") + "' -vf setsar=2 -c:v ffv1 '" + in("wide.mkv") +
