@@ -14,8 +14,10 @@
 #include "studio/effort_points.h"
 #include "studio/effort_settings.h"
 #include "studio/picture_error.h"
+#include "studio/probe_source.h"
 #include "studio/set_digest.h"
 #include "studio/show.h"
+#include "studio/show_inputs.h"
 
 namespace studio {
 namespace {
@@ -76,6 +78,21 @@ std::vector<EffortSetting> settings_to_measure(const render::Effort& base, bool 
   return all;
 }
 
+[[noreturn]] void refuse_live(const Set& set, Place place, const std::string& what) {
+  throw SetError({{set.path, place.line, place.column,
+                   what + " is a live camera: frames would be measured at its pace, and against "
+                          "the reference of another moment. Record it first (platelight capture "
+                          "record), and chart the set with what was recorded (replay:DIR)"}});
+}
+
+// Throws SetError for a set whose frames are not the same each time.
+void require_recorded(const Set& set) {
+  if (open_plate(set)->is_live()) refuse_live(set, set.camera.source_place, "the plate");
+  const auto& probe = set.probe;
+  if (!probe || probe->kind != ProbeSettings::Kind::camera) return;
+  if (ProbeSource(set).holds_camera_of(set)) refuse_live(set, probe->source_place, "the probe");
+}
+
 // What takes longer is measured once: the whole chart is to take minutes.
 constexpr double slow_frame_ms = 150;
 
@@ -116,6 +133,7 @@ ChartPoint point_of(const EffortSetting& setting, const Take& take, const render
 Chart chart_set(const std::string& set_path, const SetChartSettings& settings, Console& console) {
   Set set = read_set(set_path);
   const std::string digest = set_digest(set_path);  // now: charts take minutes, and sets are edited
+  require_recorded(set);
   const Scratch scratch;
   set.record = scratch.in_place_of(set.record);
   const std::int64_t frames = settings.quick ? 3 : 16;

@@ -9,8 +9,11 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "studio/charts/set.h"
 #include "studio/machine.h"
+#include "studio/set.h"
 #include "studio/set_digest.h"
+#include "tests/studio/made_show.h"
 
 namespace studio::effort_points_test {
 namespace {
@@ -157,6 +160,31 @@ TEST_F(EffortPointsFile, IsRefusedWithTheCommandThatMakesItAnew) {
     EXPECT_THAT(read, ThrowsMessage<std::runtime_error>(HasSubstr(reason))) << content;
     EXPECT_THAT(read, ThrowsMessage<std::runtime_error>(HasSubstr("platelight chart set")));
   }
+}
+
+using LiveSets = MadeShowTest;
+
+// Each take would be of other moments, and as fast as the camera.
+TEST_F(LiveSets, AreChartedOnceTheyAreRecorded) {
+  Console console(true, "");
+  SetChartSettings settings;
+  settings.samples = 2;
+  settings.quick = true;
+  const std::string live_plate = write_made_set(dir_, "live_grey:1000,50");
+  EXPECT_THAT(
+      [&] { static_cast<void>(chart_set(live_plate, settings, console)); },
+      ThrowsMessage<SetError>(testing::AllOf(
+          HasSubstr("made.toml:5:10: the plate is a live camera"), HasSubstr("capture record"))));
+  const std::string live_probe = (dir_ / "probe.toml").string();
+  std::ofstream(live_probe) << "[show]\nwidth = 64\nheight = 48\n"
+                               "[camera]\nsource = \"grey:9,25,0\"\n"
+                               "[probe]\nsource = \"live_grey:1000,50\"\n"
+                               "lens = { model = \"pinhole\", focal_px = 60, size = [64, 48] }\n"
+                               "pose = { axis = [0, 0, 1] }\nmatch = [1, 1, 1]\n";
+  EXPECT_THAT(
+      [&] { static_cast<void>(chart_set(live_probe, settings, console)); },
+      ThrowsMessage<SetError>(testing::AllOf(
+          HasSubstr("probe.toml:7:10: the probe is a live camera"), HasSubstr("capture record"))));
 }
 
 }  // namespace
