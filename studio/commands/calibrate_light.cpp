@@ -241,6 +241,8 @@ void calibrate_light(const LightOptions& options, Console& console) {
   set.objects.clear();
   set.stand_ins.clear();
   set.lamps.clear();
+  set.videos.clear();
+  set.persons.clear();
   const auto patches =
       options.patches.empty()
           ? std::vector<PaintedPatch>{}

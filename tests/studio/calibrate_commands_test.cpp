@@ -481,6 +481,18 @@ TEST_F(CalibrateLight, FindsTheGainFromWhatBothCamerasSee) {
   EXPECT_FALSE(figures().contains("matrix"));
 }
 
+// They are not opened: the light is measured while the person's camera is not there.
+TEST_F(CalibrateLight, NeedsNoVideosAndPersons) {
+  write("set.toml", content_of(path("set.toml")) +
+                        "[[object]]\nname = \"tv\"\nmade = \"tv\"\n"
+                        "[[video]]\nobject = \"tv/tv\"\nsource = \"plate.exr\"\n"
+                        "[[billboard]]\nsource = \"v4l2:/dev/none\"\nheight = 2\n"
+                        "position = [0, 5, 0]\n");
+  const Outcome outcome = run_with_figures("calibrate light " + path("set.toml"));
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_gain();
+}
+
 TEST_F(CalibrateLight, FindsTheGainFromAGreyCard) {
   const std::string card = write("card.toml", "[[patch]]\npixels = [4, 3, 20, 12]\nalbedo = 0.4\n");
   const Outcome outcome =
