@@ -148,7 +148,7 @@ struct Collected {
 
 Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std::int64_t frames) {
   FrameMaker maker(set);
-  const std::int64_t count = maker.is_endless() ? 1 : frames;
+  const std::int64_t count = maker.plate().is_still() ? 1 : frames;
   Collected collected;
   std::vector<calibrate::LightPair>& pairs = collected.pairs;
   for (std::int64_t n = 0; n < count; ++n) {

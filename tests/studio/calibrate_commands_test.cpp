@@ -493,6 +493,21 @@ TEST_F(CalibrateLight, NeedsNoVideosAndPersons) {
   expect_gain();
 }
 
+TEST_F(CalibrateLight, LooksAtAllFramesOfAPlateThatLoops) {
+  for (const char* name : {"plate_0.exr", "plate_1.exr"}) {
+    fs::copy_file(path("plate.exr"), path(name));
+  }
+  std::string looping = content_of(path("set.toml"));
+  const std::string still = "source = \"plate.exr\"\n";
+  looping.replace(looping.find(still), still.size(), "source = \"plate_%d.exr\"\nloop = true\n");
+  write("set.toml", looping);
+  const std::string card = write("card.toml", "[[patch]]\npixels = [4, 3, 20, 12]\nalbedo = 0.4\n");
+  const Outcome outcome =
+      run_with_figures("calibrate light " + path("set.toml") + " --frames 3 --patches " + card);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(figures()["pairs"], 3);
+}
+
 TEST_F(CalibrateLight, FindsTheGainFromAGreyCard) {
   const std::string card = write("card.toml", "[[patch]]\npixels = [4, 3, 20, 12]\nalbedo = 0.4\n");
   const Outcome outcome =
