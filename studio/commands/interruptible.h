@@ -8,8 +8,8 @@
 namespace studio {
 
 // Until it goes out of scope, a first Ctrl-C, SIGTERM or SIGHUP (the terminal is gone) is only
-// noted; the next one ends the program. What the program was told to ignore stays so. One at a
-// time.
+// noted; the next one, of whatever kind, ends the program. What the program was told to ignore
+// stays so. One at a time.
 class Interruptible {
  public:
   Interruptible() {
@@ -30,9 +30,11 @@ class Interruptible {
  private:
   static constexpr std::array signals{SIGINT, SIGTERM, SIGHUP};
 
-  static void note(int signal) {
+  static void note(int) {
     noted_ = 1;
-    std::signal(signal, SIG_DFL);
+    for (const int signal : signals) {
+      if (std::signal(signal, SIG_DFL) == SIG_IGN) std::signal(signal, SIG_IGN);
+    }
   }
 
   static inline volatile std::sig_atomic_t noted_ = 0;

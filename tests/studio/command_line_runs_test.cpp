@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,6 +17,7 @@
 #include "capture/camera.h"
 #include "capture/exr.h"
 #include "capture/png.h"
+#include "studio/commands/interruptible.h"
 #include "tests/studio/command_line.h"
 #include "tests/studio/made_show.h"
 
@@ -227,6 +230,20 @@ TEST_F(Runs, EndOnASignalWithTheirTakeWhole) {
     const auto camera = capture::open_camera("file:" + take);
     EXPECT_EQ(camera->info().frames, json["frames"]);
   }
+}
+
+TEST(Interruptible, EndsTheProgramOnASecondSignalOfAnyKind) {
+  const auto interrupt_by = [](int second) {
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, SIG_DFL);
+    std::signal(SIGHUP, SIG_IGN);
+    const Interruptible interruptible;
+    std::raise(SIGINT);
+    std::raise(SIGHUP);  // as the program was told
+    if (interruptible.is_interrupted()) std::raise(second);
+    std::_Exit(0);
+  };
+  EXPECT_EXIT(interrupt_by(SIGTERM), testing::KilledBySignal(SIGTERM), "");
+  EXPECT_EXIT(interrupt_by(SIGINT), testing::KilledBySignal(SIGINT), "");
 }
 
 TEST_F(Runs, AreCheckedUpToTheirDisplayAndTake) {
