@@ -1,9 +1,20 @@
 // Arguments through CLI11.
 #include "studio/arguments.h"
 
+#include <cmath>
+#include <cstdlib>
+
 #include <CLI/CLI.hpp>
 
 namespace studio {
+namespace {
+
+// NaN is in every range, as CLI11 compares.
+std::string refuse_nan(const std::string& given) {
+  return std::isnan(std::strtod(given.c_str(), nullptr)) ? given + " is not a number" : "";
+}
+
+}  // namespace
 
 void Arguments::positional(const std::string& name, std::string& target, const std::string& help) {
   app_->add_option(name, target, help)->required()->type_name("");
@@ -40,7 +51,10 @@ void Arguments::option(const std::string& names,
                        double low,
                        double high,
                        const std::string& help) {
-  app_->add_option(names, target, help)->type_name("X")->check(CLI::Range(low, high));
+  app_->add_option(names, target, help)
+      ->type_name("X")
+      ->check(CLI::Range(low, high))
+      ->check(refuse_nan);
 }
 
 void Arguments::choices(const std::string& names,

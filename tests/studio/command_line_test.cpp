@@ -80,6 +80,16 @@ TEST_F(CommandLine, ReturnsTwoAndOneLineForWrongUsage) {
   }
 }
 
+TEST_F(CommandLine, TakesNoNumberThatIsNone) {
+  for (const char* words : {"run a.toml --error nan", "run a.toml --fps -NaN",
+                            "capture record v4l2:/dev/none take --seconds nan"}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 2) << words;
+    expect_one_line(outcome.err);
+    EXPECT_THAT(outcome.err, HasSubstr("is not a number")) << words;
+  }
+}
+
 TEST_F(CommandLine, NamesACommandThatItDoesNotKnow) {
   EXPECT_THAT(run("chek a.toml").err, HasSubstr("chek"));
   EXPECT_THAT(run("calibrate lenz -o a.toml").err, HasSubstr("\"calibrate lenz\""));
