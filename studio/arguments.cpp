@@ -14,6 +14,16 @@ std::string refuse_nan(const std::string& given) {
   return std::isnan(std::strtod(given.c_str(), nullptr)) ? given + " is not a number" : "";
 }
 
+// CLI11 takes numbers that begin with a zero as octal ones.
+std::string without_leading_zeros(std::string given) {
+  const std::size_t first = given.starts_with('-') || given.starts_with('+') ? 1 : 0;
+  const auto is_digit = [&](std::size_t i) {
+    return i < given.size() && given[i] >= '0' && given[i] <= '9';
+  };
+  while (is_digit(first) && given[first] == '0' && is_digit(first + 1)) given.erase(first, 1);
+  return given;
+}
+
 }  // namespace
 
 void Arguments::positional(const std::string& name, std::string& target, const std::string& help) {
@@ -43,7 +53,10 @@ void Arguments::option(const std::string& names,
                        std::int64_t low,
                        std::int64_t high,
                        const std::string& help) {
-  app_->add_option(names, target, help)->type_name("N")->check(CLI::Range(low, high));
+  app_->add_option(names, target, help)
+      ->type_name("N")
+      ->transform(without_leading_zeros)
+      ->check(CLI::Range(low, high));
 }
 
 void Arguments::option(const std::string& names,

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -142,6 +143,19 @@ TEST_F(Runs, TellWhatInputsOfAStillPlateCostAndEnd) {
                               write_made_set(dir_, "file:plate_0.png") + " --json " + json_path);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(nlohmann::json::parse(content_of(json_path))["frames"], 4);
+}
+
+TEST_F(Runs, CountInTensWhateverNumbersBeginWith) {
+  write_set();  // its plate
+  const std::string json_path = (dir_ / "run.json").string();
+  const std::string command =
+      "run " + write_made_set(dir_, "file:plate_0.png") + " --json " + json_path + " --frames ";
+  for (const auto& [given, frames] : {std::pair{"010", 10}, {"08", 8}, {"+0009", 9}}) {
+    const Outcome outcome = run(command + given);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(nlohmann::json::parse(content_of(json_path))["frames"], frames) << given;
+  }
+  EXPECT_EQ(run(command + "00").status, 2);
 }
 
 TEST_F(Runs, RecordVideoAndExr) {
