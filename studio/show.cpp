@@ -357,6 +357,7 @@ class Show::Stages {
     tally_.status().lost_plate_frames = work.plate.lost;
     tally_.status().damaged_plate_frames = work.plate.damaged;
     publish(false);
+    shown.notes = take_untold();
     if (on_frame) on_frame(shown);
   }
 
@@ -506,12 +507,18 @@ class Show::Stages {
   // not hide the rest.
   void note(std::string what) {
     const std::lock_guard lock(mutex_);
+    untold_.push_back(what);
     notes_.push_back(std::move(what));
     ++noted_;
     if (notes_.size() <= most_notes) return;
     const std::string kind = kind_of_note(notes_.back());
     const auto same = std::ranges::find(notes_, kind, kind_of_note);
     notes_.erase(same + 1 == notes_.end() ? notes_.begin() : same);
+  }
+
+  std::vector<std::string> take_untold() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(untold_, {});
   }
 
   ShowOptions options_;  // live wherever the plate is
@@ -543,7 +550,8 @@ class Show::Stages {
   mutable std::mutex mutex_;
   std::condition_variable posted_;
   std::vector<ShowCommand> commands_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_;   // the last of them
+  std::vector<std::string> untold_;  // all since the last frame that was shown
   std::int64_t noted_ = 0;
   std::mutex publishing_;  // before mutex_
   std::atomic<bool> paused_ = false;

@@ -107,6 +107,7 @@ struct ShownFrame {
   std::shared_ptr<const render::FrameResult> result;
   std::shared_ptr<const std::vector<std::uint8_t>> rgb8;       // (height, width, 3) display codes
   std::shared_ptr<const std::vector<std::uint8_t>> view_rgb8;  // the view asked for, or null
+  std::vector<std::string> notes;  // all that the show noted since the frame before
 };
 
 struct ShowOptions {

@@ -102,15 +102,17 @@ class Warnings {
  public:
   explicit Warnings(Console& console) : console_(console) {}
 
-  void tell(const ShowStatus& status) {
+  void tell(const ShownFrame& shown, const ShowStatus& status) {
     const std::lock_guard lock(mutex_);
     if (!status.recorder.error.empty()) tell(status.recorder.error);
-    tell_notes(status);
+    for (const std::string& what : shown.notes) tell(what);
+    seen_ += static_cast<std::int64_t>(shown.notes.size());
   }
-  // And of how many were not told.
+  // What came after the last frame, and how many were not told.
   void tell_rest(const ShowStatus& status) {
-    tell(status);
     const std::lock_guard lock(mutex_);
+    if (!status.recorder.error.empty()) tell(status.recorder.error);
+    tell_last(status);
     for (const auto& [kind, count] : kinds_) {
       if (count > most_of_kind) {
         console_.warn(fmt::format("{} more like: {}", count - most_of_kind, kind));
@@ -125,12 +127,11 @@ class Warnings {
   }
 
  private:
-  void tell_notes(const ShowStatus& status) {
+  void tell_last(const ShowStatus& status) {
     const std::vector<std::string>& notes = status.notes;
     const auto fresh = static_cast<std::ptrdiff_t>(std::min(
         static_cast<std::size_t>(std::max<std::int64_t>(status.noted - seen_, 0)), notes.size()));
     for (auto note = notes.end() - fresh; note != notes.end(); ++note) tell(*note);
-    seen_ = status.noted;
   }
   void tell(const std::string& what) {
     if (std::ranges::find(told_, what) != told_.end()) return;
@@ -146,7 +147,7 @@ class Warnings {
   std::mutex mutex_;
   std::vector<std::string> told_;     // the last of them
   std::map<std::string, int> kinds_;  // how many of each
-  std::int64_t seen_ = 0;             // notes that were looked at
+  std::int64_t seen_ = 0;             // notes of the frames so far
 };
 
 // Sections of a set whose changes a running show does not take over.
@@ -248,7 +249,7 @@ void run(const RunOptions& options, Console& console) {
     show.run([&](const ShownFrame& shown) {
       const auto status = show.status();
       report_progress(*status, planned, console);
-      warnings.tell(*status);
+      warnings.tell(shown, *status);
       // A show that is not live is there for its recording.
       const bool in_vain = !status->recorder.error.empty() && !show.is_live();
       if (ctrl_c.is_interrupted() || in_vain) show.post(Quit{});

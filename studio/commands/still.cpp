@@ -41,7 +41,7 @@ void still(const StillOptions& options, Console& console) {
   ShownFrame shown;
   show.run([&](const ShownFrame& frame) { shown = frame; });
   if (!shown.rgb8) throw std::runtime_error(set.path + ": the plate has no such frame");
-  for (const std::string& note : show.status()->notes) console.warn(note);
+  for (const std::string& note : shown.notes) console.warn(note);
 
   std::vector<std::uint8_t> picture = shown.view_rgb8 ? *shown.view_rgb8 : *shown.rgb8;
   draw_overlays(set, shown, options.overlays, picture);

@@ -158,6 +158,26 @@ TEST_F(Runs, CountInTensWhateverNumbersBeginWith) {
   EXPECT_EQ(run(command + "00").status, 2);
 }
 
+TEST_F(Runs, TellEveryNoteOfTheirModels) {
+  write_set();  // its plate
+  std::string objects;
+  for (const std::string name : {"a", "b", "c", "d", "e", "f", "g", "h"}) {
+    write(name + ".obj",
+          "mtllib lost_" + name + ".mtl\no " + name + "\nv 0 0 0\nv 1 0 0\nv 0 2 0\nf 1 2 3\n");
+    objects += "[[object]]\nname = \"sign " + name + "\"\nmesh = \"" + name + ".obj\"\n";
+  }
+  const std::string set = write_made_set(dir_, "file:plate_0.png", objects);
+  const std::string png = (dir_ / "still.png").string();
+  for (const std::string& words : {"run " + set + " --frames 2", "still " + set + " -o " + png}) {
+    const Outcome outcome = run(words);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    for (const std::string name : {"a", "b", "c", "d", "e", "f", "g", "h"}) {
+      EXPECT_THAT(outcome.err, HasSubstr("'lost_" + name + ".mtl' is not there"));
+      EXPECT_THAT(outcome.err, HasSubstr("'" + name + ".mtl' is not there"));
+    }
+  }
+}
+
 TEST_F(Runs, RecordVideoAndExr) {
   const std::string take = (dir_ / "take.mkv").string();
   const Outcome outcome = run("run --quiet " + write_set() + " --record " + take + " --exr " +

@@ -146,6 +146,20 @@ TEST_F(ShowNotes, KeepsNotesOfEveryKind) {
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("the plate's frame")));
 }
 
+TEST_F(ShowNotes, GivesFramesAllNotesSinceTheOneBefore) {
+  ShowOptions options;
+  options.frames = 2;
+  Show show(made_set("grey:1,25,0"), options);
+  for (char name = 'a'; name < 'p'; ++name) show.post(MoveObject{std::string("no ") + name, {}});
+  std::vector<std::vector<std::string>> told;
+  show.run([&](const ShownFrame& shown) { told.push_back(shown.notes); });
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(told[0].size(), 15U);
+  EXPECT_THAT(told[0], Contains(HasSubstr("\"no a\"")));
+  EXPECT_THAT(told[1], ElementsAre());
+  EXPECT_EQ(show.status()->notes.size(), 10U);
+}
+
 TEST_F(ShowNotes, NotesWhatACommandCannotDoAndGoesOn) {
   ShowOptions options;
   options.frames = 5;
