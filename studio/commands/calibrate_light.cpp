@@ -151,10 +151,13 @@ Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std:
   const std::int64_t count = maker.plate().is_still() ? 1 : frames;
   Collected collected;
   std::vector<calibrate::LightPair>& pairs = collected.pairs;
+  std::shared_ptr<const capture::HalfImage> last;
   for (std::int64_t n = 0; n < count; ++n) {
     const auto prepared =
         maker.plate().is_live() ? maker.make_at(maker.wait_for_plate()) : maker.make(n);
     if (!prepared) break;
+    if (prepared->plate == last) continue;  // shown again, it tells nothing new
+    last = prepared->plate;
     const capture::Image plate = even_plate(*prepared);
     const auto frame = static_cast<std::size_t>(n);
     if (pairs.empty()) collected.exposure_s = prepared->plate_exposure_s;

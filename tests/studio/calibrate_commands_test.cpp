@@ -506,6 +506,10 @@ TEST_F(CalibrateLight, LooksAtAllFramesOfAPlateThatLoops) {
       run_with_figures("calibrate light " + path("set.toml") + " --frames 3 --patches " + card);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(figures()["pairs"], 3);
+  fs::remove(path("plate_1.exr"));
+  ASSERT_EQ(run_with_figures("calibrate light " + path("set.toml") + " --patches " + card).status,
+            0);
+  EXPECT_EQ(figures()["pairs"], 1) << "the same picture again and again";
 }
 
 TEST_F(CalibrateLight, FindsTheGainFromAGreyCard) {
