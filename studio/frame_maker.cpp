@@ -62,10 +62,31 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live
   // Beside all else: the probe's pictures take the longest.
   std::future<std::unique_ptr<LightFeed>> light =
       std::async(std::launch::async, [this] { return std::make_unique<LightFeed>(set_); });
-  plate_ = open_plate(set_);
-  track_ = track_of(set_);
-  directions_ = directions_of(set_);
+  Faults faults(set_.path);
+  const auto collecting = [&](const auto& act) {
+    try {
+      act();
+    } catch (const SetError& error) {
+      for (const Diagnostic& d : error.diagnostics()) faults.add({d.line, d.column}, d.message);
+    }
+  };
+  collecting([&] { plate_ = open_plate(set_); });
+  collecting([&] { track_ = track_of(set_); });
+  collecting([&] { directions_ = directions_of(set_); });
   lens_ = std::make_shared<calibrate::Lens>(lens_of(set_));
+  // What else has faults is found without a plate too.
+  const capture::Time start = plate_ ? plate_->first().time : capture::Time{};
+  const bool live_plate = plate_ && plate_->is_live();
+  collecting([&] { videos_ = std::make_unique<VideoFeed>(set_, start, live_plate); });
+  collecting([&] { persons_ = std::make_unique<PersonFeed>(set_, start, live_plate); });
+  collecting([&] {
+    set_scene_ = describe_scene(set_);
+    if (persons_) scene_ = compile(set_, *persons_, set_scene_, ++scene_version_);
+    if (videos_) videos_->place(set_, set_scene_);
+  });
+  collecting([&] { light_ = light.get(); });
+  if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
   rate_ = rate.value_or(set_.show.fps.value_or(own));
@@ -73,15 +94,9 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live
   if (plate_->is_live() && plate_rate.num > 0 && rate_.value() > plate_rate.value()) {
     rate_ = plate_rate;
   }
-  live_ = live_ || plate_->is_live();
-  videos_ = std::make_unique<VideoFeed>(set_, plate_->first().time, plate_->is_live());
-  persons_ = std::make_unique<PersonFeed>(set_, plate_->first().time, plate_->is_live());
-  set_scene_ = describe_scene(set_);
-  scene_ = compile(set_, *persons_, set_scene_, ++scene_version_);
-  videos_->place(set_, set_scene_);
-  shapes_ = std::make_unique<ShapeFeed>(set_, set_scene_, rate_, plate_->first().time, live_);
+  live_ = live_ || live_plate;
+  shapes_ = std::make_unique<ShapeFeed>(set_, set_scene_, rate_, start, live_);
   lamps_ = describe_lamps(set_);
-  light_ = light.get();
 }
 
 bool FrameMaker::is_endless() const { return plate_->is_still() || set_.camera.loop; }

@@ -304,6 +304,29 @@ TEST_F(Runs, AreCheckedUpToTheirDisplayAndTake) {
               HasSubstr("is shown nowhere"));
 }
 
+TEST_F(Runs, AreCheckedForTheFaultsOfAllSources) {
+  write("plate.png", "\x89PNG\r\n\x1a\nnothing");
+  write("light.hdr", "no light");
+  write("video.png", "no video");
+  write("person.png", "no person");
+  const std::string set = write("bad.toml",
+                                "[show]\nwidth = 64\nheight = 48\n"
+                                "[camera]\nsource = \"plate.png\"\n"
+                                "model = \"pinhole\"\nfocal_px = 60\n"
+                                "pose = { position = [0, -8, 4], look_at = [0, 0, 0.5] }\n"
+                                "[probe]\nsource = \"light.hdr\"\n"
+                                "[display]\ndisplay = \"none such\"\n"
+                                "[[object]]\nname = \"tv\"\nmade = \"tv\"\n"
+                                "[[video]]\nobject = \"tv/tv\"\nsource = \"video.png\"\n"
+                                "[[billboard]]\nsource = \"person.png\"\nheight = 2\n"
+                                "position = [0, 0, 0]\n");
+  const Outcome outcome = run("check " + set);
+  EXPECT_EQ(outcome.status, 1);
+  for (const char* place : {":5:10: ", ":10:10: ", ":11:1: ", ":18:10: ", ":20:10: "}) {
+    EXPECT_THAT(outcome.err, HasSubstr(set + place)) << place;
+  }
+}
+
 TEST_F(Runs, AreNotRecordedOverWhatTheirSetIsMadeFrom) {
   const std::string take = (dir_ / "take.mkv").string(), frames = (dir_ / "take").string();
   const std::string first = write_set();
