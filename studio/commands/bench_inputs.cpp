@@ -24,10 +24,13 @@ struct Pass {
 // The frames of a set, without the first, which builds what is kept.
 Pass make_all(const Set& set, std::int64_t most_frames) {
   FrameMaker maker(set);
-  maker.make(0);
+  const auto make = [&](std::int64_t number) {
+    return maker.plate().is_live() ? maker.make_at(maker.wait_for_plate()) : maker.make(number);
+  };
+  make(0);
   Pass pass;
   const double start_ms = cpu_ms_so_far();
-  while (const std::optional<PreparedFrame> frame = maker.make(pass.frames + 1)) {
+  while (const std::optional<PreparedFrame> frame = make(pass.frames + 1)) {
     for (std::size_t i = 0; i < stages; ++i) pass.stage_ms[i] += frame->stage_ms[i];
     ++pass.frames;
     if (pass.frames + 1 >= std::min(most_frames, set.show.frames.value_or(most_frames))) break;

@@ -49,7 +49,8 @@ struct CyclesBench {
 void bench_cycles(const CyclesBench& bench, Console& console);
 
 // CPU time a frame that a set's inputs take: plate, probe, light table; the best of `runs` passes
-// over the show's frames, but at most so many: a still plate has no last one. Throws SetError.
+// over the show's frames, but at most so many: a still plate has no last one. A live plate's are
+// made as its pictures come. Throws SetError.
 void bench_inputs(const std::string& set_path,
                   int runs,
                   std::int64_t most_frames,

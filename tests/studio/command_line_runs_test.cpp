@@ -3,12 +3,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,6 +22,7 @@
 #include "capture/camera.h"
 #include "capture/exr.h"
 #include "capture/png.h"
+#include "studio/commands/benches.h"
 #include "studio/commands/interruptible.h"
 #include "tests/studio/command_line.h"
 #include "tests/studio/made_show.h"
@@ -143,6 +148,35 @@ TEST_F(Runs, TellWhatInputsOfAStillPlateCostAndEnd) {
                               write_made_set(dir_, "file:plate_0.png") + " --json " + json_path);
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(nlohmann::json::parse(content_of(json_path))["frames"], 4);
+}
+
+using LiveInputs = MadeShowTest;
+
+// Counts the pictures that a live camera has given.
+class CountedGreyCamera final : public capture::Camera {
+ public:
+  explicit CountedGreyCamera(std::atomic<int>& given) : camera_(1000, {50, 1}, 0), given_(given) {}
+  const capture::CameraInfo& info() const override { return camera_.info(); }
+  capture::CameraStatistics statistics() const override { return camera_.statistics(); }
+  std::optional<capture::Frame> next() override {
+    auto frame = camera_.next();
+    ++given_;
+    return frame;
+  }
+
+ private:
+  LiveGreyCamera camera_;
+  std::atomic<int>& given_;
+};
+
+TEST_F(LiveInputs, AreMeasuredAsThePicturesCome) {
+  std::atomic<int> given = 0;
+  capture::register_camera("counted", [&](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<CountedGreyCamera>(given);
+  });
+  Console console(true, "");
+  bench_inputs(write_made_set(dir_, "counted:"), 1, 40, console);
+  EXPECT_GE(given, 20);
 }
 
 TEST_F(Runs, CountInTensWhateverNumbersBeginWith) {
