@@ -292,7 +292,7 @@ void calibrate_light(const LightOptions& options, Console& console) {
 
 Command calibrate_light_command() {
   return {"calibrate light", "Measure the gain from a set's lightprobe to its plate",
-          "platelight calibrate light studio/sets/desk_car.toml --patches chart.toml",
+          "platelight calibrate light demo/car.toml --patches demo/calibration/patches.toml",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto o = std::make_shared<LightOptions>();
             arguments.positional("SET", o->set, "set file with a camera and a probe");

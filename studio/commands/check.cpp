@@ -103,7 +103,7 @@ void check(const std::string& path, Console& console) {
 
 Command check_command() {
   return {"check", "Check a set file, its models and its sources, and name all their faults",
-          "platelight check studio/sets/desk_car.toml",
+          "platelight check demo/car.toml",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto path = std::make_shared<std::string>();
             arguments.positional("SET", *path, "set file");

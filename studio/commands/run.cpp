@@ -285,7 +285,7 @@ void run(const RunOptions& options, Console& console) {
 Command run_command() {
   return {
       "run", "Put a set on air, and record it",
-      "platelight run studio/sets/real_car.toml --frames 50 --record take.mkv --json run.json",
+      "platelight run demo/car.toml --record take.mkv --json run.json",
       [](Arguments& arguments) -> std::function<void(Console&)> {
         auto o = std::make_shared<RunOptions>();
         arguments.positional("SET", o->set, "set file");

@@ -54,7 +54,7 @@ void still(const StillOptions& options, Console& console) {
 
 Command still_command() {
   return {"still", "Render one frame of a set to a PNG file",
-          "platelight still studio/sets/desk_car.toml -o desk.png --overlay grid,axes,stand_in",
+          "platelight still demo/car.toml -o still.png --overlay grid,axes,stand_in",
           [](Arguments& arguments) -> std::function<void(Console&)> {
             auto o = std::make_shared<StillOptions>();
             arguments.positional("SET", o->set, "set file");
