@@ -3,8 +3,9 @@
 # the results are. DIR is where they go; a second run repeats quickly.
 #   studio/demo.sh [DIR]
 set -euo pipefail
+out=${1:+$(realpath -m -- "$1")}
 cd "$(dirname "$0")/.."
-out=${1:-demo}
+out=${out:-demo}
 studio/install-deps.sh
 build=${PLATELIGHT_BUILD:-build}
 cmake -S . -B "$build" -G Ninja -DCMAKE_UNITY_BUILD=ON >/dev/null
