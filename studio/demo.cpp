@@ -46,6 +46,10 @@ std::uintmax_t bytes_in(const fs::path& dir) {
 
 }  // namespace
 
+int height_for(const render::MadeStudioSettings& studio, int width) {
+  return 2 * ((width * studio.height + studio.width) / (2 * studio.width));
+}
+
 render::MadeStudio make_demo_studio(const DemoSettings& settings) {
   if (settings.world == DemoWorld::court) {
     render::MadeStudio studio = render::make_studio(settings.studio);

@@ -46,6 +46,9 @@ using DemoProgress = std::function<void(double share, std::string_view what)>;
 // and reason.
 DemoSettings read_demo_truth(const std::filesystem::path& file);
 
+// The plate's height for another width, of the same shape to a pixel or so: even, as H.264 needs.
+int height_for(const render::MadeStudioSettings& studio, int width);
+
 // The world without its car. Throws std::runtime_error with path and reason for a map that cannot
 // be read or used.
 render::MadeStudio make_demo_studio(const DemoSettings& settings);

@@ -42,7 +42,8 @@ void demo(const DemoOptions& options, Console& console) {
   settings.lamp = options.lamp;
   if (options.width) {
     const int width = static_cast<int>(*options.width);
-    settings.studio.height = width * settings.studio.height / settings.studio.width;
+    if (width % 2 != 0) throw UsageError("--width must be even: the plate is H.264 video");
+    settings.studio.height = height_for(settings.studio, width);
     settings.studio.width = width;
   }
   if (options.samples) settings.samples = static_cast<int>(*options.samples);
@@ -80,7 +81,7 @@ Command demo_command() {
         arguments.option("--map", options->map, "of the park: a latitude-longitude .hdr or .exr");
         arguments.flag("--lamp", options->lamp, "of the court: a lamp beside the car, virtual too");
         arguments.option("--width", options->width, 32, 8192,
-                         "of the plate (court 640, park 1280); its shape stays");
+                         "of the plate (court 640, park 1280), even; its shape stays");
         arguments.option("--samples", options->samples, 1, 65536,
                          "paths per pixel of the truth, for each part of the light (16)");
         arguments.option("--frames", options->frames, 1, 100000,

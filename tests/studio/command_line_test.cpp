@@ -90,6 +90,14 @@ TEST_F(CommandLine, TakesNoNumberThatIsNone) {
   }
 }
 
+TEST_F(CommandLine, MakesNoDemoOfAnOddWidth) {
+  const Outcome outcome = run("demo " + (dir_ / "made").string() + " --width 301");
+  EXPECT_EQ(outcome.status, 2);
+  expect_one_line(outcome.err);
+  EXPECT_THAT(outcome.err, HasSubstr("--width must be even"));
+  EXPECT_FALSE(fs::exists(dir_ / "made"));
+}
+
 TEST_F(CommandLine, NamesACommandThatItDoesNotKnow) {
   EXPECT_THAT(run("chek a.toml").err, HasSubstr("chek"));
   EXPECT_THAT(run("calibrate lenz -o a.toml").err, HasSubstr("\"calibrate lenz\""));

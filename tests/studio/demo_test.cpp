@@ -247,6 +247,19 @@ TEST(ParkSet, IsTheOneInTheProjectButForWhereItsFootageLies) {
             park_set(park, "../../demo/park/"));
 }
 
+// H.264 has no odd sizes.
+TEST(HeightFor, IsEvenAndKeepsTheShape) {
+  for (const render::MadeStudioSettings& studio :
+       {render::MadeStudioSettings{}, render::park_settings()}) {
+    EXPECT_EQ(height_for(studio, studio.width), studio.height);
+    for (int width = 32; width <= 8192; width += 2) {
+      const int height = height_for(studio, width);
+      EXPECT_EQ(height % 2, 0) << width;
+      EXPECT_NEAR(height, static_cast<double>(width) * studio.height / studio.width, 1) << width;
+    }
+  }
+}
+
 TEST(MakeDemoStudio, NamesAMapThatCannotLightThePark) {
   DemoSettings settings = tiny_park("dark");
   capture::write_rgbe(settings.map.string(), capture::make_image(16, 32));
