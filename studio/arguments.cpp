@@ -78,6 +78,7 @@ void Arguments::choices(const std::string& names,
   for (const std::string& choice : choices) list += (list.empty() ? "" : ",") + choice;
   app_->add_option(names, target, help)
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->type_name(list)
       ->check(CLI::IsMember(choices));
 }

@@ -469,6 +469,11 @@ TEST_F(Runs, DrawOverlaysOverAStill) {
   const Outcome outcome =
       run("still " + set + " -o " + drawn + " --overlay grid,axes,stand_in,coverage,light");
   EXPECT_EQ(outcome.status, 0) << outcome.err;
+  const std::string before = (dir_ / "before.png").string();
+  const Outcome options_first =
+      run("still --overlay grid,axes,stand_in --overlay coverage,light " + set + " -o " + before);
+  EXPECT_EQ(options_first.status, 0) << options_first.err;
+  EXPECT_EQ(content_of(before), content_of(drawn));
   EXPECT_TRUE(content_of(plain).starts_with("\x89PNG"));
   EXPECT_NE(content_of(plain), content_of(drawn));
   EXPECT_EQ(run("still " + set).status, 2);
