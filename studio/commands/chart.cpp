@@ -14,6 +14,7 @@
 #include "studio/charts/set.h"
 #include "studio/commands/commands.h"
 #include "studio/effort_points.h"
+#include "studio/set.h"
 
 namespace studio {
 namespace {
@@ -41,6 +42,7 @@ void chart_of_set(const ChartOptions& options, Console& console) {
   const std::string& set = options.stages[1];
   const std::string beside = std::filesystem::path(effort_points_file(set)).parent_path().string();
   const std::string out = !options.out.empty() ? options.out : beside.empty() ? "." : beside;
+  static_cast<void>(read_set(set));  // no folder is made for a set that is none
   require_chart_folder(out);
   SetChartSettings settings;
   settings.quick = options.request.quick;

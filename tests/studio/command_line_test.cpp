@@ -141,6 +141,13 @@ TEST_F(CommandLine, MeasuresNoChartThatItCannotWrite) {
   EXPECT_THAT(refused.err, HasSubstr("charts"));
 }
 
+TEST_F(CommandLine, MakesNoFolderForTheChartOfASetThatIsNone) {
+  const Outcome refused = run("chart set " + (dir_ / "absent" / "a.toml").string());
+  EXPECT_EQ(refused.status, 1);
+  expect_one_line(refused.err);
+  EXPECT_FALSE(fs::exists(dir_ / "absent"));
+}
+
 TEST_F(CommandLine, RefusesABenchmarkWithoutItsSubject) {
   for (const char* words : {"bench wheels", "bench inputs", "bench cycles"}) {
     const Outcome outcome = run(words);
