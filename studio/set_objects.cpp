@@ -80,7 +80,8 @@ void read_shapes(Section& section, const std::string& pattern, ObjectSettings& o
 
 void read_mesh(Section& section, const SetContext& context, ObjectSettings& object) {
   std::string given;
-  if (section.text("mesh", given)) {
+  const bool told = section.text("mesh", given);
+  if (told) {
     const std::string path = (context.base / given).lexically_normal().string();
     if (capture::is_sequence(path)) return read_shapes(section, path, object);
   }
@@ -89,7 +90,7 @@ void read_mesh(Section& section, const SetContext& context, ObjectSettings& obje
       section.fault(key, "is for a mesh of numbered files, such as mesh = \"flag_%04d.obj\"");
     }
   }
-  section.file("mesh", context.base, object.mesh);
+  if (told) section.file("mesh", context.base, object.mesh);
 }
 
 bool holds(const std::vector<std::string>& words, std::string_view word) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -65,6 +66,20 @@ TEST_F(SetFile, ReadsTheLeastThatASetNeeds) {
   EXPECT_FALSE(set.show.fps);
   EXPECT_EQ(set.camera.source, "made:grey");
   EXPECT_EQ(set.effort, render::Effort{});
+}
+
+TEST_F(SetFile, TellsOnceOfAMeshThatIsNoName) {
+  try {
+    static_cast<void>(read_set(write("a.toml", std::string(plain) + "[[object]]\nmesh = 5\n")));
+    FAIL() << "was accepted";
+  } catch (const SetError& error) {
+    EXPECT_EQ(std::ranges::count_if(error.diagnostics(),
+                                    [](const Diagnostic& d) {
+                                      return d.message.find("object.mesh") != std::string::npos;
+                                    }),
+              1)
+        << error.what();
+  }
 }
 
 TEST_F(SetFile, ReadsEveryKey) {
