@@ -149,6 +149,11 @@ bool is_device(std::string_view uri) {
   return uri.starts_with("v4l2:") || uri.starts_with("aravis:");
 }
 
+bool has_scheme(std::string_view uri) {
+  const std::size_t colon = uri.find(':');
+  return colon != uri.npos && openers().contains(uri.substr(0, colon));
+}
+
 void check_camera_uri(std::string_view uri) {
   const auto [scheme, rest] = parts_of_uri(uri, {});
   if (scheme == "v4l2") check_v4l2_uri(rest);

@@ -104,6 +104,10 @@ std::unique_ptr<Camera> open_camera(std::string_view uri, const CameraOptions& o
 // Whether the URI names a device (`v4l2:`, `aravis:`), whose pictures come as time goes by.
 bool is_device(std::string_view uri);
 
+// Whether it begins with the scheme of a camera that there is; else it may be a path, which may
+// have a colon in it.
+bool has_scheme(std::string_view uri);
+
 // What can be told from a URI alone, without opening anything: throws std::runtime_error, without
 // the URI, with the reason and what to write, if its scheme is none that there is, or if it names a
 // device with settings that none could have (see parse_v4l2 and parse_aravis) or with a pixel

@@ -222,8 +222,12 @@ bool read_source_key(Section& section,
   std::string given;
   if (!section.text(key, given)) return false;
   const std::size_t colon = given.find(':');
-  std::string scheme = colon == std::string::npos ? "file" : given.substr(0, colon);
-  const std::string rest = colon == std::string::npos ? given : given.substr(colon + 1);
+  std::error_code ignored;
+  const bool is_path = colon == std::string::npos ||
+                       (!capture::has_scheme(given) &&
+                        (given.find('/') < colon || fs::exists(base / given, ignored)));
+  const std::string scheme = is_path ? "file" : given.substr(0, colon);
+  const std::string rest = is_path ? given : given.substr(colon + 1);
   if (scheme != "file" && scheme != "replay") {
     try {
       capture::check_camera_uri(given);

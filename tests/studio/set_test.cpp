@@ -82,6 +82,16 @@ TEST_F(SetFile, TellsOnceOfAMeshThatIsNoName) {
   }
 }
 
+TEST_F(SetFile, FindsBesideItAFileWhoseNameHasAColon) {
+  const std::string start = "[show]\nwidth = 64\nheight = 48\n[camera]\nsource = ";
+  const std::string plate = write("plate 10:30.png", "x");
+  EXPECT_EQ(read_set(write("a.toml", start + "\"plate 10:30.png\"\n")).camera.source,
+            "file:" + plate);
+  for (const char* absent : {"\"plate 10:31.png\"\n", "\"./plate 10:31.png\"\n"}) {
+    EXPECT_THROW(static_cast<void>(read_set(write("a.toml", start + absent))), SetError) << absent;
+  }
+}
+
 TEST_F(SetFile, ReadsEveryKey) {
   write("plate.mp4", "x");
   write("map.exr", "x");
