@@ -37,8 +37,8 @@ std::vector<Marker> markers_of(const Board& board,
                                const BoardView& view,
                                const Pose& set_from_board);
 
-// What register_camera takes. Throws std::runtime_error naming the marker, and its line, whose pixel
-// the lens does not see, or lies outside of the lens's picture.
+// What register_camera takes. Throws std::runtime_error naming the marker, and its line, whose
+// pixel the lens does not see, or lies outside of the lens's picture.
 std::vector<Sight> sights_of(const Lens& lens, std::span<const Marker> markers);
 
 }  // namespace calibrate

@@ -98,7 +98,12 @@ TEST(RegisterCamera, LeavesOutMarkersThatWereMistaken) {
       for (int i = 0; i < cases; ++i) {
         made::MarkerScene scene = made::random_markers(count, angle_deg * degree, noise_px, random);
         made::mistake_markers(scene.sights, wrong);
-        const Registration found = register_camera(scene.sights, {noise_px});
+        Registration found;
+        try {
+          found = register_camera(scene.sights, {noise_px});
+        } catch (const std::runtime_error&) {
+          continue;  // not right either
+        }
         bool good = made::chi_square(found, scene.cam_from_set) < 27.9;
         for (std::size_t k = 0; k < wrong; ++k) {  // unless for a neighbour
           const Vec2 off = residual_of(scene.sights[k], scene.cam_from_set);

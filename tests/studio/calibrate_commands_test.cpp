@@ -229,7 +229,7 @@ TEST_F(CalibrateCommands, PoseWarnsOfABoardThatLooksAlikeAfterHalfATurn) {
                        " --board 8x6 --square 0.05 -o " + path("pose.toml"));
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("8x6 corners looks alike after half a turn"));
-  EXPECT_EQ(figures()["warnings"].size(), 1U);
+  EXPECT_THAT(figures()["warnings"].dump(), HasSubstr("half a turn"));
 }
 
 TEST_F(CalibrateCommands, WhatWasReadIsNotWrittenOver) {
