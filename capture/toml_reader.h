@@ -78,8 +78,8 @@ class TomlReader {
   double number(const toml::node& node, std::string_view key, bool any = false) const {
     const auto value = node.is_number() ? node.value<double>() : std::nullopt;
     if (!value || !std::isfinite(*value) || (!any && std::abs(*value) > farthest)) {
-      fail(node.source(),
-           in_quotes(key) + " must hold " + (any ? "finite numbers" : "numbers of at most 1e6"));
+      fail(node.source(), in_quotes(key) + (any ? " must be finite numbers"
+                                                : " must hold numbers of at most 1e6"));
     }
     return *value;
   }

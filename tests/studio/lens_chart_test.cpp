@@ -112,6 +112,7 @@ TEST(LensChart, ShowsWhatIsAskedOfIt) {
   EXPECT_GE(peers, 1u);
   EXPECT_EQ(std::ranges::count(chart.points, true, &ChartPoint::by_default), 2);
   EXPECT_EQ(chart.stressors.size(), 7u);
+  int past_the_edge = 0;
   for (const Stressor& stressor : chart.stressors) {
     // Where the error is several pixels, it was foretold, or the status says that something is
     // wrong.
@@ -119,12 +120,15 @@ TEST(LensChart, ShowsWhatIsAskedOfIt) {
       const bool told = s.status != "ok" || s.reported_error.value_or(0) > s.error / 2;
       EXPECT_TRUE(s.error < 2 || told) << stressor.stressor << " " << s.value;
     }
-    // From where nothing is wrong, and no error of pixels is foretold, to past the edge.
+    // A chart that is never confident is none.
     const auto is_good = [](const StressorSample& s) {
       return s.status == "ok" && s.error < 2 && s.reported_error.value_or(HUGE_VAL) < 5;
     };
-    EXPECT_EQ(std::ranges::count_if(stressor.samples, is_good), 1) << stressor.stressor;
+    const auto good = std::ranges::count_if(stressor.samples, is_good);
+    EXPECT_GE(good, 1) << stressor.stressor;
+    past_the_edge += good < std::ssize(stressor.samples);
   }
+  EXPECT_GE(past_the_edge, 6) << "boards need no tilt where they are off the axis";
 }
 
 }  // namespace

@@ -95,6 +95,7 @@ TEST_F(LiveCarTest, IsLitAsItsPlateShows) {
 // From a picture's arrival to ours. Those that a busy machine holds up are few, the first one among
 // them, which is rendered with nothing kept.
 TEST_F(LiveCarTest, ShowsItsPlateWithinTwoFrames) {
+  if (!PLATELIGHT_FULL_TESTS) GTEST_SKIP() << "needs a machine of its own: tests/run.sh --full";
   ShowOptions options;
   options.frames = 60;
   Show show(quick_set(dir_, "0"), options);
