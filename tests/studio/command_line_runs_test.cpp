@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -307,11 +309,23 @@ TEST(Interruptible, EndsTheProgramOnASecondSignalOfAnyKind) {
     const Interruptible interruptible;
     std::raise(SIGINT);
     std::raise(SIGHUP);  // as the program was told
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
     if (interruptible.is_interrupted()) std::raise(second);
     std::_Exit(0);
   };
   EXPECT_EXIT(interrupt_by(SIGTERM), testing::KilledBySignal(SIGTERM), "");
   EXPECT_EXIT(interrupt_by(SIGINT), testing::KilledBySignal(SIGINT), "");
+}
+
+// As `timeout` sends its signal to a program and to the program's group.
+TEST(Interruptible, TakesSignalsThatComeTogetherForOne) {
+  const auto interrupt = [] {
+    for (const int signal : {SIGINT, SIGHUP}) std::signal(signal, SIG_DFL);
+    const Interruptible interruptible;
+    for (const int signal : {SIGINT, SIGINT, SIGHUP}) std::raise(signal);
+    std::_Exit(interruptible.is_interrupted() ? 3 : 0);
+  };
+  EXPECT_EXIT(interrupt(), testing::ExitedWithCode(3), "");
 }
 
 TEST_F(Runs, AreCheckedUpToTheirDisplayAndTake) {
