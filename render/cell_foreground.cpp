@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "render/cell_baker.h"
 #include "render/embree_context.h"
+#include "render/kept_transport.h"
 
 namespace render {
 namespace {
@@ -48,10 +50,15 @@ bool only_glows(const ShadePoint& p) {
 // Whether a ray through any of the cell's pixels may meet what shows live pictures.
 bool CellBaker::may_see_pictures() const {
   const Scene::Places& places = frame_->inputs.scene->places();
+  const KeptTransport* kept = frame_->inputs.kept;
   std::optional<CellCone> cone;
   for (std::size_t i = 0; i < places.bounds.size(); ++i) {
     if (places.pictures[i].empty()) continue;
-    if (!cone) cone = cell_cone(*frame_->inputs.directions, frame_->turn, x0_, y0_);
+    if (!cone) {
+      cone = kept && !kept->cones().empty()
+                 ? kept->cones()[frame_->cell_at(x0_ / cell_size, y0_ / cell_size)]
+                 : cell_cone(*frame_->inputs.directions, frame_->turn, x0_, y0_);
+    }
     if (may_be_seen(*cone, frame_->camera, places.bounds[i])) return true;
   }
   return false;

@@ -74,6 +74,9 @@ class KeptTransport {
   // Of each frame in turn.
   const std::shared_ptr<BorderedLevels>& bordered_levels() const { return bordered_levels_; }
 
+  // Of all cells, row by row, once anything has moved before a camera that stays; else empty.
+  const std::vector<CellCone>& cones() const { return cones_; }
+
   // What cells mark where they reach in; stays while any cell is kept.
   const SpaceGrid& grid() const { return grid_; }
 

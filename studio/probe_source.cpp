@@ -286,11 +286,7 @@ void ProbeSource::prime() {
     single_ = {};
     newest_ = {};
     auto next = read.begin();
-    while (next != read.end() && newest_.image == nullptr) {
-      Taken taken;
-      take(*next++, taken);
-      show(taken);
-    }
+    while (next != read.end() && newest_.image == nullptr) take({*next++});
     ahead_.assign(next, read.end());
   }
   note_camera();
@@ -321,10 +317,7 @@ void ProbeSource::prime_live(std::size_t cycle) {
     camera_->wait_for_newer(end);
     const std::vector<capture::Frame> frames = camera_->advance(capture::Time::max(), at_once);
     if (frames.empty()) break;
-    note_camera();
-    Taken taken;
-    for (const capture::Frame& frame : frames) take(frame, taken);
-    show(taken);
+    take(frames);
     // Exposures that follow the light may have become fewer.
     cycle = std::min(cycle, status_.exposures_s.size());
     if (!frames.back().note.empty()) why = frames.back().note;
@@ -405,6 +398,13 @@ void ProbeSource::take(const capture::Frame& frame, Taken& taken) {
   if (add(frame)) taken.fresh = frame.time;
   taken.any = true;
   taken.last_note = frame.note;
+}
+
+void ProbeSource::take(const std::vector<capture::Frame>& frames) {
+  note_camera();
+  Taken taken;
+  for (const capture::Frame& frame : frames) take(frame, taken);
+  show(taken);
 }
 
 void ProbeSource::show(const Taken& taken) {

@@ -83,6 +83,7 @@ class ProbeSource {
   void note_camera();
   capture::Frame wait_for_next();
   void take(const capture::Frame& frame, Taken& taken);
+  void take(const std::vector<capture::Frame>& frames);
   void take_until(capture::Time time);
   void show(const Taken& taken);
   bool tells_exposure(const capture::Frame& frame) const;
