@@ -2,13 +2,16 @@
 #include "compositing/billboard.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <span>
 #include <stdexcept>
 
+#include "render/lanes.h"
 #include "render/shader.h"
 #include "render/trace.h"
+#include "render/transform.h"
 
 namespace compositing {
 namespace {
@@ -111,6 +114,14 @@ const char* fault_of(const Block& block) {
 
 Vec3f grey(float value) { return {value, value, value}; }
 
+// The same of a place of the picture.
+Vec3f dimmed(
+    const Block& block, const render::LivePicture& picture, float u, float v, float footprint_uv) {
+  if (picture.is_clear(u, v, footprint_uv)) return grey(1);
+  if (block.translucency == 0) return grey(1 - picture.quick_alpha(u, v, footprint_uv));
+  return passed(block, picture.look_up(u, v, footprint_uv));
+}
+
 void show(const Block& block,
           const std::array<float, 4>& rgba,
           ShadePoint& p,
@@ -130,6 +141,90 @@ void show(const Block& block,
                 0,
                 {},
                 p.kind});
+}
+
+// A billboard where it stands in a frame: a parallelogram, whose rays to light take no tree.
+class StandingBillboard final : public render::Prepared {
+ public:
+  StandingBillboard(const Material& material,
+                    const std::array<float, 12>& set_from_object,
+                    std::shared_ptr<const render::LivePicture> picture)
+      : block_(block_of(material)), material_(material), picture_(std::move(picture)) {
+    const Vec3f right = render::transform_vector(set_from_object, {1, 0, 0});
+    const Vec3f up = render::transform_vector(set_from_object, {0, 0, 1});
+    corner_ = render::transform_point(set_from_object, {-0.5F, 0, 0});
+    const Vec3f across = cross(right, up);
+    const float area = length(across);
+    if (!(area > 0)) return;
+    normal_ = across * (1 / area);
+    along_right_ = cross(up, normal_) * (1 / area);
+    along_up_ = cross(normal_, right) * (1 / area);
+    uv_per_metre_ = 1 / std::sqrt(area);
+  }
+
+  bool dim(const render::LightRays& rays) const override {
+    for (std::size_t first = 0; first < rays.count; first += 8) {
+      const std::size_t n = std::min<std::size_t>(rays.count - first, 8);
+      const auto eight = [&](const float* from) {
+        std::array<float, 8> some{};
+        std::copy_n(from + first, n, some.begin());
+        return render::load_eight(some.data());
+      };
+      const Eights o{eight(rays.ox), eight(rays.oy), eight(rays.oz)};
+      const Eights d{eight(rays.dx), eight(rays.dy), eight(rays.dz)};
+      const Eight facing = dot(d, normal_);
+      const Eight t = dot(corner_ - o, normal_) / facing;
+      const Eights at = o + d * t;
+      const Eight u = dot(at - corner_, along_right_), v = dot(at - corner_, along_up_);
+      unsigned met = render::bits_of((t > 0) & (t < render::ray_far) & (u >= 0) & (u <= 1) &
+                                     (v >= 0) & (v <= 1));
+      for (met &= (1U << n) - 1; met != 0; met &= met - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(met)), ray = first + i;
+        const float slant = std::max(std::abs(facing[i]), 1e-6F);
+        const float width_m = rays.width_m[ray] + rays.cone_rad[ray] * t[i];
+        const Vec3f share =
+            passed_at(u[i], 1 - v[i], {at.x[i], at.y[i], at.z[i]}, width_m / std::sqrt(slant));
+        rays.red[ray] *= share.x, rays.green[ray] *= share.y, rays.blue[ray] *= share.z;
+      }
+    }
+    return true;
+  }
+
+ private:
+  using Eight = render::Eight;
+  struct Eights {
+    Eight x, y, z;
+    friend Eights operator+(const Eights& a, const Eights& b) {
+      return {a.x + b.x, a.y + b.y, a.z + b.z};
+    }
+    friend Eights operator*(const Eights& a, Eight by) { return {a.x * by, a.y * by, a.z * by}; }
+    friend Eights operator-(Vec3f a, const Eights& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+    friend Eights operator-(const Eights& a, Vec3f b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+    friend Eight dot(const Eights& a, Vec3f b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+  };
+
+  Vec3f passed_at(float u, float v, Vec3f position, float footprint_m) const {
+    float uv_per_metre = uv_per_metre_;
+    if (block_.camera.columns != 0) {
+      const auto found =
+          seen_by_camera(block_.camera, std::span(material_.parameters).subspan(sizeof block_),
+                         in_camera(block_.camera, position));
+      if (!found) return grey(1);
+      u = found->place.u, v = found->place.v, uv_per_metre = found->uv_per_metre;
+    }
+    return dimmed(block_, *picture_, u, v, footprint_m * uv_per_metre);
+  }
+
+  Block block_;
+  Material material_;
+  std::shared_ptr<const render::LivePicture> picture_;
+  Vec3f corner_{}, normal_{}, along_right_{}, along_up_{};
+  float uv_per_metre_ = 0;
+};
+
+bool is_billboard_mesh(const render::Mesh& mesh) {
+  const render::Mesh own = make_billboard_mesh(0);
+  return mesh.positions == own.positions && mesh.uvs == own.uvs && mesh.triangles == own.triangles;
 }
 
 class BillboardShader final : public render::Shader {
@@ -167,9 +262,20 @@ class BillboardShader final : public render::Shader {
 
   bool lets_light_through(const Material&) const override { return true; }
   bool glows_by_means() const override { return true; }
+  bool only_shows(const Material& material) const override { return block_of(material).lit == 0; }
 
   std::vector<std::size_t> pictures_of(const Material& material) const override {
     return {block_of(material).picture};
+  }
+
+  std::shared_ptr<const render::Prepared> prepare(
+      const Material& material,
+      const render::Mesh& mesh,
+      const std::array<float, 12>& set_from_object,
+      std::span<const std::shared_ptr<const render::LivePicture>> pictures) const override {
+    if (!is_billboard_mesh(mesh)) return nullptr;
+    return std::make_shared<StandingBillboard>(material, set_from_object,
+                                               pictures[block_of(material).picture]);
   }
 
   std::optional<Layer> layer(const ShadeContext& context,
@@ -200,14 +306,11 @@ class BillboardShader final : public render::Shader {
     const render::LivePicture& picture = *context.pictures[block.picture];
     const auto [u, v] = at.place;
     const float footprint_uv = footprint_m * at.uv_per_metre;
+    if (kind == RayKind::shadow) return dimmed(block, picture, u, v, footprint_uv);
     if (picture.is_clear(u, v, footprint_uv)) return grey(1);
-    if (kind != RayKind::shadow) {
-      const bool clear = std::isfinite(footprint_uv) &&
-                         picture.look_up(u, v, footprint_uv) == std::array<float, 4>{};
-      return clear ? grey(1) : Vec3f{};
-    }
-    if (block.translucency == 0) return grey(1 - picture.quick_alpha(u, v, 0));
-    return passed(block, picture.look_up(u, v, 0));
+    const bool clear = std::isfinite(footprint_uv) &&
+                       picture.look_up(u, v, footprint_uv) == std::array<float, 4>{};
+    return clear ? grey(1) : Vec3f{};
   }
 };
 

@@ -224,6 +224,7 @@ class HullShader final : public render::Shader {
 
   std::shared_ptr<const render::Prepared> prepare(
       const Material& material,
+      const render::Mesh&,
       const std::array<float, 12>& set_from_object,
       std::span<const std::shared_ptr<const render::LivePicture>> pictures) const override {
     return std::make_shared<HullCells>(block_of(material),

@@ -56,10 +56,30 @@ void CellBaker::bake(const FrameContext& frame,
   statistics_ = &statistics;
   const std::uint64_t rays_before =
       statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays;
+  const KeptTransport* kept = frame.inputs.kept;
+  const CellReach* known =
+      kept ? kept->reach_with_pictures(x0 / cell_size, y0 / cell_size, stage) : nullptr;
+  const bool may_be_apart = block_ == 1 && !frame.stalls.empty();
+  if (known || !may_be_apart || !find(stage, true)) {
+    // What rays passed that were to find it without pictures decides, too.
+    const CellReach reach = known ? *known : may_be_apart ? transport.reach : CellReach{};
+    find(stage, false);
+    transport.reach.add(reach);
+  }
+  transport.rays =
+      statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays - rays_before;
+}
+
+// False if live pictures matter to it in ways that are not looked at anew in each frame.
+bool CellBaker::find(int stage, bool past_pictures) {
+  const FrameContext& frame = *frame_;
+  CellTransport& transport = *transport_;
   transport.clear();
+  past_pictures_ = gather_.past_pictures = transport.past_pictures = past_pictures;
+  needs_pictures_ = false;
   const auto& table = *frame.inputs.directions;
-  transport.blocks = {block_, std::min(cell_size, table.width - x0),
-                      std::min(cell_size, table.height - y0)};
+  transport.blocks = {block_, std::min(cell_size, table.width - x0_),
+                      std::min(cell_size, table.height - y0_)};
   if (frame.inputs.count_rays) transport.counts.resize(cell_pixels);
   counting_ = frame.inputs.count_rays ? transport.counts.data() : nullptr;
   smooths_ = stage == smoothed_stage;
@@ -70,7 +90,7 @@ void CellBaker::bake(const FrameContext& frame,
   samples_.fill({});
   first_.fill({});
   own_.fill({});
-  base_.fill({});
+  std::fill_n(base_.begin(), slots, CellTransport::Base{});
   light_.fill({});
   edge_.fill(Edge::none);
   counts_.fill(0);
@@ -86,9 +106,11 @@ void CellBaker::bake(const FrameContext& frame,
   looked_up_.direction = {};
   see_foreground();
   trace_centres();
+  if (past_pictures_) keep_far();
   const bool finds_edges = effort_.aa_samples > 1;
   if (finds_edges) keep_centres();
   shade_centres();
+  if (needs_pictures_) return false;
   if (finds_edges) {
     trace_ring();
     find_edges();
@@ -98,9 +120,9 @@ void CellBaker::bake(const FrameContext& frame,
     blend_neighbours();
     if (counting_) count_errors();
   }
+  if (needs_pictures_) return false;
   pack();
-  transport.rays =
-      statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays - rays_before;
+  return true;
 }
 
 void CellBaker::clear_answer(ShadePoint& p) {
@@ -127,7 +149,7 @@ void CellBaker::trace(
   }
   TraceContext context(*frame_->inputs.scene, kind, coherent);
   context.cone_rad = cone_rad;
-  context.past_pictures = pictures == LivePictures::passed;
+  context.past_pictures = past_pictures_ || pictures == LivePictures::passed;
   RTCRayHitNp rays;
   rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
               s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
@@ -211,6 +233,7 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
   p.throughput = {1, 1, 1};
   p.pixel = pixel;
   p.slot = slot;
+  p.behind = no_picture_ray;
   p.kind = RayKind::camera;
   p.depth = 0;
   p.path = 1;
@@ -378,7 +401,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   Receivers& r = receivers_;
   const Vec3f origin = offset_origin(p.hit, p.hit.geometric_normal);
   r.px[k] = origin.x, r.py[k] = origin.y, r.pz[k] = origin.z;
-  if (grid_) transport_->reach.add_receiver(*grid_, origin);
+  if (grid_) transport_->reach.add_receiver(*grid_, origin, sets_centres_);
   r.nx[k] = p.light_normal.x, r.ny[k] = p.light_normal.y, r.nz[k] = p.light_normal.z;
   const Vec3f g = p.hit.geometric_normal;
   r.gx[k] = g.x, r.gy[k] = g.y, r.gz[k] = g.z;
@@ -429,7 +452,9 @@ void CellBaker::receive(int count, bool grid) {
     const std::size_t k = grid ? p.pixel : static_cast<std::size_t>(r.count);
     place[i] = static_cast<std::uint16_t>(k);
     point_at[k] = static_cast<std::uint16_t>(i);
+    sets_centres_ = grid;
     set_receiver(k, p);
+    sets_centres_ = false;
     ++r.count;
     r.active[k / 64] |= std::uint64_t{1} << (k % 64);
     if (p.diffuse != Vec3f{} || p.catches_lamps || glossy[i] > 1) {
@@ -453,6 +478,7 @@ void CellBaker::receive(int count, bool grid) {
       }
       gather_cell(shadow_rays_, r, gather_, transport_->visibility, *statistics_);
       transport_->receiving = r.active;
+      keep_shadowed(transport_->visibility, r.active, transport_->shadowed);
     } else {
       gather_points(shadow_rays_, r, gather_, tested_, *statistics_);
     }
@@ -500,7 +526,11 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
   for (const PointLight& l : tested_) {
     const ShadePoint& p = points_[point_at[l.point]];
     const Vec3f weight = p.throughput * p.diffuse * l.passed * l.weight;
-    if (weight != Vec3f{}) {
+    if (weight == Vec3f{}) continue;
+    if (past_pictures_) {
+      add_light_past_pictures(p, shadow_rays_.direction(receivers_, l.point, l.light), l.light,
+                              weight, part_of_light(l, light_of_point_[point_at[l.point]].open));
+    } else {
       add_light({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
     }
   }
@@ -511,6 +541,7 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
     const auto first = static_cast<std::uint32_t>(t.shadow_lights.size());
     for (const PointLight& l : tested_) {
       if (l.point != k) continue;
+      note_picture_shadow(p, k, l, light_of_point_[point_at[k]].open);
       t.shadow_lights.push_back({l.light, l.weight, (Vec3f{1, 1, 1} - l.passed) * l.weight});
     }
     const bool bent = p.kind == RayKind::bent;
@@ -523,6 +554,7 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
       continue;
     }
     if (p.catches_lamps && !frame_->planned_table->lamps.empty()) {
+      needs_pictures_ = needs_pictures_ || p.behind != no_picture_ray;
       catcher_of_receiver_[k] = static_cast<std::uint32_t>(t.catchers.size());
       t.catchers.push_back({static_cast<std::uint16_t>(target_of(p)),
                             static_cast<std::uint32_t>(cell_pixels + t.shadow_points.size() - 1),

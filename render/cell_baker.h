@@ -49,6 +49,14 @@ class CellBaker final : public RaySink {
 
   void push(const ShadePoint& from, const NewRay& ray) override;
 
+  // What the frame's live pictures do to a cell that was found without them. False if nothing.
+  bool look_at_pictures(const FrameContext& frame,
+                        const CellTransport& cell,
+                        int x0,
+                        int y0,
+                        CellPictures& seen,
+                        RenderStatistics& statistics);
+
  private:
   static constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
   static constexpr int ring_pixels = ring_size * ring_size;
@@ -64,7 +72,8 @@ class CellBaker final : public RaySink {
     std::uint32_t pixel, slot;
     RayKind kind;
     std::uint8_t depth;
-    bool one_of_many;  // of rays all over a rough lobe: its compact light is found apart
+    std::uint16_t behind;  // the picture ray that its path began with last, or none
+    bool one_of_many;      // of rays all over a rough lobe: its compact light is found apart
     bool lamps_apart;  // and so are the lamps that it mirrors: it does not see what glows by them
     bool beyond_cut;   // followed by chance: what is straight on is counted, for all that are not
     bool first;        // that a centre sent on, or the brightest of several
@@ -162,6 +171,7 @@ class CellBaker final : public RaySink {
   static bool continuous(const Met& a, const Met& b, float pixel_angle, Vec3f camera);
   template <class Sample>  // a point, or a ray
   static std::size_t target_of(const Sample& p) {
+    if (p.behind != no_picture_ray) return slots + p.behind;
     return p.slot < cell_pixels ? p.pixel : cell_pixels + p.pixel;
   }
   bool is_inside(std::size_t k) const { return (inside_[k / 64] >> (k % 64) & 1) != 0; }
@@ -176,6 +186,7 @@ class CellBaker final : public RaySink {
   }
 
   // cell_baker.cpp
+  bool find(int stage, bool past_pictures);
   static void clear_answer(ShadePoint& p);
   void trace(int count,
              bool coherent,
@@ -204,16 +215,81 @@ class CellBaker final : public RaySink {
 
   // cell_foreground.cpp
   bool may_see_pictures() const;
-  void set_rays_of_all_pixels();
+  void set_rays_of_all_pixels(const CellTransport::Blocks& in_picture);
   int meet_pictures(std::span<const float, cell_pixels> came_m,
                     std::span<const Vec3f, cell_pixels> left,
                     std::span<int, cell_pixels> ray_of_point);
   void see_foreground();
   bool is_behind_foreground(int x, int y) const;
 
+  // cell_pictures.cpp
+  void keep_far();
+  void keep_distances();
+  void keep_shadowed(CellVisibility& visibility,
+                     const CellMask& receiving,
+                     std::vector<CellTransport::Shadowed>& shadowed);
+  bool may_be_passed(Vec3f from, Vec3f direction, float far_m) const {
+    return past_pictures_ && !shades_ring_ && frame_->stalls.are_passed(from, direction, far_m);
+  }
+  void ask_lamp(const Receivers& r, std::size_t k, std::size_t lamp);
+  void note_picture_shadow(const ShadePoint& p,
+                           std::size_t receiver,
+                           const PointLight& l,
+                           Vec3f open);
+  float share_of_sample(std::size_t slot) const;
+  std::uint32_t index_of_sample(std::size_t slot) const {
+    return is_further(slot) ? index_of_slot_[slot - cell_pixels] : 0;
+  }
+  float number_in_pixel(std::uint32_t pixel, std::uint32_t sample, std::uint32_t path) const;
+  float chance_of_picture_ray(float share) const;
+  std::uint16_t add_picture_ray(const QueuedRay& ray, float far_m);
+  float part_of_light(const PointLight& l, Vec3f open) const;
+  // `part`: of the point's light, if there is other light as well.
+  void add_light_past_pictures(
+      const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part = 1);
+  bool pictures_may_part(std::size_t k) const;
+  float hidden_from(const Met& met) const;
+  bool centre_looks_apart(std::size_t pixel);
+  std::uint16_t look_apart(
+      const Further& f, Vec3f direction, float far_m, float width, std::uint16_t lender);
+  void compare_with_centre(int index, const Further& f);
+  bool hides_pictures(int index) const;
+  template <class SetPoint>
+  bool look_along(int count, bool coherent, RayKind kind, float cone_rad, SetPoint&& set_point);
+  bool passes_picture(Vec3f from, Vec3f direction, float far_m) const;
+  void see_straight(const CellTransport& cell, CellPictures& seen);
+  void see_along(const CellTransport& cell, CellPictures& seen);
+  void light_through(std::span<const CellTransport::PictureLight> all, std::vector<Vec3f>& passed);
+  struct ShadowPlan;
+  void find_smooth_squares(const CellMask& receiving, CellTransport::Shadowed& centres) const;
+  bool is_soft_in(std::size_t bit,
+                  const CellTransport::Shadowed& centres,
+                  Vec3f direction,
+                  float cone_rad) const;
+  void plan_square(std::size_t bit,
+                   const CellTransport::Shadowed& centres,
+                   Vec3f direction,
+                   float cone_rad,
+                   ShadowPlan& plan) const;
+  bool shade_centres_by_pictures(const CellTransport::Shadowed& centres,
+                                 const LitCentres& lit_centres,
+                                 const CellVisibility& visibility,
+                                 LostLight& lost);
+  bool look_for_light(const ShadowPlan& plan,
+                      const CellTransport::Shadowed& centres,
+                      Vec3f direction,
+                      float cone_rad);
+  void shoot_at_pictures();
+
   // cell_bounce.cpp
   void mark_passed(std::size_t count);
   void bounce();
+  static void set_bounced_cone(ShadePoint& p,
+                               const Spread& steps,
+                               const Spread& spread,
+                               float roughness,
+                               bool one_of_many,
+                               float far_m);
   void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
 
   // cell_mirrored.cpp
@@ -262,7 +338,7 @@ class CellBaker final : public RaySink {
 
   // cell_bent.cpp
   void leave_bent(
-      std::size_t slot, std::uint32_t pixel, Vec3f direction, const Spread& spread, Vec3f weight);
+      std::size_t slot, std::size_t target, Vec3f direction, const Spread& spread, Vec3f weight);
   void add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point);
   bool add_plate(std::size_t slot,
                  std::size_t target,
@@ -279,6 +355,7 @@ class CellBaker final : public RaySink {
   };
   void pack();
   void pack_bases();
+  void pack_places();
   void pack_lights(std::vector<CellTransport::LightTerm>& terms);
   void add_light(const CellTransport::LightTerm& term);
   void add_place(const EnvironmentTerm& term);
@@ -398,7 +475,8 @@ class CellBaker final : public RaySink {
   std::array<int, cell_pixels> sent_{};  // rays that surfaces have sent on, by pixel
 
   std::array<Sample, slots> samples_;  // centres, then further ones shaded on their own
-  std::array<CellTransport::Base, slots> base_;
+  // Of all slots, those of picture rays too.
+  std::array<CellTransport::Base, CellPicture::all_slots> base_;
   std::array<Light, cell_pixels> light_;  // at what the centres met
   std::array<Met, ring_pixels> met_;
   std::array<Vec3f, slots> first_;          // of `added`, what the first surface gives
@@ -441,8 +519,18 @@ class CellBaker final : public RaySink {
   float blend_contrast_ = 0;       // 0 = neighbours are not blended
   bool cuts_glass_later_ = false;  // rays inside clear bodies are followed further than others
   int x0_ = 0, y0_ = 0;
-  int block_ = 1;      // pixels a side that share a camera ray
-  CellMask inside_{};  // pixels that have one
+  int block_ = 1;                // pixels a side that share a camera ray
+  CellMask inside_{};            // pixels that have one
+  bool sets_centres_ = false;    // receivers are centres', or what these mirror
+  bool past_pictures_ = false;   // live pictures are passed; of this frame's, see `transport_`
+  bool needs_pictures_ = false;  // ... which will not do: the cell is to be found with them
+  // What rays saw of pictures, how far they came, and where they end, while they are looked along.
+  std::array<CellPictures::Seen, stream_rays> along_;
+  std::array<float, stream_rays> came_m_, end_m_;
+  std::vector<Scene::Bounds> pictures_at_;
+  bool takes_no_tree_ = false;  // what they dim
+  std::array<float, stream_rays> shadow_width_m_, shadow_cone_rad_;
+  ColourPlanes hidden_;  // of one light, from centres
 };
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.

@@ -12,26 +12,24 @@ namespace render {
 // plate, if that lies in the picture, or the environment. What the plate adds is planned by the
 // environment, so that what is decided by it does not change with the plate.
 void CellBaker::leave_bent(
-    std::size_t slot, std::uint32_t pixel, Vec3f direction, const Spread& spread, Vec3f weight) {
+    std::size_t slot, std::size_t target, Vec3f direction, const Spread& spread, Vec3f weight) {
   ShadePoint p{};
   p.incoming = direction;
   p.throughput = weight;
   p.kind = RayKind::bent;
-  p.pixel = pixel;
-  p.slot = static_cast<std::uint32_t>(slot);
   ShadePoint* const leaving = &p;
   const Scene& scene = *frame_->inputs.scene;
   scene.background().shade({&scene.description(), &scene}, {&leaving, 1});
   Vec3f sees_environment = p.environment_share;
   if (p.plate_share != Vec3f{}) {
     const float width_rad = std::sqrt(length(spread.a) * length(spread.b));
-    if (!add_plate(slot, target_of(p), direction, width_rad, direction, weight * p.plate_share,
+    if (!add_plate(slot, target, direction, width_rad, direction, weight * p.plate_share,
                    CellTransport::BentPlate::lit)) {
       sees_environment += p.plate_share;
     }
   }
   if (sees_environment != Vec3f{}) {
-    add_environment(slot, target_of(p), direction, 0, spread, false, weight * sees_environment);
+    add_environment(slot, target, direction, 0, spread, false, weight * sees_environment);
   }
 }
 

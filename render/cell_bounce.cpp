@@ -32,6 +32,19 @@ void CellBaker::mark_passed(std::size_t count) {
   }
 }
 
+// How wide a ray looks that came so far.
+void CellBaker::set_bounced_cone(ShadePoint& p,
+                                 const Spread& steps,
+                                 const Spread& spread,
+                                 float roughness,
+                                 bool one_of_many,
+                                 float far_m) {
+  arrive(p, steps, spread, far_m);
+  // A ray all over a lobe stands for a part of it, and these overlap.
+  p.blur_m = one_of_many ? overlap * std::sqrt(length(cross(p.steps.a, p.steps.b)))
+                         : far_m * lobe_width(roughness);
+}
+
 // What a cut ray meets is not shaded: it is taken for a surface like that which mirrors it, in the
 // light of what the pixel shows. What lets light through does not count.
 void CellBaker::meet_surroundings(const QueuedRay& ray, std::size_t i) {
@@ -79,34 +92,36 @@ void CellBaker::bounce() {
       const QueuedRay& q = queue_[from + i];
       const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
       const std::size_t target = target_of(q);
-      if (!hit && q.beyond_cut) continue;
-      if (!hit && q.kind != RayKind::camera) {
-        if (q.kind == RayKind::bent) {
-          leave_bent(q.slot, q.pixel, q.direction, q.spread, q.throughput);
-        } else if (q.kind == RayKind::reflection) {
-          add_environment(q.slot, target, q.sees, q.roughness, q.spread, q.one_of_many,
-                          q.throughput);
-        }
-        continue;
-      }
       if (hit && q.surroundings != Vec3f{}) {
         meet_surroundings(q, i);
         continue;
       }
-      if (hit && q.beyond_cut && q.kind == RayKind::bent) {
-        leave_bent(q.slot, q.pixel, q.direction, q.spread, -q.throughput);
-      } else if (hit && (q.kind == RayKind::difference || q.beyond_cut)) {
-        add_environment(q.slot, target, q.sees, q.roughness, q.spread, q.one_of_many,
-                        -q.throughput);
+      const std::uint16_t behind =
+          q.surroundings == Vec3f{} && may_be_passed(q.origin, q.direction, stream_.far_m[i])
+              ? add_picture_ray(q, stream_.far_m[i])
+              : q.behind;
+      const bool before_pictures = behind != q.behind;
+      // What it counts as is not what it meets, but by how much that differs from what is straight
+      // on.
+      const bool as_difference = q.kind == RayKind::difference || q.beyond_cut;
+      const auto see_straight_on = [&](std::size_t to, Vec3f weight) {
+        if (q.kind == RayKind::bent) {
+          leave_bent(q.slot, to, q.direction, q.spread, weight);
+        } else {
+          add_environment(q.slot, to, q.sees, q.roughness, q.spread, q.one_of_many, weight);
+        }
+      };
+      if (!hit && !before_pictures && as_difference) continue;
+      if (as_difference) see_straight_on(target, -q.throughput);
+      if (!hit && q.kind != RayKind::camera) {
+        see_straight_on(behind != no_picture_ray ? slots + behind : target, q.throughput);
+        continue;
       }
       ShadePoint& p =
           hit ? points_[static_cast<std::size_t>(count++)] : points_[stream_rays - ++leaving];
       set_point(p, static_cast<int>(i), q.pixel, q.slot);
       if (!hit) group_[leaving - 1] = &p;
-      if (hit) arrive(p, q.steps, q.spread, stream_.far_m[i]);
-      p.blur_m = hit ? stream_.far_m[i] * lobe_width(q.roughness) : 0;
-      // It stands for a part of a lobe whose parts overlap.
-      if (q.one_of_many) p.blur_m = overlap * std::sqrt(length(cross(p.steps.a, p.steps.b)));
+      if (hit) set_bounced_cone(p, q.steps, q.spread, q.roughness, q.one_of_many, stream_.far_m[i]);
       p.throughput = q.throughput;
       if (hit && q.media.count > 0) {
         p.throughput =
@@ -119,6 +134,7 @@ void CellBaker::bounce() {
       p.media = q.media;
       p.kind = q.kind == RayKind::difference ? RayKind::reflection : q.kind;
       p.depth = q.depth;
+      p.behind = behind;
       p.path = q.path;
     }
     queue_.resize(from);

@@ -211,7 +211,7 @@ void CellBaker::add_asked(const ShadePoint& p, const AskedAgain& asked) {
     lamp_terms_.push_back({target, asked.number, weight});
     samples_[p.slot].added += weight * planned.lamps[asked.number].intensity;
   } else {
-    add_light({target, asked.number, weight});
+    add_light_past_pictures(p, planned.lights[asked.number].direction, asked.number, weight);
     samples_[p.slot].added += weight * planned.lights[asked.number].irradiance;
   }
 }

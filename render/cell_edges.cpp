@@ -137,7 +137,7 @@ void CellBaker::shade_ring() {
   sent_ = sent;
   transport_ = &own;
   std::swap(aside_.reach, own.reach);
-  std::fill(base_.begin() + cell_pixels, base_.end(), CellTransport::Base{});
+  std::fill_n(base_.begin() + cell_pixels, cell_pixels, CellTransport::Base{});
   for (std::size_t i = 0; i < around; ++i) {
     mirrored_[i] = samples_[cell_pixels + i].added - first_[cell_pixels + i];
   }
@@ -344,10 +344,25 @@ void CellBaker::finish_further(int count) {
   for (int i = 0; i < count; ++i) {
     const Further& f = further_[static_cast<std::size_t>(i)];
     const int neighbour = neighbour_of(i, f);
-    if (neighbour >= 0 && edge_[f.pixel] == Edge::surface) {
+    const bool shares = neighbour >= 0 && edge_[f.pixel] == Edge::surface;
+    std::uint16_t behind = no_picture_ray;
+    if (past_pictures_) {
+      compare_with_centre(i, f);
+      const auto ray = static_cast<std::size_t>(i);
+      behind = look_apart(
+          f, {stream_.dx[ray], stream_.dy[ray], stream_.dz[ray]},
+          hides_pictures(i) ? stream_.far_m[ray] : ray_far, finer,
+          shares ? static_cast<std::uint16_t>(neighbour) : CellTransport::PictureRay::no_lender);
+    }
+    if (shares) {
       sample_of_ray[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(neighbour);
-      take_from_centre(f.pixel, neighbour % cell_size - f.pixel % cell_size,
-                       neighbour / cell_size - f.pixel / cell_size, 1);
+      const auto centre = static_cast<std::size_t>(neighbour);
+      if (behind != no_picture_ray) {
+        add_further(f.pixel, samples_[centre], 1);
+      } else {
+        take_from_centre(f.pixel, neighbour % cell_size - f.pixel % cell_size,
+                         neighbour / cell_size - f.pixel / cell_size, 1);
+      }
       continue;
     }
     const std::size_t slot = cell_pixels + used;
@@ -358,6 +373,7 @@ void CellBaker::finish_further(int count) {
     ShadePoint& p =
         hit ? points_[static_cast<std::size_t>(shaded++)] : points_[stream_rays - ++leaving];
     set_point(p, i, f.pixel, static_cast<std::uint32_t>(slot));
+    p.behind = behind;
     if (hit) set_camera_cone(p, i, finer);
     if (hit && neighbour >= 0 && edge_[f.pixel] != Edge::shadow)
       lender_[static_cast<std::size_t>(shaded - 1)] = static_cast<std::int16_t>(neighbour);
@@ -403,13 +419,17 @@ void CellBaker::end_batch() {
 void CellBaker::sample_edges() {
   const bool takes_centre = effort_.aa_samples <= few_samples;
   mirrors_ = {};
+  if (past_pictures_) keep_distances();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     const bool mirrors = sent_[k] > 0 || samples_[k].added != first_[k];
     mirrors_[k / 64] |= std::uint64_t{mirrors} << (k % 64);
     if (!takes_rays(k)) continue;
     clear_further(k);
+    if (past_pictures_ && pictures_may_part(k)) {
+      transport_->looks_apart[k / 64] |= std::uint64_t{1} << (k % 64);
+    }
     if (!takes_centre) continue;
-    borrowed_[k][own_centre] = 1;
+    if (!centre_looks_apart(k)) borrowed_[k][own_centre] = 1;
     add_further(k, samples_[k], 1);
     ++batches_[k];
   }

@@ -9,36 +9,10 @@
 #include "render/cell_baker.h"
 #include "render/embree_context.h"
 #include "render/kept_transport.h"
+#include "render/straight_on.h"
 
 namespace render {
 namespace {
-
-// Pictures behind each other that are looked at; what shows through the last one is what blocks
-// share.
-constexpr int most_pictures = 16;
-// Less of a pixel than that is not looked for behind a picture.
-constexpr float least_share = 1.0F / 512;
-
-// What surfaces send on, where that is one ray straight through each: else there is no foreground.
-class StraightOn final : public RaySink {
- public:
-  explicit StraightOn(const ShadePoint* points) : points_(points) { share_.fill({}); }
-  void push(const ShadePoint& from, const NewRay& ray) override {
-    const auto i = static_cast<std::size_t>(&from - points_);
-    broken_ = broken_ || ray.normal != Vec3f{} || ray.kind != RayKind::camera || ray.media ||
-              share_[i] != Vec3f{};
-    origin_[i] = ray.origin;
-    share_[i] = ray.throughput;
-  }
-  bool broken() const { return broken_; }
-  Vec3f origin(std::size_t i) const { return origin_[i]; }
-  Vec3f share(std::size_t i) const { return share_[i]; }
-
- private:
-  const ShadePoint* points_;
-  std::array<Vec3f, stream_rays> origin_, share_;
-  bool broken_ = false;
-};
 
 bool only_glows(const ShadePoint& p) {
   return p.video.index < 0 && p.diffuse == Vec3f{} && p.plate_share == Vec3f{} &&
@@ -64,13 +38,13 @@ bool CellBaker::may_see_pictures() const {
   return false;
 }
 
-// Sets a ray through each of the cell's pixels.
-void CellBaker::set_rays_of_all_pixels() {
+// Sets a ray through each of the cell's pixels that are in the picture.
+void CellBaker::set_rays_of_all_pixels(const CellTransport::Blocks& in_picture) {
   const auto& table = *frame_->inputs.directions;
   for (int i = 0; i < cell_pixels; ++i) {
     const auto [x, y] = pixel_of_ray(i);
     Vec3f v_cam{};
-    if (x < transport_->blocks.columns && y < transport_->blocks.rows) {
+    if (x < in_picture.columns && y < in_picture.rows) {
       const std::size_t t = table.index(y0_ + y, x0_ + x);
       v_cam = {table.x[t], table.y[t], table.z[t]};
     }
@@ -121,7 +95,7 @@ int CellBaker::meet_pictures(std::span<const float, cell_pixels> came_m,
 void CellBaker::see_foreground() {
   const Scene& scene = *frame_->inputs.scene;
   if (block_ == 1 || scene.pictures().empty() || !may_see_pictures()) return;
-  set_rays_of_all_pixels();
+  set_rays_of_all_pixels(transport_->blocks);
   const ShadeContext context{&scene.description(), &scene, scene.pictures(), scene.prepared(),
                              TextureFilter::quick};
   std::array<Vec3f, cell_pixels> radiance{}, left;  // by ray

@@ -17,6 +17,7 @@ void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_poin
     const Vec3f intensity = planned(i);
     for (std::size_t k = 0; k < cell_pixels; ++k) {
       light_[k].lamps += intensity * cell.factors[i].at[k];
+      if (cell.factors[i].at[k] > 0) ask_lamp(receivers_, k, cell.numbers[i]);
     }
   }
   for (const TintedLight& tint : cell.tints) {
@@ -40,6 +41,7 @@ void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver
   for (const PointLamp& l : reached_) {
     const std::size_t i = point_of_receiver[l.point];
     const ShadePoint& p = points_[i];
+    ask_lamp(receivers_, l.point, l.lamp);
     const Vec3f factor = l.factor();
     const Vec3f irradiance = factor * frame_->planned_table->lamps[l.lamp].intensity;
     const Vec3f weight = p.throughput * p.diffuse * factor;
@@ -61,6 +63,7 @@ void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver
 // At a stand-in's point that has the light of a centre.
 void CellBaker::catch_lamps(const ShadePoint& p, std::size_t centre, Vec3f irradiance) {
   if (!p.catches_lamps || irradiance == Vec3f{}) return;
+  needs_pictures_ = needs_pictures_ || p.behind != no_picture_ray;
   transport_->catchers.push_back({static_cast<std::uint16_t>(target_of(p)),
                                   static_cast<std::uint32_t>(centre), p.throughput, p.albedo});
   const Vec3f caught = p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);

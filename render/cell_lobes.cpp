@@ -189,7 +189,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
       base.passed += mean(ray.throughput);
       base.seen += mean(ray.throughput);
     } else if (ray.kind == RayKind::bent) {
-      leave_bent(from.slot, from.pixel, ray.direction, cone, ray.throughput);
+      leave_bent(from.slot, target_of(from), ray.direction, cone, ray.throughput);
     } else if (ray.kind == RayKind::reflection) {
       add_environment(from.slot, target_of(from), sees, ray.roughness, cone, one_of_many,
                       ray.throughput);
@@ -202,7 +202,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   ++sent_[from.pixel];
   queue_.push_back({ray.origin, ray.direction, ray.throughput, sees, ray.spread, from.steps,
                     ray.roughness, from.pixel, from.slot, ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1), one_of_many, lamps,
+                    static_cast<std::uint8_t>(from.depth + 1), from.behind, one_of_many, lamps,
                     followed > 0 && followed < 1, false, next_path(from.path, pushed_), media,
                     asks ? from.diffuse : Vec3f{}});
 }
@@ -329,7 +329,12 @@ void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share)
   if (!(density > 0)) return;
   const ShadePoint& p = *lobe.point;
   const Vec3f weight = lobe.throughput * share * density;
-  add_light({static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
+  if (past_pictures_) {
+    add_light_past_pictures(p, frame_->planned_table->lights[light].direction, light, weight);
+  } else {
+    add_light(
+        {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
+  }
   samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;
 }
 

@@ -98,15 +98,19 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
   r.mirrored = true;
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     r.nx[k] = r.ny[k] = r.nz[k] = 0;
+    sets_centres_ = true;
     if (in(mirrored, k)) set_receiver(k, points_[mirrored_at_[k]]);
+    sets_centres_ = false;
   }
   count_shadow_rays(
       cell_pixels, [&](std::size_t k) { return k; },
       [&] { gather_cell(shadow_rays_, r, gather_, t.mirrored_visibility, *statistics_); });
+  keep_shadowed(t.mirrored_visibility, mirrored, t.mirrored_shadowed);
   r.mirrored = false;
   t.mirrored_receiving = mirrored;
   CellTransport::Mirrored& to = t.mirrored.emplace_back();
   to.nx = r.nx, to.ny = r.ny, to.nz = r.nz;
+  to.slot.fill(0);
   to.diffuse.r.fill(0), to.diffuse.g.fill(0), to.diffuse.b.fill(0);
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!in(mirrored, k)) continue;
@@ -114,6 +118,7 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
     const Vec3f open = r.light.open(k);
     light_of_point_[mirrored_at_[k]] = {open, r.light.arriving(k), {}};
     to.diffuse.put(k, p.throughput * p.diffuse);
+    to.slot[k] = static_cast<std::uint16_t>(target_of(p));
     const float reach_m = reach_of_neighbours * (length(p.steps.a) + length(p.steps.b));
     mirrored_hits_[k] = {p.hit.instance, p.hit.material, reach_m,
                          p.light_normal, p.hit.position, light_of_point_[mirrored_at_[k]].arriving};

@@ -14,6 +14,7 @@ namespace render {
 namespace {
 
 std::uint32_t key_of(const CellTransport::SharedTerm& s) {
+  static_assert(CellPicture::all_slots <= 1U << 14);
   return (s.slot * 65536U + s.centre) * 4U + static_cast<std::uint32_t>(s.of);
 }
 
@@ -61,12 +62,16 @@ void join_into(EnvironmentTerm& to, const EnvironmentTerm& from) {
 template <class Term>
 void sort_by_slot(std::vector<Term>& terms) {
   if (terms.empty()) return;  // as most lists are where one ray a pixel meets dull things
-  std::array<std::uint32_t, slots + 1> first{};
+  constexpr std::size_t all = CellPicture::all_slots;
+  const std::size_t count = std::size_t{std::ranges::max(terms, {}, &Term::slot).slot} + 1;
+  std::array<std::uint32_t, all + 1> first;
+  std::fill_n(first.begin(), count + 1, 0U);
   for (const Term& term : terms) ++first[term.slot + 1U];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  std::array<std::uint32_t, slots> next;
-  std::copy_n(first.begin(), slots, next.begin());
-  for (std::size_t slot = 0; slot < slots; ++slot) {
+  const auto end = first.begin() + static_cast<std::ptrdiff_t>(count) + 1;
+  std::partial_sum(first.begin(), end, first.begin());
+  std::array<std::uint32_t, all> next;
+  std::copy_n(first.begin(), count, next.begin());
+  for (std::size_t slot = 0; slot < count; ++slot) {
     for (; next[slot] < first[slot + 1]; ++next[slot]) {
       Term& here = terms[next[slot]];
       while (here.slot != slot) std::swap(here, terms[next[here.slot]++]);
@@ -83,7 +88,7 @@ void CellBaker::pack() {
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
   t.empty = t.receiving == CellMask{} && t.mirrored.empty() && places_.empty() &&
             t.lights.empty() && t.bent.empty() && t.video.empty() && lamp_terms_.empty() &&
-            t.foreground.empty();
+            t.foreground.empty() && t.picture_rays.empty() && t.picture_lights.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;
@@ -100,7 +105,7 @@ void CellBaker::pack() {
   pack_lights(lamp_terms_);
   t.lamp_terms = lamp_terms_;
   join_places(effort_.aa_samples > 1);  // a picture of one ray a pixel is hardly kept
-  t.environment.pack(places_, frame_->planned_levels);
+  pack_places();
   std::ranges::sort(t.shared, {}, [](const CellTransport::SharedTerm& s) {
     return key_of(s);
   });  // in place: nothing is allocated
@@ -108,8 +113,29 @@ void CellBaker::pack() {
   if (none(t.receiving)) t.centres.clear();
 }
 
+// Those of slots behind picture rays apart.
+void CellBaker::pack_places() {
+  CellTransport& t = *transport_;
+  constexpr std::size_t step = EnvironmentTerms::slots;
+  std::span<EnvironmentTerm> left(places_);
+  const auto take = [&](std::size_t first, EnvironmentTerms& to) {
+    const auto end = std::ranges::lower_bound(left, first + step, {}, &EnvironmentTerm::slot);
+    const auto own = left.first(static_cast<std::size_t>(end - left.begin()));
+    for (EnvironmentTerm& term : own) term.slot = static_cast<std::uint16_t>(term.slot - first);
+    to.pack(own, frame_->planned_levels);
+    left = left.subspan(own.size());
+  };
+  static_assert(slots == step);
+  take(0, t.environment);
+  for (std::size_t first = slots; first < slots + t.picture_rays.size(); first += step) {
+    take(first, t.environments_behind.emplace_back());
+  }
+}
+
 void CellBaker::pack_bases() {
   CellTransport& t = *transport_;
+  const auto behind = base_.begin() + slots;
+  t.bases_behind.assign(behind, behind + static_cast<std::ptrdiff_t>(t.picture_rays.size()));
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     // Likely the latest, or one of the first.
     const std::size_t latest = t.bases.size() - 1;
@@ -267,7 +293,8 @@ bool CellBaker::halve_faint_places() {
 // changes.
 void CellBaker::join_wider_places() {
   const std::uint16_t slot = keyed_places_.front().term.slot;
-  const auto samples = slot < cell_pixels ? 1.0F : static_cast<float>(counts_[slot - cell_pixels]);
+  const bool of_centre = slot < cell_pixels || slot >= slots;
+  const auto samples = of_centre ? 1.0F : static_cast<float>(counts_[slot - cell_pixels]);
   float left = most_change * samples;
   // They are in order of levels, and wider ones have higher numbers.
   for (auto place = keyed_places_.begin(); place != keyed_places_.end(); ++place) {

@@ -222,11 +222,15 @@ bool MovedThings::may_be_seen(const CellCone& cone, Vec3f camera) const {
   });
 }
 
-bool MovedThings::may_change(const CellReach& reach) const {
-  return have_common(reach.passed, filled_) || have_common(reach.lit, shaded_) ||
-         (!is_empty(reach.lit_outside) &&
-          (may_shade(reach.lit_outside) || std::ranges::any_of(relit_, [&](const auto& bounds) {
-             return overlap(bounds, reach.lit_outside);
+bool MovedThings::may_be_passed(const CellReach& reach) const {
+  return have_common(reach.passed, filled_);
+}
+
+bool MovedThings::may_light(const CellReach::Receivers& receivers) const {
+  return have_common(receivers.boxes, shaded_) ||
+         (!is_empty(receivers.outside) &&
+          (may_shade(receivers.outside) || std::ranges::any_of(relit_, [&](const auto& bounds) {
+             return overlap(bounds, receivers.outside);
            })));
 }
 

@@ -43,16 +43,33 @@ class SpaceGrid {
 // What a cell depends on beside its camera rays.
 struct CellReach {
   SpaceGrid::Mask passed{};  // boxes that bounced rays cross
-  SpaceGrid::Mask lit{};     // that hold points from which shadow rays go
-  Scene::Bounds lit_outside = no_bounds;
+  // Points from which shadow rays go: of all; of those that are not a grid of centres'.
+  struct Receivers {
+    SpaceGrid::Mask boxes{};  // that hold any
+    Scene::Bounds outside = no_bounds;
 
-  void add_receiver(const SpaceGrid& grid, Vec3f p) {
-    if (const int box = grid.box_at(p); box >= 0) {
-      const auto i = static_cast<std::size_t>(box);
-      lit[i / 64] |= std::uint64_t{1} << (i % 64);
-    } else {
-      lit_outside = joined(lit_outside, {p, p});
+    void add(const Receivers& other) {
+      for (std::size_t i = 0; i < boxes.size(); ++i) boxes[i] |= other.boxes[i];
+      outside = joined(outside, other.outside);
     }
+    void add(const SpaceGrid& grid, Vec3f p) {
+      if (const int box = grid.box_at(p); box >= 0) {
+        const auto i = static_cast<std::size_t>(box);
+        boxes[i / 64] |= std::uint64_t{1} << (i % 64);
+      } else {
+        outside = joined(outside, {p, p});
+      }
+    }
+  };
+  Receivers lit, lit_apart;
+
+  void add(const CellReach& other) {
+    for (std::size_t i = 0; i < passed.size(); ++i) passed[i] |= other.passed[i];
+    lit.add(other.lit), lit_apart.add(other.lit_apart);
+  }
+  void add_receiver(const SpaceGrid& grid, Vec3f p, bool of_centre = false) {
+    lit.add(grid, p);
+    if (!of_centre) lit_apart.add(grid, p);
   }
 };
 
@@ -85,7 +102,12 @@ class MovedThings {
               std::vector<Scene::Bounds> relit = {});
 
   bool may_be_seen(const CellCone& cone, Vec3f camera) const;
-  bool may_change(const CellReach& reach) const;
+  bool may_change(const CellReach& reach) const {
+    return may_be_passed(reach) || may_light(reach.lit);
+  }
+  // Whether bounced rays may meet it; whether light may come otherwise to points.
+  bool may_be_passed(const CellReach& reach) const;
+  bool may_light(const CellReach::Receivers& receivers) const;
 
  private:
   bool may_shade(const Scene::Bounds& receivers) const;

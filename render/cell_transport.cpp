@@ -6,7 +6,9 @@
 #include <cstddef>
 #include <cstring>
 #include <numbers>
+#include <numeric>
 
+#include "render/blocker_boxes.h"
 #include "render/lanes.h"
 #include "render/stand_in_parameters.h"
 
@@ -39,17 +41,18 @@ void add_lamps(const CellTransport& cell, const FrameLight& light, RelightWorksp
 
 void light_mirrored(const CellTransport& cell,
                     const FrameLight& light,
+                    const LostLight* more_lost,
                     RelightWorkspace& w,
                     CellPicture& picture) {
   if (cell.mirrored.empty()) return;
   const CellTransport::Mirrored& m = cell.mirrored.front();
   add_up_light({cell.mirrored_receiving, m.nx, m.ny, m.nz}, light.lights, cell.mirrored_visibility,
-               w.mirrored, w.soft);
+               w.mirrored, w.soft, more_lost);
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!in(cell.mirrored_receiving, k)) continue;
     const Vec3f arriving = w.mirrored.arriving(k);
     w.mirrored_arriving.put(k, arriving);
-    picture.added[k] += four_of(m.diffuse.at(k) * arriving);
+    picture.added[m.slot[k]] += four_of(m.diffuse.at(k) * arriving);
   }
 }
 
@@ -139,20 +142,36 @@ void light_catchers(const CellTransport& cell,
   }
 }
 
+// Of light that passes pictures, if that stands for so many of which no other is dimmed.
+Vec3f passed_of(Vec3f passed, float stands_for) {
+  const Vec3f all{1, 1, 1};
+  return stands_for == 1 ? passed : all - (all - passed) * stands_for;
+}
+
 // Shadows on points that are no centres.
 void light_shadow_points(const CellTransport& cell,
                          const FrameLight& light,
+                         const CellPictures* pictures,
                          RelightWorkspace& w,
                          CellPicture& picture) {
   w.open_at_points.clear();
   w.passing_at_points.clear();
+  const bool dims = pictures && !pictures->shadowed_through.empty();
+  std::size_t dimmed = 0;  // of the picture shadows, which are in order
   for (const CellTransport::ShadowPoint& point : cell.shadow_points) {
     Vec3f open{}, lost{};
     for (std::uint32_t i = point.first; i < point.first + point.count; ++i) {
       const CellTransport::ShadowLight& s = cell.shadow_lights[i];
       const Vec3f e = light.lights[s.light].irradiance;
       open += e * s.open;
-      lost += e * s.lost;
+      Vec3f own_lost = s.lost;
+      if (dims && dimmed < cell.picture_shadows.size() && cell.picture_shadows[dimmed].slot == i) {
+        const Vec3f all{s.open, s.open, s.open};
+        own_lost = all - (all - own_lost) * passed_of(pictures->shadowed_through[dimmed],
+                                                      cell.picture_shadows[dimmed].stands_for);
+        ++dimmed;
+      }
+      lost += e * own_lost;
     }
     w.passing_at_points.push_back(passing(open, lost));
     picture.share[point.slot] += with_mean(point.share * w.passing_at_points.back());
@@ -187,6 +206,46 @@ void fill_blocks(const CellTransport::Blocks& blocks, CellPicture& picture) {
   }
 }
 
+// What rays see that pictures may come before: the last ones first, for a ray may have been sent on
+// by what another one met.
+void show_picture_rays(const CellTransport& cell,
+                       const CellPictures* pictures,
+                       CellPicture& picture) {
+  const bool seen = pictures && !pictures->along.empty();
+  const auto show = [&](std::size_t i) {
+    const CellTransport::PictureRay& ray = cell.picture_rays[i];
+    const std::size_t from = slots + i, to = ray.target;
+    if (ray.lender != CellTransport::PictureRay::no_lender) {
+      picture.added[from] += picture.added[ray.lender];
+      picture.share[from] += picture.share[ray.lender];
+      picture.seen[from] += picture.seen[ray.lender];
+    }
+    if (!seen) {
+      picture.added[to] += picture.added[from];
+      picture.share[to] += picture.share[from];
+      picture.seen[to] += picture.seen[from];
+      return;
+    }
+    const auto& [radiance, seen_through] = pictures->along[i];
+    const Vec3f passed = passed_of(seen_through, ray.stands_for);
+    const Four share{passed.x, passed.y, passed.z, mean(passed)};
+    picture.added[to] +=
+        four_of(ray.throughput * radiance * ray.stands_for) + share * picture.added[from];
+    picture.share[to] += share * picture.share[from];
+    picture.seen[to] += share[3] * picture.seen[from];
+  };
+  bool any_lent = false;
+  for (std::size_t i = cell.picture_rays.size(); i-- > 0;) {
+    const bool lent = cell.picture_rays[i].lender != CellTransport::PictureRay::no_lender;
+    any_lent = any_lent || lent;
+    if (!lent) show(i);
+  }
+  // Centres are whole now.
+  for (std::size_t i = 0; any_lent && i < cell.picture_rays.size(); ++i) {
+    if (cell.picture_rays[i].lender != CellTransport::PictureRay::no_lender) show(i);
+  }
+}
+
 void show_foreground(const CellTransport::Foreground& foreground, CellPicture& picture) {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     const Four passed = foreground.passed[k];
@@ -212,6 +271,14 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
          (texel(y1, x0) * (1 - u) + texel(y1, x1) * u) * v;
 }
 
+Scene::Bounds CellTransport::Shadowed::box(const CellMask& centres) const {
+  Scene::Bounds box = no_bounds;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (in(centres, k)) box = joined(box, {position(k), position(k)});
+  }
+  return box;
+}
+
 void CellTransport::clear() {
   empty = true;
   blocks = {};
@@ -225,6 +292,11 @@ void CellTransport::clear() {
   lamps.numbers.clear(), lamps.factors.clear(), lamps.tints.clear();
   lamp_terms.clear(), catchers.clear(), caught.clear();
   bent.clear(), bent_caustics.clear(), video.clear(), borrowed.clear(), further.clear();
+  past_pictures = false;
+  far_m.clear();
+  picture_rays.clear(), bases_behind.clear(), environments_behind.clear();
+  picture_shadows.clear(), looks_apart = {}, nearest_m = farthest_m = 0;
+  picture_lights.clear(), shadowed.clear(), mirrored_shadowed.clear();
   reach = {};
   rays = 0;
   counts.clear();
@@ -239,7 +311,11 @@ std::size_t CellTransport::bytes() const {
          of(foreground) + of(bases) + of(centres) + of(shared) + of(lights) + environment.bytes() +
          of(shadow_points) + of(shadow_lights) + of(lamps.numbers) + of(lamps.factors) +
          of(lamps.tints) + of(lamp_terms) + of(catchers) + of(caught) + of(bent) +
-         of(bent_caustics) + of(video) + of(borrowed) + of(further) + of(counts);
+         of(bent_caustics) + of(video) + of(borrowed) + of(further) + of(counts) + of(far_m) +
+         of(picture_rays) + of(bases_behind) + of(environments_behind) +
+         std::accumulate(environments_behind.begin(), environments_behind.end(), std::size_t{0},
+                         [](std::size_t sum, const auto& e) { return sum + e.bytes(); }) +
+         of(picture_lights) + of(picture_shadows) + of(shadowed) + of(mirrored_shadowed);
 }
 
 void relight(const CellTransport& cell,
@@ -247,19 +323,25 @@ void relight(const CellTransport& cell,
              std::span<const Four, cell_pixels> plate,
              RelightWorkspace& w,
              CellPicture& picture,
-             RenderStatistics& statistics) {
+             RenderStatistics& statistics,
+             const CellPictures* pictures) {
   if (!none(cell.receiving)) {
     const CellTransport::Centres& c = cell.centres.front();
-    add_up_light({cell.receiving, c.nx, c.ny, c.nz}, light.lights, cell.visibility, w.light,
-                 w.soft);
+    add_up_light({cell.receiving, c.nx, c.ny, c.nz}, light.lights, cell.visibility, w.light, w.soft,
+                 pictures && pictures->shades ? &pictures->lost : nullptr);
     add_lamps(cell, light, w);
   }
   light_centres(cell, w, picture);
-  light_mirrored(cell, light, w, picture);
+  for (std::size_t i = 0; i < cell.bases_behind.size(); ++i) {
+    show_base(cell.bases_behind[i], slots + i, picture);
+  }
+  light_mirrored(cell, light,
+                 pictures && pictures->shades_mirrored ? &pictures->mirrored_lost : nullptr, w,
+                 picture);
   for (const CellTransport::Further& f : cell.further) {
     show_base(f.base, cell_pixels + f.pixel, picture);
   }
-  light_shadow_points(cell, light, w, picture);
+  light_shadow_points(cell, light, pictures, w, picture);
   light_catchers(cell, light, plate, w, picture, statistics);
   for (const CellTransport::SharedTerm& s : cell.shared) {
     if (s.of == CellTransport::SharedTerm::Of::shadow) {
@@ -282,7 +364,20 @@ void relight(const CellTransport& cell,
   for (const CellTransport::LightTerm& l : cell.lamp_terms) {
     picture.added[l.slot] += four_of(l.weight * light.lamps[l.light].intensity);
   }
-  cell.environment.add_light(light.environment, picture.added);
+  for (std::size_t i = 0; i < cell.picture_lights.size(); ++i) {
+    const CellTransport::PictureLight& l = cell.picture_lights[i];
+    const Vec3f passed = pictures && !pictures->lit_through.empty()
+                             ? passed_of(pictures->lit_through[i], l.stands_for)
+                             : Vec3f{1, 1, 1};
+    picture.added[l.slot] += four_of(l.weight * passed) * light.irradiances[l.light];
+  }
+  constexpr std::size_t step = EnvironmentTerms::slots;
+  const std::span<Four> added(picture.added);
+  cell.environment.add_light(light.environment, added.first<step>());
+  for (std::size_t i = 0; i < cell.environments_behind.size(); ++i) {
+    cell.environments_behind[i].add_light(light.environment,
+                                          added.subspan(slots + i * step).first<step>());
+  }
   for (const CellTransport::BentPlate& b : cell.bent) {
     const Vec3f share =
         b.point == CellTransport::BentPlate::lit ? Vec3f{1, 1, 1} : w.passing_at_points[b.point];
@@ -291,6 +386,7 @@ void relight(const CellTransport& cell,
   for (const CellTransport::VideoTerm& v : cell.video) {
     picture.added[v.slot] += four_of(v.weight * plate_at(*light.levels[v.level], v.x, v.y));
   }
+  show_picture_rays(cell, pictures, picture);
   // Pixels of further samples: their own sums, and what they share of centres, of their own too.
   for (const CellTransport::Borrowed& b : cell.borrowed) {
     const auto n = static_cast<float>(b.count);
@@ -309,6 +405,7 @@ void relight(const CellTransport& cell,
   }
   if (cell.blocks.size > 1) fill_blocks(cell.blocks, picture);
   if (!cell.foreground.empty()) show_foreground(cell.foreground.front(), picture);
+  if (pictures && pictures->has_foreground) show_foreground(pictures->foreground, picture);
 }
 
 }  // namespace render

@@ -13,6 +13,7 @@
 #include "render/environment_terms.h"
 #include "render/frame_job.h"
 #include "render/light_gather.h"
+#include "render/shader.h"
 
 namespace render {
 
@@ -54,6 +55,7 @@ struct CellTransport {
   struct Mirrored {
     alignas(64) std::array<float, cell_pixels> nx, ny, nz;
     ColourPlanes diffuse;  // radiance per irradiance, times its share
+    std::array<std::uint16_t, cell_pixels> slot;
   };
   // Centres that receive light: normals and answers; 0 elsewhere.
   struct Centres {
@@ -125,6 +127,40 @@ struct CellTransport {
     std::array<Four, cell_pixels> radiance, passed;
   };
 
+  // Of a cell that was found without live pictures.
+  //
+  // A ray that surfaces sent on and that pictures may come before: the slot `target` shows what
+  // they show, and as much as they let pass of a slot of the ray's own, the slots-th and on.
+  struct PictureRay {
+    Vec3f origin, direction, throughput;
+    Spread spread, steps;  // of its cone, as it begins
+    float far_m;           // what it meets is there
+    float roughness;       // of the lobe that it is in the middle of
+    float stands_for;      // so many as dim as it is, of which the others see no pictures
+    std::uint16_t target;
+    std::uint16_t lender;  // the centre that has what is behind, or no_lender
+    RayKind kind;
+    bool one_of_many;  // of rays all over a lobe
+    static constexpr std::uint16_t no_lender = 0xFFFF;
+  };
+  static constexpr std::size_t most_picture_rays = 31 * EnvironmentTerms::slots;
+  // Slot += weight * light of the table, as far as pictures let it pass.
+  struct PictureLight {
+    Vec3f origin, direction, weight;
+    float stands_for;  // as of picture rays
+    std::uint32_t slot;
+    std::uint16_t light;
+  };
+  // Centres that pictures may cast shadows on: where their shadow rays begin, and how wide a square
+  // of the surface each stands for.
+  struct Shadowed {
+    alignas(64) std::array<float, cell_pixels> px, py, pz, width_m;
+    std::uint32_t smooth = 0;  // squares that are one smooth surface, a bit each (cell_squares.h)
+
+    Vec3f position(std::size_t k) const { return {px[k], py[k], pz[k]}; }
+    Scene::Bounds box(const CellMask& centres) const;
+  };
+
   // Pixels that share a camera ray.
   struct Blocks {
     int size = 1;                               // pixels a side
@@ -162,8 +198,21 @@ struct CellTransport {
   std::vector<VideoTerm> video;
   std::vector<Borrowed> borrowed;
   std::vector<Further> further;
-  CellReach reach;         // if anything moves
-  std::uint64_t rays = 0;  // that it took
+  bool past_pictures = false;  // found without live pictures
+  // How far each pixel's camera ray comes before it meets what hides pictures.
+  std::vector<float> far_m;
+  std::vector<PictureRay> picture_rays;
+  std::vector<Base> bases_behind;                     // of their own slots
+  std::vector<EnvironmentTerms> environments_behind;  // of each 512 of these
+  std::vector<PictureLight> picture_lights;
+  std::vector<PictureLight> picture_shadows;  // `slot` is of shadow_lights
+  // Pixels whose further rays look at pictures by themselves, and how far away the nearest and the
+  // farthest thing is between which these may come.
+  CellMask looks_apart{};
+  float nearest_m = 0, farthest_m = 0;
+  std::vector<Shadowed> shadowed, mirrored_shadowed;  // one each, or none
+  CellReach reach;                                    // if anything moves
+  std::uint64_t rays = 0;                             // that it took
   // By pixel, or empty if nobody has asked: a cell that is kept without them is found anew, once.
   std::vector<RayCount> counts;
 
@@ -203,6 +252,26 @@ inline Vec3f brightening(Vec3f open, Vec3f gathered) {
 // A picture's value at a place in its pixels, bilinear; the outermost go on beyond its edge.
 Vec3f plate_at(const capture::Image& level, float x, float y);
 
+// What live pictures do in a frame to a cell that was found without them.
+struct CellPictures {
+  struct Seen {
+    Vec3f radiance, passed;
+  };
+  std::vector<Seen> along;              // of the picture rays
+  std::vector<Vec3f> lit_through;       // of the picture lights: what passes
+  std::vector<Vec3f> shadowed_through;  // of those of shadow lights
+  // What centres lose, and what these mirror.
+  bool shades = false, shades_mirrored = false;
+  LostLight lost, mirrored_lost;
+  bool has_foreground = false;
+  CellTransport::Foreground foreground;
+
+  bool any() const {
+    return has_foreground || !along.empty() || !lit_through.empty() || !shadowed_through.empty() ||
+           shades || shades_mirrored;
+  }
+};
+
 // What relight() works in.
 struct RelightWorkspace {
   LightSums light, mirrored, soft;
@@ -215,20 +284,23 @@ struct RelightWorkspace {
 };
 
 // What a pixel shows: plate * share + added. The first 256 are the pixels; after them, while they
-// are lit, their further samples' sums.
+// are lit, their further samples' sums, and what lies behind picture rays.
 struct CellPicture {
-  std::array<Four, slots> added;
-  std::array<Four, slots> share;  // the last of the four: their mean
-  std::array<float, slots> seen;
+  static constexpr std::size_t all_slots = slots + CellTransport::most_picture_rays;
+  std::array<Four, all_slots> added;
+  std::array<Four, all_slots> share;  // the last of the four: their mean
+  std::array<float, all_slots> seen;
 };
 
-// A cell under the light of a frame. `plate` in scene-linear light decides where lamps on stand-ins
+// A cell under the light of a frame, with what the frame's live pictures do to it, if it was found
+// without them and they do anything. `plate` in scene-linear light decides where lamps on stand-ins
 // find their albedo.
 void relight(const CellTransport& cell,
              const FrameLight& light,
              std::span<const Four, cell_pixels> plate,
              RelightWorkspace& workspace,
              CellPicture& picture,
-             RenderStatistics& statistics);
+             RenderStatistics& statistics,
+             const CellPictures* pictures = nullptr);
 
 }  // namespace render

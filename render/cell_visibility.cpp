@@ -304,7 +304,8 @@ void add_up_light(const LitCentres& centres,
                   std::span<const DirectionalLight> lights,
                   const CellVisibility& visibility,
                   LightSums& sums,
-                  LightSums& soft) {
+                  LightSums& soft,
+                  const LostLight* more) {
   const bool shares = !visibility.windows.empty();
   const LightsOfCell of_cell(lights, centres.receiving, visibility);
   for (std::size_t k = 0; k < cell_pixels; k += lanes) {
@@ -335,6 +336,13 @@ void add_up_light(const LitCentres& centres,
     const bool soft_one = shares && SoftLights::has_parts(l) && !in(visibility.near[tint.light], k);
     if (soft_one) soft.add_lost(k, lost);
   }
+  const auto add_lost = [](const ColourPlanes& lost, LightSums& to) {
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      to.lost_r[k] += lost.r[k], to.lost_g[k] += lost.g[k], to.lost_b[k] += lost.b[k];
+    }
+  };
+  if (more) add_lost(more->all, sums);
+  if (more && shares) add_lost(more->shared, soft);
   if (!shares) return;
   share_lost(visibility.windows, soft, sums);
 }

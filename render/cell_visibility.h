@@ -74,6 +74,11 @@ struct LightSums {
   void add_lost(std::size_t k, Vec3f e) { lost_r[k] += e.x, lost_g[k] += e.y, lost_b[k] += e.z; }
 };
 
+// Light that centres lose: of all sources; of these, of those that windows share.
+struct LostLight {
+  ColourPlanes all, shared;
+};
+
 // A cell's centres that receive light, and their normals: 0 where there is none.
 struct LitCentres {
   const CellMask& receiving;
@@ -82,11 +87,13 @@ struct LitCentres {
 
 // Adds up the table's light there: of all of it that is not behind real things, and what of it
 // virtual objects take. The centres of windows lose the share of the soft light that the windows
-// about them lose as wholes; where none of these loses any, exactly nothing. `soft` is scratch.
+// about them lose as wholes; where none of these loses any, exactly nothing. `more`: what they lose
+// besides, or null. `soft` is scratch.
 void add_up_light(const LitCentres& centres,
                   std::span<const DirectionalLight> lights,
                   const CellVisibility& visibility,
                   LightSums& sums,
-                  LightSums& soft);
+                  LightSums& soft,
+                  const LostLight* more = nullptr);
 
 }  // namespace render

@@ -10,6 +10,20 @@
 #include "render/kernel.h"
 
 namespace render {
+namespace {
+
+// How far away a box is, at the least and at the most.
+std::array<float, 2> distances_to(const Scene::Bounds& box, Vec3f from) {
+  const auto off = [](float lower, float upper, float at) {
+    const float below = lower - at, above = at - upper;
+    return std::array{std::max({below, above, 0.0F}), std::max(-below, -above)};
+  };
+  const auto x = off(box.lower.x, box.upper.x, from.x), y = off(box.lower.y, box.upper.y, from.y),
+             z = off(box.lower.z, box.upper.z, from.z);
+  return {length(Vec3f{x[0], y[0], z[0]}), length(Vec3f{x[1], y[1], z[1]})};
+}
+
+}  // namespace
 
 void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame) {
   const Scene& scene = *frame.inputs.scene;
@@ -20,15 +34,22 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
   scarce_ = bytes_ > room() / 2;
   keys_ = keys;
   const auto caustics_before = std::exchange(shown_caustics_, frame.caustics);
-  if (same_transport && same_size && moved) {
-    if (moved->empty()) return;
-    if (std::ranges::all_of(*moved, [&](const auto& bounds) { return grid_.holds(bounds); })) {
-      std::vector<Scene::Bounds> relit;
+  const bool same_way = stalls_.empty() == frame.stalls.empty();
+  const auto held = [&](const auto& boxes) {
+    return std::ranges::all_of(boxes, [&](const auto& bounds) { return grid_.holds(bounds); });
+  };
+  if (same_transport && same_size && same_way && moved) {
+    Changes changes;
+    changes.stalls = PictureStalls::changed(stalls_, frame.stalls);
+    if (moved->empty() && changes.stalls.empty()) return;
+    if (held(*moved) && held(changes.stalls)) {
       if (caustics_before && frame.caustics && caustics_before->key() != frame.caustics->key()) {
-        relit = caustics_before->regions();
-        std::ranges::copy(frame.caustics->regions(), std::back_inserter(relit));
+        changes.relit = caustics_before->regions();
+        std::ranges::copy(frame.caustics->regions(), std::back_inserter(changes.relit));
       }
-      forget(std::move(*moved), std::move(relit), frame);
+      changes.but_pictures = *Scene::moved_but_pictures(places_, scene.places());
+      changes.moved = std::move(*moved);
+      forget(std::move(changes), frame);
     } else {
       forget_all(scene);
     }
@@ -42,40 +63,82 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
     forget_all(scene);
   }
   places_ = scene.places();
+  stalls_ = frame.stalls;
   columns_ = frame.columns;
   rows_ = frame.rows;
   full_ = false;
 }
 
 void KeptTransport::forget_all(const Scene& scene) {
-  for (Cell& cell : cells_) cell.stage = none;
+  for (Cell& cell : cells_) cell.stage = cell.needs_pictures = none;
   scratch_bytes_ = 0;
   bends_plate_ = false;
   cones_.clear();
   grid_ = SpaceGrid(scene.virtual_bounds());
 }
 
-void KeptTransport::forget(std::vector<Scene::Bounds> moved,
-                           std::vector<Scene::Bounds> relit,
-                           const FrameContext& frame) {
+void KeptTransport::forget(Changes changes, const FrameContext& frame) {
   if (cones_.empty()) cones_ = cell_cones(*frame.inputs.directions, frame.turn);
   SpaceGrid::Mask receivers{};
   for (const Cell& cell : cells_) {
     if (cell.stage == none) continue;
-    const SpaceGrid::Mask& lit = cell.transport->reach.lit;
+    const SpaceGrid::Mask& lit = cell.transport->reach.lit.boxes;
     for (std::size_t i = 0; i < lit.size(); ++i) receivers[i] |= lit[i];
   }
   LightTable lights = *frame.planned_table;
   lights.lamps.resize(frame.job->lights.lamps.size());  // those of caustics are nowhere
-  const MovedThings things(std::move(moved), grid_, lights, frame.soft_lights, receivers,
-                           std::move(relit));
+  const auto things = [&](std::vector<Scene::Bounds> where) {
+    return MovedThings(std::move(where), grid_, lights, frame.soft_lights, receivers,
+                       changes.relit);
+  };
+  // Cells that were found without pictures stay while these stay in their stalls.
+  const MovedThings but_pictures = things(changes.but_pictures), stalls = things(changes.stalls);
+  const bool any_past =
+      !changes.but_pictures.empty() || !changes.stalls.empty() || !changes.relit.empty();
+  std::ranges::copy(changes.stalls, std::back_inserter(changes.moved));
+  const MovedThings moved = things(changes.moved);
+  const auto matters = [&](const MovedThings& things, std::size_t i, const CellTransport& cell) {
+    return things.may_be_seen(cones_[i], frame.camera) || things.may_change(cell.reach);
+  };
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     Cell& cell = cells_[i];
     if (cell.stage == none) continue;
-    if (things.may_be_seen(cones_[i], frame.camera) || things.may_change(cell.transport->reach)) {
+    const CellTransport& transport = *cell.transport;
+    if (transport.past_pictures) {
+      const bool changed = any_past && (matters(but_pictures, i, transport) ||
+                                        stalls_matter(changes.stalls, stalls, i, frame));
+      if (changed) cell.stage = none;
+    } else if (matters(moved, i, transport)) {
+      const bool but_by_pictures =
+          any_past && (matters(but_pictures, i, transport) || matters(stalls, i, transport));
+      cell.needs_pictures = but_by_pictures ? none : cell.stage;
       cell.stage = none;
     }
   }
+}
+
+// Whether a cell that was found without pictures would be found otherwise with other stalls: where
+// these may come between things that its camera rays see side by side, where bounced rays pass, and
+// where points are lit of which nothing is kept.
+bool KeptTransport::stalls_matter(const std::vector<Scene::Bounds>& boxes,
+                                  const MovedThings& stalls,
+                                  std::size_t i,
+                                  const FrameContext& frame) const {
+  const CellTransport& cell = *cells_[i].transport;
+  const bool parts = std::ranges::any_of(boxes, [&](const Scene::Bounds& box) {
+    const auto [nearest, farthest] = distances_to(box, frame.camera);
+    return cell.nearest_m < farthest && cell.farthest_m > nearest &&
+           may_be_seen(cones_[i], frame.camera, box);
+  });
+  if (parts || stalls.may_be_passed(cell.reach)) return true;
+  const bool knows_centres = (render::none(cell.receiving) || !cell.shadowed.empty()) &&
+                             (cell.mirrored.empty() || !cell.mirrored_shadowed.empty());
+  return stalls.may_light(knows_centres ? cell.reach.lit_apart : cell.reach.lit);
+}
+
+const CellReach* KeptTransport::reach_with_pictures(int column, int row, int stage) const {
+  const Cell& cell = cells_[index(column, row)];
+  return cell.needs_pictures == stage && cell.transport ? &cell.transport->reach : nullptr;
 }
 
 const CellTransport* KeptTransport::find(int column, int row, int stage) const {

@@ -12,6 +12,7 @@
 #include "render/bordered_levels.h"
 #include "render/caustics.h"
 #include "render/cell_transport.h"
+#include "render/picture_stalls.h"
 
 namespace render {
 
@@ -52,6 +53,9 @@ class KeptTransport {
 
   // A cell's transport at a stage, or null if it is not kept.
   const CellTransport* find(int column, int row, int stage) const;
+  // Of a cell that is not kept, but is known to be one that has to be found with live pictures:
+  // what that depends on. Else null.
+  const CellReach* reach_with_pictures(int column, int row, int stage) const;
   // Where to put it, or null if the memory is used up; keep() makes it count.
   CellTransport* place(int column, int row);
   void keep(int column, int row, int stage);
@@ -103,15 +107,23 @@ class KeptTransport {
     std::unique_ptr<LitCell> lit;  // of that transport
     std::size_t bytes = 0;         // counted in bytes_
     int stage = none;
+    int needs_pictures = none;  // the stage at which it was last found with them, for it had to be
   };
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);
   }
   void forget_all(const Scene& scene);
-  void forget(std::vector<Scene::Bounds> moved,
-              std::vector<Scene::Bounds> relit,
-              const FrameContext& frame);
+  // What moved, where light falls otherwise, and what of that is no picture; where pictures have
+  // other stalls.
+  struct Changes {
+    std::vector<Scene::Bounds> moved, relit, but_pictures, stalls;
+  };
+  void forget(Changes changes, const FrameContext& frame);
+  bool stalls_matter(const std::vector<Scene::Bounds>& boxes,
+                     const MovedThings& stalls,
+                     std::size_t i,
+                     const FrameContext& frame) const;
 
   CausticFollower caustics_;
   std::shared_ptr<BorderedLevels> bordered_levels_ = std::make_shared<BorderedLevels>();
@@ -119,6 +131,7 @@ class KeptTransport {
   FrameKeys keys_;
   bool light_stays_ = false;  // the same as in the frame before
   Scene::Places places_;
+  PictureStalls stalls_;
   SpaceGrid grid_;
   int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;

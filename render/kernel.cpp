@@ -20,11 +20,15 @@ struct TileWorkspace::Impl {
   CellTransport transport;
   RelightWorkspace relight;
   CellPicture picture;
+  CellPictures pictures;  // of the cell at work
   std::array<Four, cell_pixels> plate;
 
   void render_cell(const FrameContext& frame, const TileView& tile, int x0, int y0);
   void load_plate(const TileView& tile, int x0, int y0);
-  void light(const FrameContext& frame, const CellTransport& cell, RenderStatistics& statistics);
+  void light(const FrameContext& frame,
+             const CellTransport& cell,
+             bool sees_pictures,
+             RenderStatistics& statistics);
   void write(const FrameContext& frame, const TileView& tile, int x0, int y0) const;
   void write_kept(
       const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0);
@@ -77,8 +81,9 @@ void TileWorkspace::Impl::load_plate(const TileView& tile, int x0, int y0) {
 
 void TileWorkspace::Impl::light(const FrameContext& frame,
                                 const CellTransport& cell,
+                                bool sees_pictures,
                                 RenderStatistics& statistics) {
-  if (cell.empty) {
+  if (cell.empty && !sees_pictures) {
     picture.added.fill(Four{});
     picture.share.fill(Four{1, 1, 1, 1});
     picture.seen.fill(1);
@@ -87,7 +92,7 @@ void TileWorkspace::Impl::light(const FrameContext& frame,
   render::relight(
       cell,
       {frame.job->lights.lights, frame.irradiances, frame.lamps, frame.levels, *frame.bordered},
-      plate, relight, picture, statistics);
+      plate, relight, picture, statistics, sees_pictures ? &pictures : nullptr);
 }
 
 // with_light() of stand_in_parameters.h, of colours in four lanes.
@@ -195,6 +200,12 @@ bool is_broken_plate(const TileView& tile, int x0, int y0) {
 // A cell whose transport is kept: as it was lit last, if nothing that lights it has changed.
 void TileWorkspace::Impl::write_kept(
     const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0) {
+  if (baker.look_at_pictures(frame, cell, x0, y0, pictures, *tile.statistics)) {
+    load_plate(tile, x0, y0);
+    light(frame, cell, true, *tile.statistics);
+    write(frame, tile, x0, y0);
+    return;
+  }
   KeptTransport& memory = *frame.inputs.kept;
   const int column = x0 / cell_size, row = y0 / cell_size;
   const FrameKeys& keys = memory.keys();
@@ -211,7 +222,7 @@ void TileWorkspace::Impl::write_kept(
   TileView apart = tile;
   RenderStatistics statistics;
   apart.statistics = &statistics;
-  light(frame, cell, statistics);
+  light(frame, cell, false, statistics);
   write(frame, apart, x0, y0);
   const bool can_stay = cell.video.empty() && knows_plate;
   if (LitCell* room = can_stay ? memory.place_lit(column, row) : nullptr) {
@@ -242,7 +253,9 @@ void TileWorkspace::Impl::render_cell(const FrameContext& frame,
   } else {
     load_plate(tile, x0, y0);
     baker.bake(frame, stage, x0, y0, transport, *tile.statistics);
-    light(frame, transport, *tile.statistics);
+    const bool sees_pictures =
+        baker.look_at_pictures(frame, transport, x0, y0, pictures, *tile.statistics);
+    light(frame, transport, sees_pictures, *tile.statistics);
     if (counts) write_counts(transport, tile, x0, y0);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
     if (memory) memory->found_with(baker.scratch_bytes());

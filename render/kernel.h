@@ -8,6 +8,7 @@
 #include "render/camera_turn.h"
 #include "render/glowing_parts.h"
 #include "render/light_gather.h"
+#include "render/picture_stalls.h"
 #include "render/ray_log.h"
 #include "render/refinement.h"
 #include "render/renderer.h"
@@ -56,6 +57,9 @@ struct FrameContext {
   Vec3f camera;           // its position in the set
   float pixel_angle = 0;  // radians across a pixel at the picture's centre
   std::vector<SmallLight> small_lights;
+  // Of live pictures that cells are found without, and that are looked at anew in every frame;
+  // none where pictures belong to what cells are found with.
+  PictureStalls stalls;
 };
 // Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not
 // finite).

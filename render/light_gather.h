@@ -75,6 +75,7 @@ struct GatherWorkspace {
   int rays = 0;
   RayLog* log = nullptr;            // keeps all rays, if set
   std::uint32_t* counts = nullptr;  // adds up shadow rays by receiver, if set
+  bool past_pictures = false;       // live pictures block nothing
 
   static constexpr int group = 64;  // lights at a time
   std::array<CellMask, group> lit, seen, tested, near;

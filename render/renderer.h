@@ -15,6 +15,7 @@
 namespace render {
 
 class KeptTransport;
+class PictureStalls;
 
 // What a FrameJob's numbers stand for on this machine. All of it must outlive the call.
 struct FrameInputs {
@@ -32,6 +33,9 @@ struct FrameInputs {
   // environment in its place.
   const capture::HalfImage* plate = nullptr;
   const calibrate::Lens* lens = nullptr;
+  // What keeps cells that show live pictures from being found anew while these stay within them;
+  // null, or where any picture is outside: boxes close about them.
+  const PictureStalls* stalls = nullptr;
   bool count_rays = false;  // fill FrameResult::rays; the picture's bits are the same
 };
 

@@ -216,6 +216,7 @@ Facet facet_of(const Mesh& mesh,
 [[gnu::always_inline]] inline Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
                                                         unsigned lane,
                                                         RayKind kind,
+                                                        float width_m,
                                                         float cone_rad) const {
   const unsigned n = args->N;
   const Vec3f incoming = ray_of(args, lane).direction;
@@ -225,7 +226,10 @@ Facet facet_of(const Mesh& mesh,
            RTCHitN_v(args->hit, n, lane), incoming, hit);
   const ShadeContext context{&description, nullptr, pictures, prepared};
   const float slant = std::max(std::abs(dot(incoming, hit.geometric_normal)), 1e-6F);
-  const float footprint_m = cone_rad * RTCRayN_tfar(args->ray, n, lane) / slant;
+  const float across_m = width_m + cone_rad * RTCRayN_tfar(args->ray, n, lane);
+  // Of shadow rays as large as what their cone cuts out, which is longer than wide.
+  const float footprint_m =
+      kind == RayKind::shadow ? across_m / std::sqrt(slant) : across_m / slant;
   return compiled->shaders[hit.material]->transmittance(
       context, description.materials[hit.material], hit, incoming, kind, footprint_m);
 }
@@ -243,6 +247,7 @@ bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned 
   const auto& traced = *reinterpret_cast<const TraceContext*>(args->context);
   TraceContext context(*traced.scene, RayKind::camera, false);
   context.cone_rad = traced.cone_rad;  // what it passed on its way here it passes again
+  context.past_pictures = traced.past_pictures;
   RTCRayHit ray{};
   ray.ray = {.org_x = origin.x,
              .org_y = origin.y,
@@ -276,7 +281,7 @@ void Scene::Impl::filter_closest(const RTCFilterFunctionNArguments* args) {
   const bool past_picture = impl.is_past_picture(args);
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
-    if (past_picture || impl.passes(args, i, context.kind, context.cone_rad) == Vec3f{1, 1, 1} ||
+    if (past_picture || impl.passes(args, i, context.kind, 0, context.cone_rad) == Vec3f{1, 1, 1} ||
         impl.stands_back(args, i)) {
       args->valid[i] = 0;
     }
@@ -303,10 +308,13 @@ void Scene::Impl::filter_any(const RTCFilterFunctionNArguments* args) {
       continue;
     }
     const auto& anywhere = impl.compiled->shadow[material];
-    const Vec3f share = anywhere ? *anywhere : impl.passes(args, i, RayKind::shadow, 0);
+    const unsigned id = RTCRayN_id(args->ray, args->N, i);
+    const float width_m = context.shadow_width_m ? context.shadow_width_m[id] : 0;
+    const float cone_rad = context.shadow_width_m ? context.shadow_cone_rad[id] : 0;
+    const Vec3f share =
+        anywhere ? *anywhere : impl.passes(args, i, RayKind::shadow, width_m, cone_rad);
     if (share == Vec3f{}) continue;
     if (context.transmittance_r) {
-      const unsigned id = RTCRayN_id(args->ray, args->N, i);
       context.transmittance_r[id] *= share.x;
       context.transmittance_g[id] *= share.y;
       context.transmittance_b[id] *= share.z;
@@ -454,19 +462,38 @@ bool Scene::shows_pictures(std::uint32_t instance) const {
 }
 const Scene::Places& Scene::places() const { return impl_->places; }
 
-std::optional<std::vector<Scene::Bounds>> Scene::moved(const Places& before, const Places& now) {
+bool Scene::only_shows_pictures() const { return impl_->compiled->only_shows_pictures; }
+
+namespace {
+
+template <class Counts>
+std::optional<std::vector<Scene::Bounds>> moved_of(const Scene::Places& before,
+                                                   const Scene::Places& now,
+                                                   Counts&& counts) {
   if (before.parts != now.parts) return std::nullopt;
-  std::vector<Bounds> where;
+  std::vector<Scene::Bounds> where;
   for (std::size_t i = 0; i < now.bounds.size(); ++i) {
+    if (!counts(i)) continue;
     if (before.set_from_object[i] == now.set_from_object[i] &&
         before.pictures[i] == now.pictures[i] && before.shapes[i] == now.shapes[i]) {
       continue;
     }
-    for (const Bounds& bounds : {before.bounds[i], now.bounds[i]}) {
+    for (const Scene::Bounds& bounds : {before.bounds[i], now.bounds[i]}) {
       if (bounds.lower.x <= bounds.upper.x) where.push_back(bounds);
     }
   }
   return where;
+}
+
+}  // namespace
+
+std::optional<std::vector<Scene::Bounds>> Scene::moved(const Places& before, const Places& now) {
+  return moved_of(before, now, [](std::size_t) { return true; });
+}
+
+std::optional<std::vector<Scene::Bounds>> Scene::moved_but_pictures(const Places& before,
+                                                                    const Places& now) {
+  return moved_of(before, now, [&](std::size_t i) { return now.pictures[i].empty(); });
 }
 
 }  // namespace render

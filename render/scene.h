@@ -31,6 +31,7 @@ inline constexpr unsigned mask_virtual = 1;       // virtual objects
 inline constexpr unsigned mask_stand_in = 2;      // stand-ins, seen by camera and reflection rays
 inline constexpr unsigned mask_real_blocker = 4;  // stand-ins that block real light
 inline constexpr unsigned mask_occluder = 8;
+inline constexpr unsigned mask_picture = 16;  // what shows live pictures
 // In the mask of a shadow ray: clear bodies block it.
 inline constexpr unsigned ray_glass_blocks = 1U << 31;
 
@@ -183,6 +184,9 @@ class Scene {
   const Pictures& pictures() const;
   const std::vector<PreparedSurface>& prepared() const;  // by Shader::prepare()
   bool shows_pictures(std::uint32_t instance) const;     // whether any is live on it
+  // Whether all that shows live pictures does nothing but glow by them and let pass what is behind
+  // (Shader::only_shows): what rays find without them holds then, less what they hide.
+  bool only_shows_pictures() const;
   // Where the moving instances of a scene stand, what they show, and what else it is made of.
   struct Places {
     std::uint64_t parts = 0;  // differs between scenes that share nothing
@@ -195,6 +199,9 @@ class Scene {
   // Bounds, before and after, of what stands elsewhere in `now`, has another shape or shows another
   // picture; nothing if more than that differs.
   static std::optional<std::vector<Bounds>> moved(const Places& before, const Places& now);
+  // The same of what shows no picture.
+  static std::optional<std::vector<Bounds>> moved_but_pictures(const Places& before,
+                                                               const Places& now);
 
  private:
   struct Part;

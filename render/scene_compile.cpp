@@ -127,13 +127,19 @@ void Scene::Compiled::find_pictures(const SceneDescription& description) {
       if (std::ranges::find(by, material) != by.end()) continue;
       const auto pictures = shaders[material]->pictures_of(description.materials[material]);
       if (!pictures.empty()) by.push_back(material);
+      only_shows_pictures =
+          only_shows_pictures &&
+          (pictures.empty() || shaders[material]->only_shows(description.materials[material]));
       for (const std::size_t picture : pictures) {
         if (std::ranges::find(shown, picture) == shown.end()) shown.push_back(picture);
       }
     }
   }
   for (const Instance& instance : description.instances) {
-    if (!pictures_of_mesh[instance.mesh].empty() && !instance.moves) {
+    if (pictures_of_mesh[instance.mesh].empty()) continue;
+    only_shows_pictures = only_shows_pictures && shown_by_material[instance.mesh].size() == 1 &&
+                          description.meshes[instance.mesh]->materials.size() == 1;
+    if (!instance.moves) {
       throw std::invalid_argument("scene: object " + instance.name +
                                   " shows a live picture, but is not one that moves");
     }
@@ -146,7 +152,9 @@ void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
   const bool all_placed = instance == Part::none;
   const Instance still;
   const Instance& placing = all_placed ? still : description.instances[instance];
-  rtcSetGeometryMask(geometry, all_placed ? ~0U : mask_of(placing));
+  const bool shows_picture = !all_placed && !compiled->pictures_of_mesh[placing.mesh].empty();
+  rtcSetGeometryMask(geometry, all_placed ? ~mask_picture
+                                          : mask_of(placing) | (shows_picture ? mask_picture : 0U));
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR,
                           placing.set_from_object.data());
   rtcCommitGeometry(geometry);
@@ -252,6 +260,7 @@ void Scene::Impl::prepare(const Impl* before) {
         if (known != before->prepared.end()) surface.prepared = known->prepared;
       } else {
         surface.prepared = compiled->shaders[material]->prepare(description.materials[material],
+                                                                *description.meshes[instance.mesh],
                                                                 instance.set_from_object, pictures);
       }
       if (surface.prepared) prepared.push_back(std::move(surface));

@@ -128,6 +128,7 @@ struct Scene::Compiled {
   bool real_blockers = false;
   bool filters = false;
   bool has_glass = false;
+  bool only_shows_pictures = true;
 
   Compiled() = default;
   Compiled(const Compiled&) = delete;
@@ -253,6 +254,7 @@ struct Scene::Impl {
   Vec3f passes(const RTCFilterFunctionNArguments* args,
                unsigned lane,
                RayKind kind,
+               float width_m,
                float cone_rad) const;
   bool is_past_picture(const RTCFilterFunctionNArguments* args) const;
   bool stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const;

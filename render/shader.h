@@ -29,6 +29,8 @@ enum class RayKind : std::uint8_t {
   shadow,
 };
 
+inline constexpr std::uint16_t no_picture_ray = 0xFFFF;
+
 // Light of a live texture: gain times its look-up at (u, v).
 struct SeenVideo {
   std::int32_t index = -1;  // of SceneDescription::videos, or none
@@ -51,6 +53,7 @@ struct ShadePoint {
   Vec3f throughput;         // share of the pixel that this ray carries
   std::uint32_t pixel = 0;  // index in the cell, for patterns
   std::uint32_t slot = 0;   // the sample that the result is added to
+  std::uint16_t behind = no_picture_ray;  // what its path passed that pictures may come before
   RayKind kind = RayKind::camera;
   std::uint8_t depth = 0;
   std::uint32_t path = 1;  // a number for the surfaces' rays that led here
@@ -99,11 +102,27 @@ class RaySink {
   virtual void push(const ShadePoint& from, const NewRay& ray) = 0;
 };
 
+// Rays towards lights that end nowhere, side by side.
+struct LightRays {
+  std::size_t count = 0;
+  const float *ox = nullptr, *oy = nullptr, *oz = nullptr;
+  const float *dx = nullptr, *dy = nullptr, *dz = nullptr;  // unit
+  // How wide each begins, in metres, and by how much it widens a metre.
+  const float *width_m = nullptr, *cone_rad = nullptr;
+  float *red = nullptr, *green = nullptr, *blue = nullptr;  // what passes, so far
+};
+
 // What a shader has found out beforehand about an instance and the pictures on it: what it may ask
 // at every point without finding it again. Immutable, and refers to nothing but pictures.
 class Prepared {
  public:
   virtual ~Prepared() = default;
+  // Dims rays to light by what the instance lets pass of each: what Shader::transmittance() says of
+  // them, without any tree. False if it has no such way, and nothing was done.
+  virtual bool dim(const LightRays& rays) const {
+    static_cast<void>(rays);
+    return false;
+  }
 };
 struct PreparedSurface {
   std::uint32_t instance = 0, material = 0;
@@ -171,14 +190,22 @@ class Shader {
     static_cast<void>(material);
     return {};
   }
+  // Whether, with pictures, it does nothing but what layer() tells, without any albedo, and looks
+  // at shadow rays as wide as transmittance() is told.
+  virtual bool only_shows(const Material& material) const {
+    static_cast<void>(material);
+    return false;
+  }
   // Called when a scene is made, for every instance that shows live pictures by the material,
   // unless the scene before had it at the same place with the same ones: at most once a frame. All
   // that pictures_of() names are there.
   virtual std::shared_ptr<const Prepared> prepare(
       const Material& material,
+      const Mesh& mesh,
       const std::array<float, 12>& set_from_object,
       std::span<const std::shared_ptr<const LivePicture>> pictures) const {
-    static_cast<void>(material), static_cast<void>(set_from_object), static_cast<void>(pictures);
+    static_cast<void>(material), static_cast<void>(mesh);
+    static_cast<void>(set_from_object), static_cast<void>(pictures);
     return nullptr;
   }
   // Of shaders that glow or are matte, and let light pass straight on: what shade() gives, for the

@@ -232,6 +232,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.environment = std::move(light.environment);
     prepared.planned = std::move(light.planned);
     prepared.scene = scene_;
+    prepared.stalls = stalls_.follow(scene_->places());
     prepared.directions = directions_;
     prepared.lens = lens_;
   }

@@ -18,6 +18,7 @@
 #include "calibrate/track.h"
 #include "capture/image.h"
 #include "render/bounced_light.h"
+#include "render/picture_stalls.h"
 #include "render/renderer.h"
 #include "studio/leaving.h"
 #include "studio/light_feed.h"
@@ -46,6 +47,7 @@ struct PreparedFrame {
   std::shared_ptr<const calibrate::Lens> lens;
   std::vector<std::shared_ptr<const render::VideoTexture>> videos;
   std::vector<const render::VideoTexture*> video_frames;  // the same, for inputs()
+  render::PictureStalls stalls;                           // of the persons
   std::vector<PersonStatus> persons;                      // of the set, in its order
   std::int64_t held_shapes = 0;    // objects that deform, whose shape is not the one due
   std::vector<std::string> notes;  // what went wrong while it was made
@@ -63,7 +65,8 @@ struct PreparedFrame {
             .planned = planned.get(),
             .videos = video_frames,
             .plate = plate.get(),
-            .lens = lens.get()};
+            .lens = lens.get(),
+            .stalls = &stalls};
   }
 };
 
@@ -218,6 +221,7 @@ class FrameMaker {
   std::unique_ptr<ShapeFeed> shapes_;
   std::optional<calibrate::Track> track_;
   std::shared_ptr<const render::Scene> scene_;
+  render::StallFollower stalls_;
   SetScene set_scene_;
   std::shared_ptr<const calibrate::DirectionTable> directions_;
   std::shared_ptr<const calibrate::Lens> lens_;

@@ -166,8 +166,8 @@ std::shared_ptr<const KeyedPicture> small_figure() {
 // Rays that pass at once see what those see that are sent on, at any distance.
 TEST(Billboard, ShowsTheSameWhereItIsPassedAtOnce) {
   const auto see = [&](std::shared_ptr<const render::LivePicture> picture, float away,
-                       bool furnished) {
-    render::SceneDescription scene = scene_with(make_billboard_material("person", {}));
+                       bool furnished, bool lit = false) {
+    render::SceneDescription scene = scene_with(make_billboard_material("person", {.lit = lit}));
     if (furnished) furnish(scene, {0.9F, 1.4F}, {0.55F, -0.6F, 0.6F});
     scene.instances[0].set_from_object = standing({0, away, 0}, 3, 3);
     const MadeShot shot = shot_of(std::move(scene), {std::move(picture)});
@@ -183,8 +183,9 @@ TEST(Billboard, ShowsTheSameWhereItIsPassedAtOnce) {
     const capture::Image mask = render::affected_mask(truth, plate);
     EXPECT_LT(render::picture_error(seen, truth, mask).relative_rms, 0.01) << away;
   }
+  // What is lit is met by the set's own rays (others' by rays to pictures alone).
   const auto rays = [&](std::shared_ptr<const render::LivePicture> picture) {
-    return see(std::move(picture), 0, false).statistics.secondary_rays;
+    return see(std::move(picture), 0, false, true).statistics.secondary_rays;
   };
   EXPECT_LT(rays(small_figure()), rays(std::make_shared<Unsure>(small_figure())) / 2);
   // Close to what is seen, too: a dot in every block of texels.

@@ -82,7 +82,7 @@ TEST(MovedThings, MissNoPointThatTheyShade) {
     reach.add_receiver(grid, from);
     const render::SoftLights soft(table);
     const render::MovedThings things({{middle - half, middle + half}}, grid, table, soft,
-                                     reach.lit);
+                                     reach.lit.boxes);
     told += things.may_change(reach);
     const auto lies_between = [&](Vec3f along, float far) {
       for (int step = 0; step <= 2000; ++step) {

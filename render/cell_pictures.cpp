@@ -1,0 +1,313 @@
+// Cells that are found without live pictures: what is noted of rays and light that these may come
+// into the way of. What they do there is looked at in each frame (look_at_pictures.cpp).
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <span>
+
+#include "render/blocker_boxes.h"
+#include "render/cell_baker.h"
+#include "render/cell_squares.h"
+#include "render/embree_context.h"
+#include "render/smooth_blocks.h"
+#include "render/trace.h"
+
+namespace render {
+namespace {
+
+// Where a pixel has more rays than that which pictures may come before, or lights that they may
+// dim, some stand for all: the dimmer ones, of which each is less of it than one of so many alike.
+constexpr float rays_of_pixel = 96, lights_of_pixel = 256;
+
+std::uint32_t key_of(const TintedLight& tint) { return tint.light * 256U + tint.centre; }
+
+}  // namespace
+
+// Whether what a camera ray met hides pictures behind it.
+bool CellBaker::hides_pictures(int index) const {
+  const auto i = static_cast<std::size_t>(index);
+  if (stream_.geom[i] == RTC_INVALID_GEOMETRY_ID) return false;
+  const Scene& scene = *frame_->inputs.scene;
+  const auto& instances = scene.description().instances;
+  const Instance& met =
+      instances[scene.surface_of(stream_.geom[i], stream_.prim[i], stream_.inst[i]).instance];
+  return met.kind == ObjectKind::virtual_object || met.occludes;
+}
+
+// Notes how far the centres' rays come: pictures may come before that.
+void CellBaker::keep_far() {
+  transport_->far_m.resize(cell_pixels);
+  for (int i = 0; i < cell_pixels; ++i) {
+    const auto [x, y] = pixel_of_ray(i);
+    const auto k = static_cast<std::size_t>(i);
+    float& far_m = transport_->far_m[static_cast<std::size_t>(y * cell_size + x)];
+    far_m = stream_.far_m[k];
+    if (stream_.geom[k] == RTC_INVALID_GEOMETRY_ID || hides_pictures(i)) continue;
+    // Nothing virtual is behind it, or the ray had passed it.
+    const auto hides = closest_hit(*frame_->inputs.scene, frame_->camera,
+                                   {stream_.dx[k], stream_.dy[k], stream_.dz[k]}, 0, mask_occluder,
+                                   RayKind::camera, LivePictures::passed);
+    far_m = hides ? hides->distance : ray_far;
+  }
+}
+
+// Between what distances pictures would come between things that further rays see.
+void CellBaker::keep_distances() {
+  bool any = false;
+  for (std::size_t k = 0; k < cell_pixels && !any; ++k) any = takes_rays(k);
+  if (!any) return;
+  transport_->nearest_m = ray_far;
+  for (const Met& met : met_) {
+    const float far_m = hidden_from(met);
+    transport_->nearest_m = std::min(transport_->nearest_m, far_m);
+    transport_->farthest_m = std::max(transport_->farthest_m, far_m);
+  }
+}
+
+// Keeps where the centres' shadow rays begin, if pictures may come into the way of any.
+void CellBaker::keep_shadowed(CellVisibility& visibility,
+                              const CellMask& receiving,
+                              std::vector<CellTransport::Shadowed>& shadowed) {
+  if (!past_pictures_ || shades_ring_ || none(receiving)) return;
+  const Receivers& r = receivers_;
+  CellTransport::Shadowed all;
+  all.px = r.px, all.py = r.py, all.pz = r.pz;
+  const Scene::Bounds box = all.box(receiving);
+  const auto passes = [&](std::size_t light) {
+    const DirectionRange to = frame_->soft_lights.range(light);
+    return std::ranges::any_of(frame_->stalls.boxes(), [&](const Scene::Bounds& stall) {
+      return may_be_met(stall, box, to);
+    });
+  };
+  bool any = false;
+  for (std::size_t i = 0; i < visibility.lit.size() && !any; ++i) {
+    any = !none(visibility.lit[i]) && passes(i);
+  }
+  if (!any) return;
+  std::ranges::sort(visibility.tints, {}, key_of);
+  const auto apart = [&](std::size_t a, std::size_t b) {
+    const bool same = in(receiving, b) && r.surface[a] == r.surface[b];
+    return same ? length(all.position(b) - all.position(a)) : 0.0F;
+  };
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    all.width_m[k] = 0;
+    if (!in(receiving, k)) continue;
+    const float across = apart(k, k % cell_size + 1 < cell_size ? k + 1 : k - 1);
+    const float down = apart(k, k + cell_size < cell_pixels ? k + cell_size : k - cell_size);
+    all.width_m[k] = std::sqrt(across * down);
+  }
+  find_smooth_squares(receiving, all);
+  shadowed.push_back(all);
+}
+
+// Notes which squares of the cell are one surface each.
+void CellBaker::find_smooth_squares(const CellMask& receiving,
+                                    CellTransport::Shadowed& centres) const {
+  const auto is_smooth = [&](const Square& s) {
+    if (!holds_all(receiving, s)) return false;
+    for (std::size_t i = 0; i < s.side * s.side; ++i) {
+      const std::size_t k = s.first + i / s.side * cell_size + i % s.side;
+      if (!is_one_surface(receivers_, s.first, k)) return false;
+    }
+    return true;
+  };
+  for (std::size_t bit = 0; bit < all_squares; ++bit) {
+    centres.smooth |= std::uint32_t{is_smooth(square_of(bit))} << bit;
+  }
+}
+
+// A lamp whose light comes to a receiver.
+void CellBaker::ask_lamp(const Receivers& r, std::size_t k, std::size_t lamp) {
+  if (!past_pictures_ || needs_pictures_ || shadow_rays_.is_caustic(lamp)) return;
+  const LocalLight& light = frame_->planned_table->lamps[lamp];
+  if (light.ambient != 0) return;
+  const Vec3f from{r.px[k], r.py[k], r.pz[k]}, to = light.position - from;
+  const float far_m = length(to);
+  if (far_m > 0 && may_be_passed(from, to / far_m, far_m)) needs_pictures_ = true;
+}
+
+// Of being followed, for a ray that is such a share of its pixel. The less room there is, the
+// fewer.
+float CellBaker::chance_of_picture_ray(float share) const {
+  constexpr float half = 0.5F * CellTransport::most_picture_rays;
+  constexpr float least = 1.0F / 16;  // fewer would be sparks
+  const float room = 2 - static_cast<float>(transport_->picture_rays.size()) / half;
+  return room < least ? 0.0F : std::min(share * rays_of_pixel * std::min(room, 1.0F), 1.0F);
+}
+
+// A ray that pictures may come before; what it goes on to find is noted as behind it.
+std::uint16_t CellBaker::add_picture_ray(const QueuedRay& ray, float far_m) {
+  auto& rays = transport_->picture_rays;
+  const float chance = chance_of_picture_ray(largest(ray.throughput) * share_of_sample(ray.slot));
+  if (!(number_in_pixel(ray.pixel, index_of_sample(ray.slot), ray.path) < chance)) {
+    return ray.behind;
+  }
+  // What colours light on its way would weaken what it sees of pictures, too.
+  const bool coloured = passed_through(*frame_->inputs.scene, ray.media, 1) != Vec3f{1, 1, 1};
+  if (rays.size() == CellTransport::most_picture_rays || coloured) {
+    needs_pictures_ = true;
+    return ray.behind;
+  }
+  base_[slots + rays.size()] = {};
+  rays.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, ray.steps, far_m,
+                  ray.roughness, 1 / chance, static_cast<std::uint16_t>(target_of(ray)),
+                  CellTransport::PictureRay::no_lender, ray.kind, ray.one_of_many});
+  return static_cast<std::uint16_t>(rays.size() - 1);
+}
+
+// Whether pixels see things apart from each other that pictures may come between.
+bool CellBaker::pictures_may_part(std::size_t k) const {
+  const int px = static_cast<int>(k % cell_size), py = static_cast<int>(k / cell_size);
+  float nearest = ray_far, farthest = 0;
+  for (int y = py; y < py + 3; ++y) {
+    for (int x = px; x < px + 3; ++x) {
+      const float far_m = hidden_from(met_[static_cast<std::size_t>(y * ring_size + x)]);
+      nearest = std::min(nearest, far_m), farthest = std::max(farthest, far_m);
+    }
+  }
+  const auto& table = *frame_->inputs.directions;
+  const std::size_t t = table.index(y0_ + py, x0_ + px);
+  const Vec3f seen = normalize(frame_->turn.to_set(Vec3f{table.x[t], table.y[t], table.z[t]}));
+  return std::ranges::any_of(frame_->stalls.boxes(), [&](const Scene::Bounds& box) {
+    const auto [first, last] = stretch_in(box, frame_->camera, seen, ray_far);
+    return first <= last && nearest < last && farthest > first && nearest < farthest;
+  });
+}
+
+// The same for a centre that is one of its pixel's few samples.
+bool CellBaker::centre_looks_apart(std::size_t pixel) {
+  if (!in(transport_->looks_apart, pixel)) return false;
+  const auto& table = *frame_->inputs.directions;
+  const std::size_t t = table.index(y0_ + static_cast<int>(pixel / cell_size),
+                                    x0_ + static_cast<int>(pixel % cell_size));
+  const Vec3f seen = normalize(frame_->turn.to_set(Vec3f{table.x[t], table.y[t], table.z[t]}));
+  samples_each_ = effort_.aa_samples;
+  return look_apart({static_cast<std::uint16_t>(pixel), 0}, seen, transport_->far_m[pixel],
+                    1 / std::sqrt(static_cast<float>(samples_each_)),
+                    static_cast<std::uint16_t>(pixel)) != no_picture_ray;
+}
+
+// How far away something is that hides pictures behind it.
+float CellBaker::hidden_from(const Met& met) const {
+  const auto& instances = frame_->inputs.scene->description().instances;
+  if (met.surface.instance >= instances.size()) return ray_far;
+  const Instance& instance = instances[met.surface.instance];
+  const bool hides = instance.kind == ObjectKind::virtual_object || instance.occludes;
+  return hides ? length(met.position - frame_->camera) : ray_far;
+}
+
+// Whether a further ray looks at pictures by itself, and if so, its number; it shows what `lender`,
+// the centre of a pixel, does behind them, or what it finds itself.
+std::uint16_t CellBaker::look_apart(
+    const Further& f, Vec3f direction, float far_m, float width, std::uint16_t lender) {
+  const std::size_t pixel = f.pixel;
+  if (!in(transport_->looks_apart, pixel) || !may_be_passed(frame_->camera, direction, far_m)) {
+    return no_picture_ray;
+  }
+  auto& rays = transport_->picture_rays;
+  if (rays.size() == CellTransport::most_picture_rays) {
+    needs_pictures_ = true;
+    return no_picture_ray;
+  }
+  const float chance = chance_of_picture_ray(1 / static_cast<float>(samples_each_));
+  if (!(number_in_pixel(f.pixel, f.index, 0) < chance)) return no_picture_ray;
+  const auto [right, down] = sides_of(x0_ + static_cast<int>(pixel % cell_size),
+                                      y0_ + static_cast<int>(pixel / cell_size));
+  base_[slots + rays.size()] = {};
+  rays.push_back({frame_->camera,
+                  direction,
+                  {1, 1, 1},
+                  {frame_->turn.to_set(right) * width, frame_->turn.to_set(down) * width},
+                  {},
+                  far_m,
+                  0,
+                  1 / chance,
+                  static_cast<std::uint16_t>(cell_pixels + pixel),
+                  lender,
+                  RayKind::camera,
+                  false});
+  return static_cast<std::uint16_t>(rays.size() - 1);
+}
+
+// Light that a point gets of the table.
+void CellBaker::add_light_past_pictures(
+    const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part) {
+  const auto slot = static_cast<std::uint16_t>(target_of(p));
+  const auto number = static_cast<std::uint16_t>(light);
+  const Vec3f origin = past_pictures_ ? offset_origin(p.hit, p.hit.geometric_normal) : Vec3f{};
+  if (may_be_passed(origin, direction, ray_far)) {
+    const float chance =
+        std::min(largest(p.throughput) * share_of_sample(p.slot) * part * lights_of_pixel, 1.0F);
+    if (number_in_pixel(p.pixel, index_of_sample(p.slot), p.path + number) < chance) {
+      transport_->picture_lights.push_back({origin, direction, weight, 1 / chance, slot, number});
+      return;
+    }
+  }
+  add_light({slot, number, weight});
+}
+
+// What a light gives a point, of all that this gets if nothing is in the way.
+float CellBaker::part_of_light(const PointLight& l, Vec3f open) const {
+  const float all = largest(open);
+  const float own = largest(frame_->planned_table->lights[l.light].irradiance) * l.weight;
+  return all > own ? own / all : 1.0F;
+}
+
+// Light of a stand-in's point that is no centre, before the transport has it.
+void CellBaker::note_picture_shadow(const ShadePoint& p,
+                                    std::size_t receiver,
+                                    const PointLight& l,
+                                    Vec3f open) {
+  const Receivers& r = receivers_;
+  const Vec3f origin{r.px[receiver], r.py[receiver], r.pz[receiver]};
+  const Vec3f direction = shadow_rays_.direction(r, receiver, l.light);
+  if (!may_be_passed(origin, direction, ray_far)) return;
+  const float share = largest(p.throughput * p.plate_share) * share_of_sample(p.slot);
+  const float chance = std::min(share * part_of_light(l, open) * lights_of_pixel, 1.0F);
+  if (!(number_in_pixel(p.pixel, index_of_sample(p.slot), p.path + l.light) < chance)) return;
+  transport_->picture_shadows.push_back(
+      {origin,
+       direction,
+       {},
+       1 / chance,
+       static_cast<std::uint32_t>(transport_->shadow_lights.size()),
+       l.light});
+}
+
+// Of its pixel.
+float CellBaker::share_of_sample(std::size_t slot) const {
+  return is_further(slot) ? 1 / static_cast<float>(samples_each_) : 1.0F;
+}
+
+// A number in 0..1, well spread over the samples of a pixel.
+float CellBaker::number_in_pixel(std::uint32_t pixel,
+                                 std::uint32_t sample,
+                                 std::uint32_t path) const {
+  const std::uint32_t x = static_cast<std::uint32_t>(x0_) + pixel % cell_size;
+  const std::uint32_t y = static_cast<std::uint32_t>(y0_) + pixel / cell_size;
+  return SampleSequence(path * 3 + 1, y << 16U | x, sample).next();
+}
+
+// What pictures hide is looked at through a pixel's centre: where a further ray comes to a thing
+// before a picture, and the centre to one behind it, that will not do.
+void CellBaker::compare_with_centre(int index, const Further& f) {
+  if (needs_pictures_ || in(transport_->looks_apart, f.pixel)) return;
+  const auto i = static_cast<std::size_t>(index);
+  const float centre_m = transport_->far_m[f.pixel];
+  const float own_m = hides_pictures(index) ? stream_.far_m[i] : ray_far;
+  const Vec3f direction{stream_.dx[i], stream_.dy[i], stream_.dz[i]};
+  const bool may_differ =
+      std::ranges::any_of(frame_->stalls.boxes(), [&](const Scene::Bounds& box) {
+        const auto [first, last] = stretch_in(box, frame_->camera, direction, ray_far);
+        if (!(first <= last)) return false;
+        const bool hidden = own_m <= first && centre_m <= first;
+        const bool shown = own_m >= last && centre_m >= last;
+        return !hidden && !shown;
+      });
+  if (!may_differ) return;
+  needs_pictures_ =
+      !continuous(met_at(index), met_by(f.pixel), frame_->pixel_angle, frame_->camera);
+}
+
+}  // namespace render

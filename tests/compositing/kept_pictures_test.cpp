@@ -1,0 +1,339 @@
+// Cells that are found without the live pictures before them: what these hide, show and shade is
+// looked at in each frame, and nothing else is found anew.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "compositing/billboard.h"
+#include "compositing/keyed_picture.h"
+#include "furnished_scene.h"
+#include "made_shot.h"
+#include "render/kept_transport.h"
+#include "render/kernel.h"
+#include "render/picture_stalls.h"
+#include "render/trace.h"
+
+namespace compositing::kept_pictures_test {
+namespace {
+
+using render::FrameResult;
+using render::Vec3f;
+
+constexpr int width = 160, height = 120, cells = 10 * 8;
+
+// A soft-edged figure of two colours, which leans.
+std::shared_ptr<const KeyedPicture> figure(float lean, float red = 0.7F) {
+  constexpr int w = 96, h = 192;
+  capture::Image image = capture::make_image(h, w, 4);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      const float py = (static_cast<float>(y) + 0.5F) / h;
+      const float px = (static_cast<float>(x) + 0.5F) / w - 0.5F - lean * (1 - py);
+      const float head = 0.13F - std::hypot(px, (py - 0.16F) * 2);
+      const float body = 0.22F - std::abs(px) - 0.1F * std::abs(py - 0.6F);
+      const float within = std::max(head, py > 0.25F && py < 0.98F ? body : -1.0F);
+      const float alpha = std::clamp(0.5F + within * 30, 0.0F, 1.0F);
+      const std::array colour =
+          py < 0.27F ? std::array{red, 0.5F, 0.4F} : std::array{0.1F, 0.2F, red};
+      for (int c = 0; c < 3; ++c) image.at(y, x, c) = alpha * colour[static_cast<std::size_t>(c)];
+      image.at(y, x, 3) = alpha;
+    }
+  }
+  return std::make_shared<KeyedPicture>(make_keyed_texture(image));
+}
+
+// The shader of billboards, but for whom cells are found with their pictures.
+class FoundWith final : public render::Shader {
+ public:
+  explicit FoundWith(std::shared_ptr<const render::Shader> billboard)
+      : billboard_(std::move(billboard)) {}
+  void check(const render::SceneDescription& scene, const render::Material& m) const override {
+    billboard_->check(scene, m);
+  }
+  void shade(const render::ShadeContext& context,
+             std::span<render::ShadePoint* const> points,
+             render::RaySink& rays) const override {
+    billboard_->shade(context, points, rays);
+  }
+  bool lets_light_through(const render::Material&) const override { return true; }
+  bool glows_by_means() const override { return true; }
+  std::vector<std::size_t> pictures_of(const render::Material& m) const override {
+    return billboard_->pictures_of(m);
+  }
+  Vec3f transmittance(const render::ShadeContext& context,
+                      const render::Material& m,
+                      const render::HitPoint& hit,
+                      Vec3f incoming,
+                      render::RayKind kind,
+                      float footprint_m) const override {
+    return billboard_->transmittance(context, m, hit, incoming, kind, footprint_m);
+  }
+
+ private:
+  std::shared_ptr<const render::Shader> billboard_;
+};
+
+struct Places {
+  Vec3f person{0, 0, 0}, box{-0.8F, -0.5F, 0};
+};
+
+// A person between a box and a wall, on a floor that catches shadows, with a mirror behind and a
+// glass ball in front. What the camera sees of the person, the box hides in part.
+render::SceneDescription scene_of(const Places& at, const char* shader = "billboard") {
+  register_shaders();
+  render::register_shader("found_with",
+                          std::make_shared<FoundWith>(render::find_shader("billboard")));
+  render::SceneDescription scene;
+  scene.background = "plate";
+  scene.materials = {make_billboard_material("person", {})};
+  scene.materials[0].shader = shader;
+  scene.meshes = {std::make_shared<render::Mesh>(make_billboard_mesh(0))};
+  render::Instance& person = scene.instances.emplace_back();
+  person.name = "person";
+  person.set_from_object = {1, 0, 0, at.person.x, 0, 1, 0, at.person.y, 0, 0, 2, at.person.z};
+  person.moves = true;
+  furnish(scene, {0.9F, 1.4F}, {0.55F, -0.6F, 0.6F});
+  scene.materials.push_back(render::make_standard_material("box", {}));
+  scene.meshes.push_back(
+      made_ball({0, 0, 0.3F}, 0.3F, static_cast<std::uint32_t>(scene.materials.size() - 1)));
+  render::Instance& box = scene.instances.emplace_back();
+  box.name = "box";
+  box.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+  box.moves = true;
+  box.set_from_object = {1, 0, 0, at.box.x, 0, 1, 0, at.box.y, 0, 0, 1, at.box.z};
+  return scene;
+}
+
+// The same set with its things elsewhere: no part of it is made anew.
+render::SceneDescription moved_to(render::SceneDescription scene, const Places& at) {
+  auto& person = scene.instances.front().set_from_object;
+  auto& box = scene.instances.back().set_from_object;
+  person[3] = at.person.x, person[7] = at.person.y, person[11] = at.person.z;
+  box[3] = at.box.x, box[7] = at.box.y, box[11] = at.box.z;
+  return scene;
+}
+
+// And with another picture.
+void show(MadeShot& shot, const Places& at, std::shared_ptr<const render::LivePicture> picture) {
+  shot.scene = std::make_unique<render::Scene>(moved_to(shot.scene->description(), at), *shot.scene,
+                                               render::Scene::Pictures{std::move(picture)});
+}
+
+MadeShot shot_of(const Places& at,
+                 std::shared_ptr<const render::LivePicture> picture,
+                 const char* shader = "billboard") {
+  MadeShot shot;
+  shot.scene = std::make_unique<render::Scene>(scene_of(at, shader),
+                                               render::Scene::Pictures{std::move(picture)});
+  const double f = width * 1.1;
+  shot.directions = calibrate::make_direction_table(
+      {"pinhole", width, height, {f, f, (width - 1) / 2.0, (height - 1) / 2.0}});
+  shot.environment = made_sky(32, 0.1F, 1);
+  shot.plate = made_plate(height, width);
+  shot.job.cam_from_set = calibrate::look_at({0.3, -4, 1.6}, {0, 0, 0.9}, 0);
+  shot.job.lights = even_lights(64);
+  return shot;
+}
+
+FrameResult rendered(const MadeShot& shot,
+                     render::KeptTransport* kept,
+                     const render::PictureStalls* stalls = nullptr) {
+  render::FrameInputs inputs = shot.inputs();
+  inputs.kept = kept;
+  inputs.stalls = stalls;
+  FrameResult result;
+  render::render_frame(inputs, shot.job, shot.plate, result);
+  return result;
+}
+
+std::uint64_t rays_of(const FrameResult& result) {
+  const render::RenderStatistics& s = result.statistics;
+  return s.primary_rays + s.secondary_rays + s.shadow_rays;
+}
+
+// Before, behind, in mirrors, through glass, in shadow and at things' edges.
+TEST(KeptPictures, LookAsIfFoundWithThem) {
+  const Places at;
+  const MadeShot shot = shot_of(at, figure(0.1F));
+  const MadeShot with = shot_of(at, figure(0.1F), "found_with");
+  ASSERT_FALSE(render::make_frame_context(shot.inputs(), shot.job).stalls.empty());
+  ASSERT_TRUE(render::make_frame_context(with.inputs(), with.job).stalls.empty());
+  const capture::Image apart = capture::to_float(rendered(shot, nullptr).rgba);
+  const capture::Image truth = capture::to_float(rendered(with, nullptr).rgba);
+  double squares = 0, sum = 0;
+  int far_off = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      float most = 0;
+      for (int c = 0; c < 3; ++c) {
+        const float off = apart.at(y, x, c) - truth.at(y, x, c);
+        squares += double{off} * off;
+        sum += double{truth.at(y, x, c)} * truth.at(y, x, c);
+        most = std::max(most, std::abs(off));
+      }
+      far_off += most > 0.1F;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / sum), 0.012);
+  EXPECT_LT(far_off, width * height / 500);
+}
+
+TEST(KeptPictures, TakeNoRaysOfTheSet) {
+  MadeShot shot = shot_of({}, figure(0));
+  render::KeptTransport kept;
+  const std::uint64_t first = rays_of(rendered(shot, &kept));
+  for (const float lean : {0.05F, 0.1F}) {
+    show(shot, {}, figure(lean));
+    EXPECT_LT(rays_of(rendered(shot, &kept)), first / 5);
+    EXPECT_TRUE(std::ranges::all_of(kept.stages(),
+                                    [](int stage) { return stage == render::finished_stage; }));
+  }
+}
+
+// Pictures, their places within their stalls and beyond, other things, plate and stages change.
+TEST(KeptPictures, AreTheSameColdAndWarm) {
+  Places at;
+  MadeShot shot = shot_of(at, figure(0));
+  shot.job.effort.aa_samples = 4;
+  shot.job.effort.aa_tolerance = 0.2F;
+  shot.job.stages.assign(cells, render::finished_stage);
+  render::KeptTransport kept;
+  render::StallFollower follower;
+  std::mt19937 random(5);
+  const auto pick = [&random](int most) {
+    return std::uniform_int_distribution<int>(0, most)(random);
+  };
+  auto picture = figure(0);
+  int kept_frames = 0;
+  for (int frame = 0; frame < 20; ++frame) {
+    if (pick(2) > 0)
+      picture = figure(0.02F * static_cast<float>(pick(9)), 0.1F * static_cast<float>(pick(9)));
+    if (pick(2) == 0) at.person.x = 0.05F * static_cast<float>(pick(3));
+    if (pick(4) == 0) at.person.y = 0.4F * static_cast<float>(pick(2));
+    if (pick(3) == 0) at.box.x = -1.2F + 0.4F * static_cast<float>(pick(3));
+    show(shot, at, picture);
+    for (capture::Half& value : shot.plate.pixels) value ^= static_cast<capture::Half>(pick(1));
+    if (pick(2) == 0) {
+      for (std::uint8_t& stage : shot.job.stages) {
+        if (pick(3) == 0) stage = static_cast<std::uint8_t>(2 + pick(4));
+      }
+    }
+    const render::PictureStalls stalls = follower.follow(shot.scene->places());
+    const render::PictureStalls* given = pick(3) > 0 ? &stalls : nullptr;
+    const FrameResult warm = rendered(shot, &kept, given), cold = rendered(shot, nullptr, given);
+    EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
+    EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << frame;
+    kept_frames += 2 * rays_of(warm) < rays_of(cold);
+  }
+  EXPECT_GT(kept_frames, 2);
+}
+
+// Nothing is left of who has left the set.
+TEST(KeptPictures, LeaveNothingBehind) {
+  const auto nobody =
+      std::make_shared<KeyedPicture>(make_keyed_texture(capture::make_image(16, 16, 4)));
+  MadeShot shot = shot_of({}, figure(0));
+  render::KeptTransport kept;
+  rendered(shot, &kept);
+  show(shot, {}, nobody);
+  const FrameResult empty = rendered(shot, &kept);
+  render::SceneDescription set = scene_of({});
+  set.instances.erase(set.instances.begin());
+  MadeShot without = shot_of({}, figure(0));
+  without.scene = std::make_unique<render::Scene>(std::move(set));
+  const capture::Image a = capture::to_float(empty.rgba),
+                       b = capture::to_float(rendered(without, nullptr).rgba);
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    ASSERT_NEAR(a.pixels[i], b.pixels[i], 2e-3F * std::max(b.pixels[i], 1.0F)) << i;
+  }
+}
+
+// Rays to light are dimmed without a tree as by the tree's filter.
+TEST(KeptPictures, DimLightAsTheirShaderDoes) {
+  const BillboardCamera camera{{"pinhole", 96, 192, {180, 180, 47.5, 95.5}},
+                               calibrate::look_at({0.2, -3, 1.1}, {0, 0, 1}, 0)};
+  for (const bool filmed : {false, true}) {
+    for (const float translucency : {0.0F, 0.6F}) {
+      render::SceneDescription scene = scene_of({});
+      const BillboardSettings settings{.translucency = translucency};
+      scene.materials[0] = filmed ? make_billboard_material("person", settings, camera)
+                                  : make_billboard_material("person", settings);
+      scene.instances[0].set_from_object = {0.9F, -0.3F, 0.1F, 0.2F, 0.4F, 0.8F,
+                                            0,    0.1F,  0,    0.1F, 1.9F, 0.05F};
+      const render::Scene compiled(std::move(scene), {figure(0.1F)});
+      ASSERT_EQ(compiled.prepared().size(), 1U);
+      std::mt19937 random(9);
+      std::uniform_real_distribution<float> at(-1.5F, 1.5F);
+      constexpr std::size_t count = 2003;
+      std::array<std::vector<float>, 11> columns;
+      for (std::vector<float>& column : columns) column.assign(count, 0);
+      auto& [ox, oy, oz, dx, dy, dz, wide, cone, red, green, blue] = columns;
+      for (std::size_t i = 0; i < count; ++i) {
+        const Vec3f to = normalize(Vec3f{0.3F * at(random), 0.3F * at(random), 1 + at(random)} -
+                                   Vec3f{at(random), at(random), 0});
+        ox[i] = at(random), oy[i] = at(random), oz[i] = at(random);
+        dx[i] = to.x, dy[i] = to.y, dz[i] = to.z;
+        red[i] = green[i] = blue[i] = 1;
+      }
+      ASSERT_TRUE(compiled.prepared()[0].prepared->dim(
+          {count, ox.data(), oy.data(), oz.data(), dx.data(), dy.data(), dz.data(), wide.data(),
+           cone.data(), red.data(), green.data(), blue.data()}));
+      int dimmed = 0, unlike = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        const Vec3f share = transmittance(compiled, {ox[i], oy[i], oz[i]}, {dx[i], dy[i], dz[i]}, 0,
+                                          render::ray_far, render::mask_picture);
+        dimmed += share.x < 0.5F;
+        unlike += std::abs(share.x - red[i]) > 0.02F || std::abs(share.z - blue[i]) > 0.02F;
+      }
+      EXPECT_GT(dimmed, 20);
+      EXPECT_LT(unlike, 3) << filmed << translucency;  // at its very rim
+    }
+  }
+}
+
+render::Scene::Places places_at(float x, float wide = 1) {
+  render::Scene::Places places;
+  places.bounds = {{{x, 0, 0}, {x + wide, 0.1F, 2}}};
+  places.pictures = {{figure(0)}};
+  return places;
+}
+
+TEST(StallFollower, KeepsAStallUntilItIsLeft) {
+  render::StallFollower follower;
+  const render::PictureStalls first = follower.follow(places_at(0));
+  EXPECT_TRUE(first.hold(places_at(0)));
+  const auto same = [&](const render::PictureStalls& stalls) {
+    return render::PictureStalls::changed(first, stalls).empty();
+  };
+  EXPECT_TRUE(same(follower.follow(places_at(0.2F))));
+  EXPECT_TRUE(same(follower.follow(places_at(-0.2F))));
+  const render::PictureStalls second = follower.follow(places_at(3));
+  EXPECT_FALSE(same(second));
+  EXPECT_TRUE(second.hold(places_at(3)));
+  EXPECT_FALSE(second.hold(places_at(0)));
+}
+
+TEST(StallFollower, GivesUpWhatIsFarTooLargeForLong) {
+  render::StallFollower follower;
+  const render::PictureStalls wide = follower.follow(places_at(0, 8));
+  int frames = 0;
+  while (frames < 2 * render::StallFollower::patience &&
+         render::PictureStalls::changed(wide, follower.follow(places_at(1, 1))).empty()) {
+    ++frames;
+  }
+  EXPECT_EQ(frames, render::StallFollower::patience);
+}
+
+TEST(StallFollower, HasNoneOfNobody) {
+  render::StallFollower follower;
+  EXPECT_FALSE(follower.follow(places_at(0)).empty());
+  EXPECT_TRUE(follower.follow({}).empty());
+}
+
+}  // namespace
+}  // namespace compositing::kept_pictures_test
