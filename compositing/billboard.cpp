@@ -176,7 +176,7 @@ class StandingBillboard final : public render::Prepared {
       const Eight t = dot(corner_ - o, normal_) / facing;
       const Eights at = o + d * t;
       const Eight u = dot(at - corner_, along_right_), v = dot(at - corner_, along_up_);
-      unsigned met = render::bits_of((t > 0) & (t < render::ray_far) & (u >= 0) & (u <= 1) &
+      unsigned met = render::bits_of((t > 0) & (t < eight(rays.far_m)) & (u >= 0) & (u <= 1) &
                                      (v >= 0) & (v <= 1));
       for (met &= (1U << n) - 1; met != 0; met &= met - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(met)), ray = first + i;

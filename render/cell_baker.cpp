@@ -75,7 +75,8 @@ bool CellBaker::find(int stage, bool past_pictures) {
   const FrameContext& frame = *frame_;
   CellTransport& transport = *transport_;
   transport.clear();
-  past_pictures_ = gather_.past_pictures = transport.past_pictures = past_pictures;
+  past_pictures_ = transport.past_pictures = past_pictures;
+  gather_.pictures = past_pictures ? LivePictures::passed_apart : LivePictures::met;
   needs_pictures_ = false;
   const auto& table = *frame.inputs.directions;
   transport.blocks = {block_, std::min(cell_size, table.width - x0_),
@@ -149,7 +150,7 @@ void CellBaker::trace(
   }
   TraceContext context(*frame_->inputs.scene, kind, coherent);
   context.cone_rad = cone_rad;
-  context.past_pictures = past_pictures_ || pictures == LivePictures::passed;
+  context.pictures = past_pictures_ ? LivePictures::passed_apart : pictures;
   RTCRayHitNp rays;
   rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
               s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
@@ -478,7 +479,9 @@ void CellBaker::receive(int count, bool grid) {
       }
       gather_cell(shadow_rays_, r, gather_, transport_->visibility, *statistics_);
       transport_->receiving = r.active;
-      keep_shadowed(transport_->visibility, r.active, transport_->shadowed);
+      if (may_shade(transport_->visibility, r.active)) {
+        keep_shadowed(transport_->visibility, r.active, transport_->shadowed);
+      }
     } else {
       gather_points(shadow_rays_, r, gather_, tested_, *statistics_);
     }

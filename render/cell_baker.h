@@ -225,13 +225,15 @@ class CellBaker final : public RaySink {
   // cell_pictures.cpp
   void keep_far();
   void keep_distances();
+  bool may_shade(const CellVisibility& visibility, const CellMask& receiving) const;
   void keep_shadowed(CellVisibility& visibility,
                      const CellMask& receiving,
-                     std::vector<CellTransport::Shadowed>& shadowed);
+                     std::vector<CellTransport::Shadowed>& shadowed) const;
   bool may_be_passed(Vec3f from, Vec3f direction, float far_m) const {
     return past_pictures_ && !shades_ring_ && frame_->stalls.are_passed(from, direction, far_m);
   }
-  void ask_lamp(const Receivers& r, std::size_t k, std::size_t lamp);
+  bool may_dim_lamp(Vec3f from, std::size_t lamp) const;
+  void add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Vec3f weight);
   void note_picture_shadow(const ShadePoint& p,
                            std::size_t receiver,
                            const PointLight& l,
@@ -275,6 +277,10 @@ class CellBaker final : public RaySink {
                                  const LitCentres& lit_centres,
                                  const CellVisibility& visibility,
                                  LostLight& lost);
+  bool shade_lamps_by_pictures(const CellTransport::Shadowed& centres,
+                               const CellLamps& lamps,
+                               const CellMask& receiving,
+                               ColourPlanes& lost);
   bool look_for_light(const ShadowPlan& plan,
                       const CellTransport::Shadowed& centres,
                       Vec3f direction,
@@ -528,8 +534,9 @@ class CellBaker final : public RaySink {
   std::array<CellPictures::Seen, stream_rays> along_;
   std::array<float, stream_rays> came_m_, end_m_;
   std::vector<Scene::Bounds> pictures_at_;
-  bool takes_no_tree_ = false;  // what they dim
-  std::array<float, stream_rays> shadow_width_m_, shadow_cone_rad_;
+  std::vector<const Prepared*> dims_;  // of these
+  bool takes_no_tree_ = false;         // what they dim
+  std::array<float, stream_rays> shadow_width_m_, shadow_cone_rad_, light_far_m_;
   ColourPlanes hidden_;  // of one light, from centres
 };
 

@@ -205,10 +205,9 @@ void CellBaker::add_asked(const ShadePoint& p, const AskedAgain& asked) {
       p.throughput * p.diffuse *
       (asked.passed * asked.per_source - asked.passed_centre * asked.per_source_centre);
   if (weight == Vec3f{}) return;
-  const auto target = static_cast<std::uint16_t>(target_of(p));
   const LightTable& planned = *frame_->planned_table;
   if (asked.is_lamp) {
-    lamp_terms_.push_back({target, asked.number, weight});
+    add_lamp_past_pictures(p, asked.number, weight);
     samples_[p.slot].added += weight * planned.lamps[asked.number].intensity;
   } else {
     add_light_past_pictures(p, planned.lights[asked.number].direction, asked.number, weight);

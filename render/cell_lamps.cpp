@@ -13,12 +13,18 @@ void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_poin
   const auto planned = [&](std::size_t place) {
     return frame_->planned_table->lamps[cell.numbers[place]].intensity;
   };
+  bool dims = false;
   for (std::size_t i = 0; i < cell.numbers.size(); ++i) {
     const Vec3f intensity = planned(i);
     for (std::size_t k = 0; k < cell_pixels; ++k) {
       light_[k].lamps += intensity * cell.factors[i].at[k];
-      if (cell.factors[i].at[k] > 0) ask_lamp(receivers_, k, cell.numbers[i]);
+      dims = dims || (cell.factors[i].at[k] > 0 &&
+                      may_dim_lamp({receivers_.px[k], receivers_.py[k], receivers_.pz[k]},
+                                   cell.numbers[i]));
     }
+  }
+  if (dims && transport_->shadowed.empty()) {
+    keep_shadowed(transport_->visibility, receivers_.active, transport_->shadowed);
   }
   for (const TintedLight& tint : cell.tints) {
     light_[tint.centre].lamps -=
@@ -41,19 +47,22 @@ void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver
   for (const PointLamp& l : reached_) {
     const std::size_t i = point_of_receiver[l.point];
     const ShadePoint& p = points_[i];
-    ask_lamp(receivers_, l.point, l.lamp);
     const Vec3f factor = l.factor();
     const Vec3f irradiance = factor * frame_->planned_table->lamps[l.lamp].intensity;
     const Vec3f weight = p.throughput * p.diffuse * factor;
     light_of_point_[i].lamps += irradiance;
     if (weight != Vec3f{}) {
-      lamp_terms_.push_back({static_cast<std::uint16_t>(target_of(p)), l.lamp, weight});
+      add_lamp_past_pictures(p, l.lamp, weight);
     }
     if (bent_of_receiver_[l.point] != no_catcher && shadow_rays_.is_caustic(l.lamp)) {
       t.bent_caustics.push_back({bent_of_receiver_[l.point], l.lamp, factor});
     }
     const std::uint32_t catcher = catcher_of_receiver_[l.point];
     if (catcher == no_catcher) continue;
+    // What lamps add to the plate there is not looked at again.
+    const std::size_t r = l.point;
+    needs_pictures_ = needs_pictures_ ||
+                      may_dim_lamp({receivers_.px[r], receivers_.py[r], receivers_.pz[r]}, l.lamp);
     t.caught.push_back({catcher, l.lamp, factor});
     samples_[p.slot].added +=
         p.throughput * p.albedo * irradiance * (1 / std::numbers::pi_v<float>);

@@ -105,7 +105,9 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
   count_shadow_rays(
       cell_pixels, [&](std::size_t k) { return k; },
       [&] { gather_cell(shadow_rays_, r, gather_, t.mirrored_visibility, *statistics_); });
-  keep_shadowed(t.mirrored_visibility, mirrored, t.mirrored_shadowed);
+  if (may_shade(t.mirrored_visibility, mirrored)) {
+    keep_shadowed(t.mirrored_visibility, mirrored, t.mirrored_shadowed);
+  }
   r.mirrored = false;
   t.mirrored_receiving = mirrored;
   CellTransport::Mirrored& to = t.mirrored.emplace_back();

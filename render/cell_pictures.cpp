@@ -10,6 +10,7 @@
 #include "render/cell_baker.h"
 #include "render/cell_squares.h"
 #include "render/embree_context.h"
+#include "render/lamp_way.h"
 #include "render/smooth_blocks.h"
 #include "render/trace.h"
 
@@ -47,7 +48,7 @@ void CellBaker::keep_far() {
     // Nothing virtual is behind it, or the ray had passed it.
     const auto hides = closest_hit(*frame_->inputs.scene, frame_->camera,
                                    {stream_.dx[k], stream_.dy[k], stream_.dz[k]}, 0, mask_occluder,
-                                   RayKind::camera, LivePictures::passed);
+                                   RayKind::camera, LivePictures::passed_apart);
     far_m = hides ? hides->distance : ray_far;
   }
 }
@@ -65,26 +66,29 @@ void CellBaker::keep_distances() {
   }
 }
 
-// Keeps where the centres' shadow rays begin, if pictures may come into the way of any.
+// Whether pictures may come into the way of any light of the table to centres.
+bool CellBaker::may_shade(const CellVisibility& visibility, const CellMask& receiving) const {
+  if (!past_pictures_ || shades_ring_ || none(receiving)) return false;
+  CellTransport::Shadowed centres;
+  centres.px = receivers_.px, centres.py = receivers_.py, centres.pz = receivers_.pz;
+  const Scene::Bounds box = centres.box(receiving);
+  for (std::size_t i = 0; i < visibility.lit.size(); ++i) {
+    if (none(visibility.lit[i])) continue;
+    const DirectionRange to = frame_->soft_lights.range(i);
+    for (const Scene::Bounds& stall : frame_->stalls.boxes()) {
+      if (may_be_met(stall, box, to)) return true;
+    }
+  }
+  return false;
+}
+
+// Keeps where the centres' shadow rays begin.
 void CellBaker::keep_shadowed(CellVisibility& visibility,
                               const CellMask& receiving,
-                              std::vector<CellTransport::Shadowed>& shadowed) {
-  if (!past_pictures_ || shades_ring_ || none(receiving)) return;
+                              std::vector<CellTransport::Shadowed>& shadowed) const {
   const Receivers& r = receivers_;
-  CellTransport::Shadowed all;
+  CellTransport::Shadowed& all = shadowed.emplace_back();
   all.px = r.px, all.py = r.py, all.pz = r.pz;
-  const Scene::Bounds box = all.box(receiving);
-  const auto passes = [&](std::size_t light) {
-    const DirectionRange to = frame_->soft_lights.range(light);
-    return std::ranges::any_of(frame_->stalls.boxes(), [&](const Scene::Bounds& stall) {
-      return may_be_met(stall, box, to);
-    });
-  };
-  bool any = false;
-  for (std::size_t i = 0; i < visibility.lit.size() && !any; ++i) {
-    any = !none(visibility.lit[i]) && passes(i);
-  }
-  if (!any) return;
   std::ranges::sort(visibility.tints, {}, key_of);
   const auto apart = [&](std::size_t a, std::size_t b) {
     const bool same = in(receiving, b) && r.surface[a] == r.surface[b];
@@ -98,7 +102,6 @@ void CellBaker::keep_shadowed(CellVisibility& visibility,
     all.width_m[k] = std::sqrt(across * down);
   }
   find_smooth_squares(receiving, all);
-  shadowed.push_back(all);
 }
 
 // Notes which squares of the cell are one surface each.
@@ -117,14 +120,33 @@ void CellBaker::find_smooth_squares(const CellMask& receiving,
   }
 }
 
-// A lamp whose light comes to a receiver.
-void CellBaker::ask_lamp(const Receivers& r, std::size_t k, std::size_t lamp) {
-  if (!past_pictures_ || needs_pictures_ || shadow_rays_.is_caustic(lamp)) return;
+// Whether pictures may come between a point and a lamp.
+bool CellBaker::may_dim_lamp(Vec3f from, std::size_t lamp) const {
+  if (!past_pictures_ || shades_ring_ || shadow_rays_.is_caustic(lamp)) return false;
   const LocalLight& light = frame_->planned_table->lamps[lamp];
-  if (light.ambient != 0) return;
-  const Vec3f from{r.px[k], r.py[k], r.pz[k]}, to = light.position - from;
-  const float far_m = length(to);
-  if (far_m > 0 && may_be_passed(from, to / far_m, far_m)) needs_pictures_ = true;
+  const WayTo<float> way = way_to(from, light.position);
+  return light.ambient == 0 && way.distance_m > 0 &&
+         may_be_passed(from, way.direction, way.distance_m);
+}
+
+// Light that a point gets of a lamp.
+void CellBaker::add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Vec3f weight) {
+  const auto slot = static_cast<std::uint16_t>(target_of(p));
+  const auto number = static_cast<std::uint16_t>(lamp);
+  const Vec3f origin = past_pictures_ ? offset_origin(p.hit, p.hit.geometric_normal) : Vec3f{};
+  if (may_dim_lamp(origin, lamp)) {
+    const auto lamps = static_cast<float>(frame_->planned_table->lamps.size());
+    const float share = largest(p.throughput) * share_of_sample(p.slot);
+    const float chance = std::min(share / lamps * lights_of_pixel, 1.0F);
+    if (number_in_pixel(p.pixel, index_of_sample(p.slot), p.path + number) < chance) {
+      const WayTo<float> way = way_to(origin, frame_->planned_table->lamps[lamp].position);
+      transport_->picture_lights.push_back({origin, way.direction, weight,
+                                            way.distance_m * before_lamp, 1 / chance, slot, number,
+                                            true});
+      return;
+    }
+  }
+  lamp_terms_.push_back({slot, number, weight});
 }
 
 // Of being followed, for a ray that is such a share of its pixel. The less room there is, the
@@ -240,7 +262,8 @@ void CellBaker::add_light_past_pictures(
     const float chance =
         std::min(largest(p.throughput) * share_of_sample(p.slot) * part * lights_of_pixel, 1.0F);
     if (number_in_pixel(p.pixel, index_of_sample(p.slot), p.path + number) < chance) {
-      transport_->picture_lights.push_back({origin, direction, weight, 1 / chance, slot, number});
+      transport_->picture_lights.push_back(
+          {origin, direction, weight, ray_far, 1 / chance, slot, number, false});
       return;
     }
   }
@@ -270,9 +293,11 @@ void CellBaker::note_picture_shadow(const ShadePoint& p,
       {origin,
        direction,
        {},
+       ray_far,
        1 / chance,
        static_cast<std::uint32_t>(transport_->shadow_lights.size()),
-       l.light});
+       l.light,
+       false});
 }
 
 // Of its pixel.

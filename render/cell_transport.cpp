@@ -330,6 +330,11 @@ void relight(const CellTransport& cell,
     add_up_light({cell.receiving, c.nx, c.ny, c.nz}, light.lights, cell.visibility, w.light, w.soft,
                  pictures && pictures->shades ? &pictures->lost : nullptr);
     add_lamps(cell, light, w);
+    if (pictures && pictures->shades_lamps) {
+      for (std::size_t k = 0; k < cell_pixels; ++k) {
+        w.lamps.put(k, w.lamps.at(k) - pictures->lamps_lost.at(k));
+      }
+    }
   }
   light_centres(cell, w, picture);
   for (std::size_t i = 0; i < cell.bases_behind.size(); ++i) {
@@ -369,7 +374,9 @@ void relight(const CellTransport& cell,
     const Vec3f passed = pictures && !pictures->lit_through.empty()
                              ? passed_of(pictures->lit_through[i], l.stands_for)
                              : Vec3f{1, 1, 1};
-    picture.added[l.slot] += four_of(l.weight * passed) * light.irradiances[l.light];
+    const Four source =
+        l.lamp ? four_of(light.lamps[l.light].intensity) : light.irradiances[l.light];
+    picture.added[l.slot] += four_of(l.weight * passed) * source;
   }
   constexpr std::size_t step = EnvironmentTerms::slots;
   const std::span<Four> added(picture.added);

@@ -144,12 +144,14 @@ struct CellTransport {
     static constexpr std::uint16_t no_lender = 0xFFFF;
   };
   static constexpr std::size_t most_picture_rays = 31 * EnvironmentTerms::slots;
-  // Slot += weight * light of the table, as far as pictures let it pass.
+  // Slot += weight * light of the table, or intensity of a lamp, as far as pictures let it pass.
   struct PictureLight {
     Vec3f origin, direction, weight;
+    float far_m;       // where the light is
     float stands_for;  // as of picture rays
     std::uint32_t slot;
     std::uint16_t light;
+    bool lamp;
   };
   // Centres that pictures may cast shadows on: where their shadow rays begin, and how wide a square
   // of the surface each stands for.
@@ -263,12 +265,14 @@ struct CellPictures {
   // What centres lose, and what these mirror.
   bool shades = false, shades_mirrored = false;
   LostLight lost, mirrored_lost;
+  bool shades_lamps = false;
+  ColourPlanes lamps_lost;  // what centres lose of lamps
   bool has_foreground = false;
   CellTransport::Foreground foreground;
 
   bool any() const {
     return has_foreground || !along.empty() || !lit_through.empty() || !shadowed_through.empty() ||
-           shades || shades_mirrored;
+           shades || shades_mirrored || shades_lamps;
   }
 };
 

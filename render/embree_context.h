@@ -6,6 +6,7 @@
 #include <embree3/rtcore.h>
 
 #include "render/shader.h"
+#include "render/trace.h"
 
 namespace render {
 
@@ -15,7 +16,7 @@ struct TraceContext {
   const Scene* scene;
   RayKind kind = RayKind::camera;
   float cone_rad = std::numeric_limits<float>::infinity();  // full angle of rays, if it is known
-  bool past_pictures = false;  // surfaces that show live pictures are not there
+  LivePictures pictures = LivePictures::met;
   // Shadow rays: per ray id, share of light so far. Null: any surface that is not a hole blocks.
   float* transmittance_r = nullptr;
   float* transmittance_g = nullptr;

@@ -391,7 +391,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
   auto planned_table = std::make_shared<LightTable>(as_planned(job.lights));
   add_caustics(context, *planned_table);
   // Pictures cast no shadows on caustics, nor gather any: those are looked for with them.
-  if (inputs.scene->only_shows_pictures() && !context.caustics) {
+  if (!context.caustics) {
     const Scene::Places& places = inputs.scene->places();
     const bool given = inputs.stalls && inputs.stalls->hold(places);
     context.stalls = given ? *inputs.stalls : PictureStalls(places);

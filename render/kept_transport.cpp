@@ -47,7 +47,7 @@ void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame
         changes.relit = caustics_before->regions();
         std::ranges::copy(frame.caustics->regions(), std::back_inserter(changes.relit));
       }
-      changes.but_pictures = *Scene::moved_but_pictures(places_, scene.places());
+      changes.but_apart = *Scene::moved_but_apart(places_, scene.places());
       changes.moved = std::move(*moved);
       forget(std::move(changes), frame);
     } else {
@@ -92,9 +92,9 @@ void KeptTransport::forget(Changes changes, const FrameContext& frame) {
                        changes.relit);
   };
   // Cells that were found without pictures stay while these stay in their stalls.
-  const MovedThings but_pictures = things(changes.but_pictures), stalls = things(changes.stalls);
+  const MovedThings but_apart = things(changes.but_apart), stalls = things(changes.stalls);
   const bool any_past =
-      !changes.but_pictures.empty() || !changes.stalls.empty() || !changes.relit.empty();
+      !changes.but_apart.empty() || !changes.stalls.empty() || !changes.relit.empty();
   std::ranges::copy(changes.stalls, std::back_inserter(changes.moved));
   const MovedThings moved = things(changes.moved);
   const auto matters = [&](const MovedThings& things, std::size_t i, const CellTransport& cell) {
@@ -105,12 +105,12 @@ void KeptTransport::forget(Changes changes, const FrameContext& frame) {
     if (cell.stage == none) continue;
     const CellTransport& transport = *cell.transport;
     if (transport.past_pictures) {
-      const bool changed = any_past && (matters(but_pictures, i, transport) ||
+      const bool changed = any_past && (matters(but_apart, i, transport) ||
                                         stalls_matter(changes.stalls, stalls, i, frame));
       if (changed) cell.stage = none;
     } else if (matters(moved, i, transport)) {
       const bool but_by_pictures =
-          any_past && (matters(but_pictures, i, transport) || matters(stalls, i, transport));
+          any_past && (matters(but_apart, i, transport) || matters(stalls, i, transport));
       cell.needs_pictures = but_by_pictures ? none : cell.stage;
       cell.stage = none;
     }

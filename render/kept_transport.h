@@ -114,10 +114,10 @@ class KeptTransport {
            static_cast<std::size_t>(column);
   }
   void forget_all(const Scene& scene);
-  // What moved, where light falls otherwise, and what of that is no picture; where pictures have
-  // other stalls.
+  // What moved, where light falls otherwise, and what of that shows no picture apart; where
+  // pictures have other stalls.
   struct Changes {
-    std::vector<Scene::Bounds> moved, relit, but_pictures, stalls;
+    std::vector<Scene::Bounds> moved, relit, but_apart, stalls;
   };
   void forget(Changes changes, const FrameContext& frame);
   bool stalls_matter(const std::vector<Scene::Bounds>& boxes,

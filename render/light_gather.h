@@ -11,6 +11,7 @@
 #include "render/lamp_way.h"
 #include "render/ray_log.h"
 #include "render/scene.h"
+#include "render/trace.h"
 
 namespace render {
 
@@ -73,9 +74,9 @@ struct GatherWorkspace {
   std::array<std::uint32_t, stream_rays> ray_light, ray_point;
   std::array<float, stream_rays> ray_weight;  // of callers who want one back
   int rays = 0;
-  RayLog* log = nullptr;            // keeps all rays, if set
-  std::uint32_t* counts = nullptr;  // adds up shadow rays by receiver, if set
-  bool past_pictures = false;       // live pictures block nothing
+  RayLog* log = nullptr;                      // keeps all rays, if set
+  std::uint32_t* counts = nullptr;            // adds up shadow rays by receiver, if set
+  LivePictures pictures = LivePictures::met;  // that block light
 
   static constexpr int group = 64;  // lights at a time
   std::array<CellMask, group> lit, seen, tested, near;

@@ -12,6 +12,7 @@
 #include "render/cell_baker.h"
 #include "render/cell_squares.h"
 #include "render/embree_context.h"
+#include "render/lamp_way.h"
 #include "render/lanes.h"
 #include "render/straight_on.h"
 #include "render/trace.h"
@@ -145,7 +146,7 @@ bool CellBaker::look_at_pictures(const FrameContext& frame,
                                  CellPictures& seen,
                                  RenderStatistics& statistics) {
   seen.along.clear(), seen.lit_through.clear(), seen.shadowed_through.clear();
-  seen.shades = seen.shades_mirrored = seen.has_foreground = false;
+  seen.shades = seen.shades_mirrored = seen.shades_lamps = seen.has_foreground = false;
   if (!cell.past_pictures) return false;
   frame_ = &frame;
   statistics_ = &statistics;
@@ -155,12 +156,14 @@ bool CellBaker::look_at_pictures(const FrameContext& frame,
   const Scene& scene = *frame.inputs.scene;
   const Scene::Places& places = scene.places();
   for (std::size_t i = 0; i < places.bounds.size(); ++i) {
-    if (!places.pictures[i].empty()) pictures_at_.push_back(places.bounds[i]);
+    if (places.apart[i] != 0) pictures_at_.push_back(places.bounds[i]);
   }
-  takes_no_tree_ = scene.prepared().size() == pictures_at_.size() &&
-                   std::ranges::all_of(scene.prepared(), [](const PreparedSurface& surface) {
-                     return surface.prepared->dim({});
-                   });
+  dims_.clear();
+  for (const PreparedSurface& surface : scene.prepared()) {
+    if (scene.shows_apart(surface.instance)) dims_.push_back(surface.prepared.get());
+  }
+  takes_no_tree_ = dims_.size() == pictures_at_.size() &&
+                   std::ranges::all_of(dims_, [](const Prepared* by) { return by->dim({}); });
   if (!cell.far_m.empty()) see_straight(cell, seen);
   if (!cell.picture_rays.empty()) see_along(cell, seen);
   light_through(cell.picture_lights, seen.lit_through);
@@ -169,6 +172,10 @@ bool CellBaker::look_at_pictures(const FrameContext& frame,
     const CellTransport::Centres& c = cell.centres.front();
     seen.shades = shade_centres_by_pictures(
         cell.shadowed.front(), {cell.receiving, c.nx, c.ny, c.nz}, cell.visibility, seen.lost);
+  }
+  if (!cell.shadowed.empty() && !cell.lamps.numbers.empty()) {
+    seen.shades_lamps =
+        shade_lamps_by_pictures(cell.shadowed.front(), cell.lamps, cell.receiving, seen.lamps_lost);
   }
   if (!cell.mirrored_shadowed.empty()) {
     const CellTransport::Mirrored& m = cell.mirrored.front();
@@ -257,25 +264,26 @@ void CellBaker::shoot_at_pictures() {
   w.rays = 0;
   for (unsigned i = 0; i < n; ++i) w.tr[i] = w.tg[i] = w.tb[i] = 1;
   if (takes_no_tree_) {
-    const LightRays rays{n,
-                         w.ox.data(),
-                         w.oy.data(),
-                         w.oz.data(),
-                         w.dx.data(),
-                         w.dy.data(),
-                         w.dz.data(),
-                         shadow_width_m_.data(),
-                         shadow_cone_rad_.data(),
-                         w.tr.data(),
-                         w.tg.data(),
-                         w.tb.data()};
-    for (const PreparedSurface& surface : scene.prepared()) surface.prepared->dim(rays);
+    const LightRays rays{.count = n,
+                         .ox = w.ox.data(),
+                         .oy = w.oy.data(),
+                         .oz = w.oz.data(),
+                         .dx = w.dx.data(),
+                         .dy = w.dy.data(),
+                         .dz = w.dz.data(),
+                         .far_m = light_far_m_.data(),
+                         .width_m = shadow_width_m_.data(),
+                         .cone_rad = shadow_cone_rad_.data(),
+                         .red = w.tr.data(),
+                         .green = w.tg.data(),
+                         .blue = w.tb.data()};
+    for (const Prepared* by : dims_) by->dim(rays);
     return;
   }
   TraceContext context(scene, RayKind::shadow, false);
   for (unsigned i = 0; i < n; ++i) {
     w.near_m[i] = w.time[i] = 0;
-    w.far_m[i] = ray_far;
+    w.far_m[i] = light_far_m_[i];
     w.mask[i] = mask_picture;
     w.id[i] = i, w.flags[i] = 0;
   }
@@ -310,11 +318,12 @@ void CellBaker::light_through(std::span<const CellTransport::PictureLight> all,
   };
   for (std::size_t n = 0; n < all.size(); ++n) {
     const CellTransport::PictureLight& l = all[n];
-    if (!passes_picture(l.origin, l.direction, ray_far)) continue;
+    if (!passes_picture(l.origin, l.direction, l.far_m)) continue;
     const auto i = static_cast<std::size_t>(w.rays++);
     w.ox[i] = l.origin.x, w.oy[i] = l.origin.y, w.oz[i] = l.origin.z;
     w.dx[i] = l.direction.x, w.dy[i] = l.direction.y, w.dz[i] = l.direction.z;
     w.ray_point[i] = static_cast<std::uint32_t>(n);
+    light_far_m_[i] = l.far_m;
     if (w.rays == stream_rays) shoot();
   }
   shoot();
@@ -446,6 +455,7 @@ bool CellBaker::look_for_light(const ShadowPlan& plan,
     w.ray_point[n] = static_cast<std::uint32_t>(k);
     shadow_width_m_[n] = centres.width_m[k];
     shadow_cone_rad_[n] = cone_rad;
+    light_far_m_[n] = ray_far;
     if (w.rays == stream_rays) shoot();
   };
   for (const std::uint8_t bit : std::span(plan.squares).first(plan.count)) {
@@ -468,6 +478,67 @@ bool CellBaker::look_for_light(const ShadowPlan& plan,
   for (const std::uint8_t bit : std::span(plan.squares).first(any ? plan.count : 0)) {
     const Square square = square_of(bit);
     fill(square, hidden_.r), fill(square, hidden_.g), fill(square, hidden_.b);
+  }
+  return any;
+}
+
+// The light of lamps: each centre looks for each of them, as large as it is.
+bool CellBaker::shade_lamps_by_pictures(const CellTransport::Shadowed& centres,
+                                        const CellLamps& lamps,
+                                        const CellMask& receiving,
+                                        ColourPlanes& lost) {
+  GatherWorkspace& w = gather_;
+  const Scene::Bounds box = centres.box(receiving);
+  const Vec3f middle = (box.lower + box.upper) * 0.5F, half = (box.upper - box.lower) * 0.5F;
+  bool any = false;
+  for (std::size_t i = 0; i < lamps.numbers.size(); ++i) {
+    const LocalLight& lamp = frame_->job->lights.lamps[lamps.numbers[i]];
+    const WayTo<float> from_middle = way_to(middle, lamp.position);
+    const bool may_meet = std::ranges::any_of(pictures_at_, [&](const Scene::Bounds& picture) {
+      const auto [first, last] = stretch_in({picture.lower - half, picture.upper + half}, middle,
+                                            from_middle.direction, from_middle.distance_m);
+      return first <= last;
+    });
+    if (lamp.ambient != 0 || !may_meet) continue;
+    hidden_ = {};
+    bool hides = false;
+    const auto shoot = [&] {
+      const auto n = static_cast<std::size_t>(w.rays);
+      if (n == 0) return;
+      shoot_at_pictures();
+      for (std::size_t ray = 0; ray < n; ++ray) {
+        hidden_.put(w.ray_point[ray], {1 - w.tr[ray], 1 - w.tg[ray], 1 - w.tb[ray]});
+        hides = hides || w.tr[ray] < 1 || w.tg[ray] < 1 || w.tb[ray] < 1;
+      }
+    };
+    const float side_m = std::sqrt(lamp.area_m2);
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      if (!(lamps.factors[i].at[k] > 0)) continue;
+      const Vec3f from = centres.position(k);
+      const WayTo<float> way = way_to(from, lamp.position);
+      const float far_m = way.distance_m * before_lamp;
+      if (!(far_m > 0) || !passes_picture(from, way.direction, far_m)) continue;
+      const auto n = static_cast<std::size_t>(w.rays++);
+      w.ox[n] = from.x, w.oy[n] = from.y, w.oz[n] = from.z;
+      w.dx[n] = way.direction.x, w.dy[n] = way.direction.y, w.dz[n] = way.direction.z;
+      w.ray_point[n] = static_cast<std::uint32_t>(k);
+      shadow_width_m_[n] = centres.width_m[k];
+      shadow_cone_rad_[n] = side_m / way.distance_m;
+      light_far_m_[n] = far_m;
+      if (w.rays == stream_rays) shoot();
+    }
+    shoot();
+    if (!hides) continue;
+    for (const TintedLight& tint : lamps.tints) {
+      if (tint.light != i) continue;
+      const Vec3f own = hidden_.at(tint.centre);
+      hidden_.put(tint.centre, own - own * tint.lost_share);
+    }
+    if (!any) lost = {};
+    any = true;
+    for (std::size_t k = 0; k < cell_pixels; ++k) {
+      lost.put(k, lost.at(k) + lamp.intensity * hidden_.at(k) * lamps.factors[i].at[k]);
+    }
   }
   return any;
 }

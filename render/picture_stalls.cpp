@@ -36,12 +36,13 @@ float volume(const Scene::Bounds& box) {
   return size.x * size.y * size.z;
 }
 
-// Calls visit(number, bounds) for each moving instance that shows pictures and is anywhere.
+// Calls visit(number, bounds) for each moving instance that shows pictures apart and is anywhere.
 template <class Visit>
 void for_pictures(const Scene::Places& places, Visit&& visit) {
   for (std::size_t i = 0; i < places.bounds.size(); ++i) {
     const Scene::Bounds& bounds = places.bounds[i];
-    if (!places.pictures[i].empty() && bounds.lower.x <= bounds.upper.x) visit(i, bounds);
+    if (i < places.apart.size() && places.apart[i] != 0 && bounds.lower.x <= bounds.upper.x)
+      visit(i, bounds);
   }
 }
 

@@ -247,7 +247,7 @@ bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned 
   const auto& traced = *reinterpret_cast<const TraceContext*>(args->context);
   TraceContext context(*traced.scene, RayKind::camera, false);
   context.cone_rad = traced.cone_rad;  // what it passed on its way here it passes again
-  context.past_pictures = traced.past_pictures;
+  context.pictures = traced.pictures;
   RTCRayHit ray{};
   ray.ray = {.org_x = origin.x,
              .org_y = origin.y,
@@ -272,7 +272,15 @@ bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned 
 bool Scene::Impl::is_past_picture(const RTCFilterFunctionNArguments* args) const {
   const auto& context = *reinterpret_cast<const TraceContext*>(args->context);
   const auto& met = *static_cast<const Part*>(args->geometryUserPtr);
-  return context.past_pictures && !compiled->pictures_of_mesh[met.mesh].empty();
+  switch (context.pictures) {
+    case LivePictures::met:
+      return false;
+    case LivePictures::passed:
+      return !compiled->pictures_of_mesh[met.mesh].empty();
+    case LivePictures::passed_apart:
+      return compiled->shows_apart[met.mesh] != 0;
+  }
+  return false;
 }
 
 void Scene::Impl::filter_closest(const RTCFilterFunctionNArguments* args) {
@@ -462,7 +470,9 @@ bool Scene::shows_pictures(std::uint32_t instance) const {
 }
 const Scene::Places& Scene::places() const { return impl_->places; }
 
-bool Scene::only_shows_pictures() const { return impl_->compiled->only_shows_pictures; }
+bool Scene::shows_apart(std::uint32_t instance) const {
+  return impl_->compiled->shows_apart[impl_->description.instances[instance].mesh] != 0;
+}
 
 namespace {
 
@@ -491,9 +501,9 @@ std::optional<std::vector<Scene::Bounds>> Scene::moved(const Places& before, con
   return moved_of(before, now, [](std::size_t) { return true; });
 }
 
-std::optional<std::vector<Scene::Bounds>> Scene::moved_but_pictures(const Places& before,
-                                                                    const Places& now) {
-  return moved_of(before, now, [&](std::size_t i) { return now.pictures[i].empty(); });
+std::optional<std::vector<Scene::Bounds>> Scene::moved_but_apart(const Places& before,
+                                                                 const Places& now) {
+  return moved_of(before, now, [&](std::size_t i) { return now.apart[i] == 0; });
 }
 
 }  // namespace render

@@ -31,7 +31,7 @@ inline constexpr unsigned mask_virtual = 1;       // virtual objects
 inline constexpr unsigned mask_stand_in = 2;      // stand-ins, seen by camera and reflection rays
 inline constexpr unsigned mask_real_blocker = 4;  // stand-ins that block real light
 inline constexpr unsigned mask_occluder = 8;
-inline constexpr unsigned mask_picture = 16;  // what shows live pictures
+inline constexpr unsigned mask_picture = 16;  // Scene::shows_apart()
 // In the mask of a shadow ray: clear bodies block it.
 inline constexpr unsigned ray_glass_blocks = 1U << 31;
 
@@ -184,24 +184,25 @@ class Scene {
   const Pictures& pictures() const;
   const std::vector<PreparedSurface>& prepared() const;  // by Shader::prepare()
   bool shows_pictures(std::uint32_t instance) const;     // whether any is live on it
-  // Whether all that shows live pictures does nothing but glow by them and let pass what is behind
-  // (Shader::only_shows): what rays find without them holds then, less what they hide.
-  bool only_shows_pictures() const;
+  // Whether it does nothing but glow by live pictures and let pass what is behind
+  // (Shader::only_shows): what rays find without it holds then, less what it hides.
+  bool shows_apart(std::uint32_t instance) const;
   // Where the moving instances of a scene stand, what they show, and what else it is made of.
   struct Places {
     std::uint64_t parts = 0;  // differs between scenes that share nothing
     std::vector<std::array<float, 12>> set_from_object;
     std::vector<Bounds> bounds;
     std::vector<Pictures> pictures;                   // that each shows
+    std::vector<std::uint8_t> apart;                  // Scene::shows_apart()
     std::vector<std::shared_ptr<const Mesh>> shapes;  // of each; null: it does not deform
   };
   const Places& places() const;
   // Bounds, before and after, of what stands elsewhere in `now`, has another shape or shows another
   // picture; nothing if more than that differs.
   static std::optional<std::vector<Bounds>> moved(const Places& before, const Places& now);
-  // The same of what shows no picture.
-  static std::optional<std::vector<Bounds>> moved_but_pictures(const Places& before,
-                                                               const Places& now);
+  // The same of what does not show pictures apart.
+  static std::optional<std::vector<Bounds>> moved_but_apart(const Places& before,
+                                                            const Places& now);
 
  private:
   struct Part;

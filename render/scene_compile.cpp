@@ -127,19 +127,15 @@ void Scene::Compiled::find_pictures(const SceneDescription& description) {
       if (std::ranges::find(by, material) != by.end()) continue;
       const auto pictures = shaders[material]->pictures_of(description.materials[material]);
       if (!pictures.empty()) by.push_back(material);
-      only_shows_pictures =
-          only_shows_pictures &&
-          (pictures.empty() || shaders[material]->only_shows(description.materials[material]));
       for (const std::size_t picture : pictures) {
         if (std::ranges::find(shown, picture) == shown.end()) shown.push_back(picture);
       }
     }
+    const bool one = mesh->materials.size() == 1 && by.size() == 1;
+    shows_apart.push_back(one && shaders[by[0]]->only_shows(description.materials[by[0]]));
   }
   for (const Instance& instance : description.instances) {
-    if (pictures_of_mesh[instance.mesh].empty()) continue;
-    only_shows_pictures = only_shows_pictures && shown_by_material[instance.mesh].size() == 1 &&
-                          description.meshes[instance.mesh]->materials.size() == 1;
-    if (!instance.moves) {
+    if (!pictures_of_mesh[instance.mesh].empty() && !instance.moves) {
       throw std::invalid_argument("scene: object " + instance.name +
                                   " shows a live picture, but is not one that moves");
     }
@@ -152,9 +148,9 @@ void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
   const bool all_placed = instance == Part::none;
   const Instance still;
   const Instance& placing = all_placed ? still : description.instances[instance];
-  const bool shows_picture = !all_placed && !compiled->pictures_of_mesh[placing.mesh].empty();
-  rtcSetGeometryMask(geometry, all_placed ? ~mask_picture
-                                          : mask_of(placing) | (shows_picture ? mask_picture : 0U));
+  const bool shows_apart = !all_placed && compiled->shows_apart[placing.mesh] != 0;
+  rtcSetGeometryMask(
+      geometry, all_placed ? ~mask_picture : mask_of(placing) | (shows_apart ? mask_picture : 0U));
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR,
                           placing.set_from_object.data());
   rtcCommitGeometry(geometry);
@@ -217,6 +213,7 @@ void Scene::Impl::assemble(const Impl* before) {
     const Bounds bounds = placed_bounds(own, instance.set_from_object);
     places.set_from_object.push_back(instance.set_from_object);
     places.shapes.push_back(mesh->rest ? mesh : nullptr);
+    places.apart.push_back(c.shows_apart[instance.mesh]);
     Pictures& shown = places.pictures.emplace_back();
     for (const std::size_t picture : c.pictures_of_mesh[instance.mesh]) {
       if (picture >= pictures.size() || !pictures[picture]) {

@@ -117,6 +117,7 @@ struct Scene::Compiled {
   std::vector<Bounds> mesh_bounds;                     // of meshes that move, in their own frame
   std::vector<std::vector<std::size_t>> pictures_of_mesh;     // of the scene's, that it shows
   std::vector<std::vector<std::uint32_t>> shown_by_material;  // per mesh: those that show them
+  std::vector<std::uint8_t> shows_apart;  // per mesh: pictures, by Shader::only_shows() alone
   Bounds virtual_bounds = no_bounds, all_bounds = no_bounds;  // of what does not move
   std::vector<Bounds> blocker_boxes;                          // of it
   std::vector<GlowingPart> glowing_parts;                     // of it
@@ -128,7 +129,6 @@ struct Scene::Compiled {
   bool real_blockers = false;
   bool filters = false;
   bool has_glass = false;
-  bool only_shows_pictures = true;
 
   Compiled() = default;
   Compiled(const Compiled&) = delete;

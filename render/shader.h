@@ -102,11 +102,12 @@ class RaySink {
   virtual void push(const ShadePoint& from, const NewRay& ray) = 0;
 };
 
-// Rays towards lights that end nowhere, side by side.
+// Rays towards lights, side by side.
 struct LightRays {
   std::size_t count = 0;
   const float *ox = nullptr, *oy = nullptr, *oz = nullptr;
   const float *dx = nullptr, *dy = nullptr, *dz = nullptr;  // unit
+  const float* far_m = nullptr;                             // where the light is
   // How wide each begins, in metres, and by how much it widens a metre.
   const float *width_m = nullptr, *cone_rad = nullptr;
   float *red = nullptr, *green = nullptr, *blue = nullptr;  // what passes, so far

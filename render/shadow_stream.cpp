@@ -8,7 +8,7 @@ namespace render {
 void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics) {
   const auto n = static_cast<unsigned>(w.rays);
   TraceContext context(scene, RayKind::shadow, false);
-  context.past_pictures = w.past_pictures;
+  context.pictures = w.pictures;
   for (unsigned i = 0; i < n; ++i) {
     w.near_m[i] = 0, w.time[i] = 0, w.id[i] = i, w.flags[i] = 0;
   }

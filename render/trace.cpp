@@ -24,7 +24,7 @@ std::optional<TracedHit> closest_hit(const Scene& scene,
                                      RayKind kind,
                                      LivePictures pictures) {
   TraceContext context(scene, kind, false);
-  context.past_pictures = pictures == LivePictures::passed;
+  context.pictures = pictures;
   RTCRayHit ray{};
   ray.ray = {.org_x = origin.x,
              .org_y = origin.y,
@@ -54,7 +54,7 @@ Vec3f transmittance(const Scene& scene,
                     unsigned mask,
                     LivePictures pictures) {
   TraceContext context(scene, RayKind::shadow, false);
-  context.past_pictures = pictures == LivePictures::passed;
+  context.pictures = pictures;
   Vec3f share{1, 1, 1};
   context.transmittance_r = &share.x;
   context.transmittance_g = &share.y;

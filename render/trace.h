@@ -20,8 +20,8 @@ struct TracedHit {
   float u = 0, v = 0;
 };
 
-// Whether rays meet surfaces that show live pictures.
-enum class LivePictures : std::uint8_t { met, passed };
+// Whether rays meet surfaces that show live pictures: all; none; those that do not show them apart.
+enum class LivePictures : std::uint8_t { met, passed, passed_apart };
 
 // The nearest hit beyond `near_m`, holes passed.
 std::optional<TracedHit> closest_hit(const Scene& scene,
