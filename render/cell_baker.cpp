@@ -59,7 +59,7 @@ void CellBaker::bake(const FrameContext& frame,
   const KeptTransport* kept = frame.inputs.kept;
   const CellReach* known =
       kept ? kept->reach_with_pictures(x0 / cell_size, y0 / cell_size, stage) : nullptr;
-  const bool may_be_apart = block_ == 1 && !frame.stalls.empty();
+  const bool may_be_apart = !frame.stalls.empty();
   if (known || !may_be_apart || !find(stage, true)) {
     // What rays passed that were to find it without pictures decides, too.
     const CellReach reach = known ? *known : may_be_apart ? transport.reach : CellReach{};
@@ -105,9 +105,14 @@ bool CellBaker::find(int stage, bool past_pictures) {
   is_first_.fill(0);
   sent_.fill(0);
   looked_up_.direction = {};
-  see_foreground();
+  if (!past_pictures_) {
+    see_foreground();
+  } else if (block_ > 1) {
+    trace_all_pixels();
+    keep_far();
+  }
   trace_centres();
-  if (past_pictures_) keep_far();
+  if (past_pictures_ && block_ == 1) keep_far();
   const bool finds_edges = effort_.aa_samples > 1;
   if (finds_edges) keep_centres();
   shade_centres();

@@ -223,6 +223,7 @@ class CellBaker final : public RaySink {
   bool is_behind_foreground(int x, int y) const;
 
   // cell_pictures.cpp
+  void trace_all_pixels();
   void keep_far();
   void keep_distances();
   bool may_shade(const CellVisibility& visibility, const CellMask& receiving) const;

@@ -36,7 +36,19 @@ bool CellBaker::hides_pictures(int index) const {
   return met.kind == ObjectKind::virtual_object || met.occludes;
 }
 
-// Notes how far the centres' rays come: pictures may come before that.
+// Of blocks, a ray through each pixel: pictures before them are each pixel's own.
+void CellBaker::trace_all_pixels() {
+  set_rays_of_all_pixels(transport_->blocks);
+  for (int i = 0; i < cell_pixels; ++i) {
+    const bool taken = stream_.mask[static_cast<std::size_t>(i)] != 0;
+    statistics_->primary_rays += taken;
+    const auto [x, y] = pixel_of_ray(i);
+    if (counting_) counting_[y * cell_size + x].rays += taken;
+  }
+  trace(cell_pixels, true, RayKind::camera, frame_->pixel_angle);
+}
+
+// Notes how far the rays of pixels come: pictures may come before that.
 void CellBaker::keep_far() {
   transport_->far_m.resize(cell_pixels);
   for (int i = 0; i < cell_pixels; ++i) {
@@ -97,8 +109,9 @@ void CellBaker::keep_shadowed(CellVisibility& visibility,
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     all.width_m[k] = 0;
     if (!in(receiving, k)) continue;
-    const float across = apart(k, k % cell_size + 1 < cell_size ? k + 1 : k - 1);
-    const float down = apart(k, k + cell_size < cell_pixels ? k + cell_size : k - cell_size);
+    const auto step = static_cast<std::size_t>(block_), line = step * cell_size;
+    const float across = apart(k, k % cell_size + step < cell_size ? k + step : k - step);
+    const float down = apart(k, k + line < cell_pixels ? k + line : k - line);
     all.width_m[k] = std::sqrt(across * down);
   }
   find_smooth_squares(receiving, all);

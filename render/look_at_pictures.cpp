@@ -196,7 +196,9 @@ void CellBaker::see_straight(const CellTransport& cell, CellPictures& seen) {
     const bool in = x < cell.blocks.columns && y < cell.blocks.rows;
     end_m_[k] = in ? cell.far_m[static_cast<std::size_t>(y * cell_size + x)] : -1.0F;
     const bool apart = render::in(cell.looks_apart, static_cast<std::size_t>(y * cell_size + x));
-    const bool sees = stream_.mask[k] != 0 && end_m_[k] > 0 && !apart;
+    const bool sees =
+        stream_.mask[k] != 0 && end_m_[k] > 0 && !apart &&
+        passes_picture(frame_->camera, {stream_.dx[k], stream_.dy[k], stream_.dz[k]}, end_m_[k]);
     stream_.mask[k] = sees ? mask_picture : 0U;
     statistics_->primary_rays += sees;
   }

@@ -36,6 +36,21 @@ float volume(const Scene::Bounds& box) {
   return size.x * size.y * size.z;
 }
 
+// Boxes that hold what of one box lies outside of another.
+void add_rest(Scene::Bounds box, const Scene::Bounds& other, std::vector<Scene::Bounds>& rest) {
+  const auto cut = [&](float Vec3f::*axis) {
+    const float low = std::clamp(other.lower.*axis, box.lower.*axis, box.upper.*axis);
+    const float high = std::clamp(other.upper.*axis, box.lower.*axis, box.upper.*axis);
+    Scene::Bounds below = box, above = box;
+    below.upper.*axis = low, above.lower.*axis = high;
+    if (below.lower.*axis < low) rest.push_back(below);
+    if (above.upper.*axis > high) rest.push_back(above);
+    box.lower.*axis = low, box.upper.*axis = high;
+    return low < high;
+  };
+  if (cut(&Vec3f::x) && cut(&Vec3f::y)) cut(&Vec3f::z);
+}
+
 // Calls visit(number, bounds) for each moving instance that shows pictures apart and is anywhere.
 template <class Visit>
 void for_pictures(const Scene::Places& places, Visit&& visit) {
@@ -100,6 +115,12 @@ bool PictureStalls::are_passed(Vec3f from, Vec3f direction, float far_m) const {
 std::vector<Scene::Bounds> PictureStalls::changed(const PictureStalls& before,
                                                   const PictureStalls& now) {
   std::vector<Scene::Bounds> boxes;
+  const bool in_pairs = before.boxes_.size() == now.boxes_.size();
+  for (std::size_t i = 0; in_pairs && i < now.boxes_.size(); ++i) {
+    add_rest(before.boxes_[i], now.boxes_[i], boxes);
+    add_rest(now.boxes_[i], before.boxes_[i], boxes);
+  }
+  if (in_pairs) return boxes;
   for (const Scene::Bounds& box : before.boxes_) {
     if (!holds(now.boxes_, box)) boxes.push_back(box);
   }

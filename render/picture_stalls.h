@@ -25,7 +25,7 @@ class PictureStalls {
   bool are_passed(Vec3f from, Vec3f direction, float far_m) const;
   // Whether all of the pictures are in one of them.
   bool hold(const Scene::Places& places) const;
-  // Those of either that the other one has not.
+  // Boxes that hold what either has that the other one has not.
   static std::vector<Scene::Bounds> changed(const PictureStalls& before, const PictureStalls& now);
 
  private:

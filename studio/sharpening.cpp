@@ -48,6 +48,8 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
 // What a live frame may spend on cells.
 double Sharpening::rest_ms(bool at_rest) const {
   if (std::ranges::none_of(timed_, std::identity())) return 0;
+  // Finer cells take longer in every frame, where pictures of persons are looked at.
+  if (at_rest && relight_ms_ > share_at_rest * frame_ms_) return 0;
   const double share = at_rest ? share_at_rest : share_of_frame;
   return std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
 }

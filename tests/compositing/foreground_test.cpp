@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "compositing/billboard.h"
+#include "found_with.h"
 #include "made_shot.h"
 #include "render/kept_transport.h"
 #include "render/kernel.h"
@@ -53,13 +54,16 @@ struct Person {
 // The made shot's floor and ball of paint with persons who face its camera, 1 m high and wide.
 render::SceneDescription scene_with(const std::vector<Person>& persons) {
   render::SceneDescription scene = shot_scene();
+  register_found_with();
   scene.instances.pop_back();  // through glass, persons are as coarse as the rest
   constexpr float r = 0.70710678F;
   for (const Person& person : persons) {
     const auto number = static_cast<std::uint32_t>(scene.materials.size());
     const auto picture = static_cast<std::uint32_t>(&person - persons.data());
-    scene.materials.push_back(
+    render::Material& material = scene.materials.emplace_back(
         make_billboard_material("person", {.picture = picture, .lit = person.lit}));
+    // Others are not found with cells at all (kept_pictures_test.cpp).
+    material.shader = "found_with";
     scene.meshes.push_back(std::make_shared<render::Mesh>(make_billboard_mesh(number)));
     render::Instance& shown = scene.instances.emplace_back();
     shown.name = "person";

@@ -11,6 +11,7 @@
 
 #include "compositing/billboard.h"
 #include "compositing/keyed_picture.h"
+#include "found_with.h"
 #include "furnished_scene.h"
 #include "made_shot.h"
 #include "render/kept_transport.h"
@@ -47,37 +48,6 @@ std::shared_ptr<const KeyedPicture> figure(float lean, float red = 0.7F) {
   return std::make_shared<KeyedPicture>(make_keyed_texture(image));
 }
 
-// The shader of billboards, but for whom cells are found with their pictures.
-class FoundWith final : public render::Shader {
- public:
-  explicit FoundWith(std::shared_ptr<const render::Shader> billboard)
-      : billboard_(std::move(billboard)) {}
-  void check(const render::SceneDescription& scene, const render::Material& m) const override {
-    billboard_->check(scene, m);
-  }
-  void shade(const render::ShadeContext& context,
-             std::span<render::ShadePoint* const> points,
-             render::RaySink& rays) const override {
-    billboard_->shade(context, points, rays);
-  }
-  bool lets_light_through(const render::Material&) const override { return true; }
-  bool glows_by_means() const override { return true; }
-  std::vector<std::size_t> pictures_of(const render::Material& m) const override {
-    return billboard_->pictures_of(m);
-  }
-  Vec3f transmittance(const render::ShadeContext& context,
-                      const render::Material& m,
-                      const render::HitPoint& hit,
-                      Vec3f incoming,
-                      render::RayKind kind,
-                      float footprint_m) const override {
-    return billboard_->transmittance(context, m, hit, incoming, kind, footprint_m);
-  }
-
- private:
-  std::shared_ptr<const render::Shader> billboard_;
-};
-
 struct Places {
   Vec3f person{0, 0, 0}, box{-0.8F, -0.5F, 0};
   bool with_lit = false;  // and somebody in the set's light beside
@@ -87,8 +57,7 @@ struct Places {
 // glass ball in front. What the camera sees of the person, the box hides in part.
 render::SceneDescription scene_of(const Places& at, const char* shader = "billboard") {
   register_shaders();
-  render::register_shader("found_with",
-                          std::make_shared<FoundWith>(render::find_shader("billboard")));
+  register_found_with();
   render::SceneDescription scene;
   scene.background = "plate";
   scene.materials = {make_billboard_material("person", {})};
@@ -207,6 +176,23 @@ void expect_as_if_found_with(bool lamps) {
   ::testing::Test::RecordProperty("relative_rms", std::to_string(std::sqrt(squares / sum)));
 }
 
+// In blocks, too, persons are each pixel's own; what blocks share is as coarse as without them.
+TEST(KeptPictures, AreEachPixelsOwnInBlocks) {
+  MadeShot shot = shot_of({}, figure(0.1F)), with = shot_of({}, figure(0.1F), "found_with");
+  for (MadeShot* of : {&shot, &with}) of->job.stages.assign(cells, 1);
+  const capture::Image apart = capture::to_float(rendered(shot, nullptr).rgba);
+  const capture::Image truth = capture::to_float(rendered(with, nullptr).rgba);
+  int far_off = 0;
+  for (std::size_t i = 0; i < truth.pixels.size(); ++i) {
+    far_off += std::abs(apart.pixels[i] - truth.pixels[i]) > 0.05F;
+  }
+  EXPECT_LT(far_off, width * height / 40);
+  render::KeptTransport kept;
+  const std::uint64_t first = rays_of(rendered(shot, &kept));
+  show(shot, {}, figure(0));
+  EXPECT_LT(rays_of(rendered(shot, &kept)), first / 3);
+}
+
 TEST(KeptPictures, LookAsIfFoundWithThem) { expect_as_if_found_with(false); }
 TEST(KeptPictures, DimLampsAsIfFoundWithThem) { expect_as_if_found_with(true); }
 
@@ -249,7 +235,7 @@ void expect_same_cold_and_warm(bool with_lit) {
     for (capture::Half& value : shot.plate.pixels) value ^= static_cast<capture::Half>(pick(1));
     if (pick(2) == 0) {
       for (std::uint8_t& stage : shot.job.stages) {
-        if (pick(3) == 0) stage = static_cast<std::uint8_t>(2 + pick(4));
+        if (pick(3) == 0) stage = static_cast<std::uint8_t>(pick(6));
       }
     }
     const render::PictureStalls stalls = follower.follow(shot.scene->places());
