@@ -484,8 +484,9 @@ void CellBaker::receive(int count, bool grid) {
       }
       gather_cell(shadow_rays_, r, gather_, transport_->visibility, *statistics_);
       transport_->receiving = r.active;
+      sort_tints(transport_->visibility);
       if (may_shade(transport_->visibility, r.active)) {
-        keep_shadowed(transport_->visibility, r.active, transport_->shadowed);
+        keep_shadowed(r.active, transport_->shadowed);
       }
     } else {
       gather_points(shadow_rays_, r, gather_, tested_, *statistics_);

@@ -227,8 +227,8 @@ class CellBaker final : public RaySink {
   void keep_far();
   void keep_distances();
   bool may_shade(const CellVisibility& visibility, const CellMask& receiving) const;
-  void keep_shadowed(CellVisibility& visibility,
-                     const CellMask& receiving,
+  void sort_tints(CellVisibility& visibility) const;
+  void keep_shadowed(const CellMask& receiving,
                      std::vector<CellTransport::Shadowed>& shadowed) const;
   bool may_be_passed(Vec3f from, Vec3f direction, float far_m) const {
     return past_pictures_ && !shades_ring_ && frame_->stalls.are_passed(from, direction, far_m);
@@ -257,6 +257,7 @@ class CellBaker final : public RaySink {
       const Further& f, Vec3f direction, float far_m, float width, std::uint16_t lender);
   void compare_with_centre(int index, const Further& f);
   bool hides_pictures(int index) const;
+  float picture_end(int index, Vec3f from, Vec3f direction) const;
   template <class SetPoint>
   bool look_along(int count, bool coherent, RayKind kind, float cone_rad, SetPoint&& set_point);
   bool passes_picture(Vec3f from, Vec3f direction, float far_m) const;

@@ -96,9 +96,11 @@ void CellBaker::bounce() {
         meet_surroundings(q, i);
         continue;
       }
+      const float end_m = past_pictures_ ? picture_end(static_cast<int>(i), q.origin, q.direction)
+                                         : stream_.far_m[i];
       const std::uint16_t behind =
-          q.surroundings == Vec3f{} && may_be_passed(q.origin, q.direction, stream_.far_m[i])
-              ? add_picture_ray(q, stream_.far_m[i])
+          q.surroundings == Vec3f{} && may_be_passed(q.origin, q.direction, end_m)
+              ? add_picture_ray(q, end_m)
               : q.behind;
       const bool before_pictures = behind != q.behind;
       // What it counts as is not what it meets, but by how much that differs from what is straight

@@ -349,9 +349,9 @@ void CellBaker::finish_further(int count) {
     if (past_pictures_) {
       compare_with_centre(i, f);
       const auto ray = static_cast<std::size_t>(i);
+      const Vec3f direction{stream_.dx[ray], stream_.dy[ray], stream_.dz[ray]};
       behind = look_apart(
-          f, {stream_.dx[ray], stream_.dy[ray], stream_.dz[ray]},
-          hides_pictures(i) ? stream_.far_m[ray] : ray_far, finer,
+          f, direction, picture_end(i, frame_->camera, direction), finer,
           shares ? static_cast<std::uint16_t>(neighbour) : CellTransport::PictureRay::no_lender);
     }
     if (shares) {

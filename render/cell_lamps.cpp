@@ -24,7 +24,7 @@ void CellBaker::add_centre_lamps(std::span<const std::uint16_t> receiver_of_poin
     }
   }
   if (dims && transport_->shadowed.empty()) {
-    keep_shadowed(transport_->visibility, receivers_.active, transport_->shadowed);
+    keep_shadowed(receivers_.active, transport_->shadowed);
   }
   for (const TintedLight& tint : cell.tints) {
     light_[tint.centre].lamps -=

@@ -105,9 +105,8 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
   count_shadow_rays(
       cell_pixels, [&](std::size_t k) { return k; },
       [&] { gather_cell(shadow_rays_, r, gather_, t.mirrored_visibility, *statistics_); });
-  if (may_shade(t.mirrored_visibility, mirrored)) {
-    keep_shadowed(t.mirrored_visibility, mirrored, t.mirrored_shadowed);
-  }
+  sort_tints(t.mirrored_visibility);
+  if (may_shade(t.mirrored_visibility, mirrored)) keep_shadowed(mirrored, t.mirrored_shadowed);
   r.mirrored = false;
   t.mirrored_receiving = mirrored;
   CellTransport::Mirrored& to = t.mirrored.emplace_back();

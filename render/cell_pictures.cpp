@@ -19,7 +19,7 @@ namespace {
 
 // Where a pixel has more rays than that which pictures may come before, or lights that they may
 // dim, some stand for all: the dimmer ones, of which each is less of it than one of so many alike.
-constexpr float rays_of_pixel = 96, lights_of_pixel = 256;
+constexpr float rays_of_pixel = 48, lights_of_pixel = 256;
 
 std::uint32_t key_of(const TintedLight& tint) { return tint.light * 256U + tint.centre; }
 
@@ -34,6 +34,18 @@ bool CellBaker::hides_pictures(int index) const {
   const Instance& met =
       instances[scene.surface_of(stream_.geom[i], stream_.prim[i], stream_.inst[i]).instance];
   return met.kind == ObjectKind::virtual_object || met.occludes;
+}
+
+// How far along one of the stream's rays pictures show: up to what hides them.
+float CellBaker::picture_end(int index, Vec3f from, Vec3f direction) const {
+  const auto i = static_cast<std::size_t>(index);
+  const bool stands_in = (stream_.mask[i] & mask_stand_in) != 0 &&
+                         stream_.geom[i] != RTC_INVALID_GEOMETRY_ID && !hides_pictures(index);
+  if (!stands_in) return stream_.far_m[i];
+  // Nothing virtual is behind it, or the ray had passed it.
+  const auto hides = closest_hit(*frame_->inputs.scene, from, direction, 0, mask_occluder,
+                                 RayKind::camera, LivePictures::passed_apart);
+  return hides ? hides->distance : ray_far;
 }
 
 // Of blocks, a ray through each pixel: pictures before them are each pixel's own.
@@ -54,14 +66,8 @@ void CellBaker::keep_far() {
   for (int i = 0; i < cell_pixels; ++i) {
     const auto [x, y] = pixel_of_ray(i);
     const auto k = static_cast<std::size_t>(i);
-    float& far_m = transport_->far_m[static_cast<std::size_t>(y * cell_size + x)];
-    far_m = stream_.far_m[k];
-    if (stream_.geom[k] == RTC_INVALID_GEOMETRY_ID || hides_pictures(i)) continue;
-    // Nothing virtual is behind it, or the ray had passed it.
-    const auto hides = closest_hit(*frame_->inputs.scene, frame_->camera,
-                                   {stream_.dx[k], stream_.dy[k], stream_.dz[k]}, 0, mask_occluder,
-                                   RayKind::camera, LivePictures::passed_apart);
-    far_m = hides ? hides->distance : ray_far;
+    transport_->far_m[static_cast<std::size_t>(y * cell_size + x)] =
+        picture_end(i, frame_->camera, {stream_.dx[k], stream_.dy[k], stream_.dz[k]});
   }
 }
 
@@ -76,6 +82,11 @@ void CellBaker::keep_distances() {
     transport_->nearest_m = std::min(transport_->nearest_m, far_m);
     transport_->farthest_m = std::max(transport_->farthest_m, far_m);
   }
+}
+
+// Brings what glass tints into the order in which pictures dim it.
+void CellBaker::sort_tints(CellVisibility& visibility) const {
+  if (past_pictures_) std::ranges::sort(visibility.tints, {}, key_of);
 }
 
 // Whether pictures may come into the way of any light of the table to centres.
@@ -95,13 +106,11 @@ bool CellBaker::may_shade(const CellVisibility& visibility, const CellMask& rece
 }
 
 // Keeps where the centres' shadow rays begin.
-void CellBaker::keep_shadowed(CellVisibility& visibility,
-                              const CellMask& receiving,
+void CellBaker::keep_shadowed(const CellMask& receiving,
                               std::vector<CellTransport::Shadowed>& shadowed) const {
   const Receivers& r = receivers_;
   CellTransport::Shadowed& all = shadowed.emplace_back();
   all.px = r.px, all.py = r.py, all.pz = r.pz;
-  std::ranges::sort(visibility.tints, {}, key_of);
   const auto apart = [&](std::size_t a, std::size_t b) {
     const bool same = in(receiving, b) && r.surface[a] == r.surface[b];
     return same ? length(all.position(b) - all.position(a)) : 0.0F;
@@ -147,6 +156,7 @@ void CellBaker::add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Ve
   const auto slot = static_cast<std::uint16_t>(target_of(p));
   const auto number = static_cast<std::uint16_t>(lamp);
   const Vec3f origin = past_pictures_ ? offset_origin(p.hit, p.hit.geometric_normal) : Vec3f{};
+  if (past_pictures_ && grid_ && !shades_ring_) transport_->reach.add_receiver(*grid_, origin);
   if (may_dim_lamp(origin, lamp)) {
     const auto lamps = static_cast<float>(frame_->planned_table->lamps.size());
     const float share = largest(p.throughput) * share_of_sample(p.slot);
@@ -167,14 +177,19 @@ void CellBaker::add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Ve
 float CellBaker::chance_of_picture_ray(float share) const {
   constexpr float half = 0.5F * CellTransport::most_picture_rays;
   constexpr float least = 1.0F / 16;  // fewer would be sparks
-  const float room = 2 - static_cast<float>(transport_->picture_rays.size()) / half;
-  return room < least ? 0.0F : std::min(share * rays_of_pixel * std::min(room, 1.0F), 1.0F);
+  const auto taken = static_cast<float>(transport_->picture_rays.size());
+  const float room = std::clamp(2 - taken / half, least, 1.0F);
+  return std::min(share * rays_of_pixel * room, 1.0F);
 }
 
 // A ray that pictures may come before; what it goes on to find is noted as behind it.
 std::uint16_t CellBaker::add_picture_ray(const QueuedRay& ray, float far_m) {
   auto& rays = transport_->picture_rays;
-  const float chance = chance_of_picture_ray(largest(ray.throughput) * share_of_sample(ray.slot));
+  // Within a body of glass about a picture, one after the other may meet it.
+  const auto others =
+      ray.behind == no_picture_ray ? 0U : std::min(rays[ray.behind].behind + 1U, 20U);
+  const float share = largest(ray.throughput) * share_of_sample(ray.slot);
+  const float chance = chance_of_picture_ray(share / static_cast<float>(1U << others));
   if (!(number_in_pixel(ray.pixel, index_of_sample(ray.slot), ray.path) < chance)) {
     return ray.behind;
   }
@@ -187,7 +202,8 @@ std::uint16_t CellBaker::add_picture_ray(const QueuedRay& ray, float far_m) {
   base_[slots + rays.size()] = {};
   rays.push_back({ray.origin, ray.direction, ray.throughput, ray.spread, ray.steps, far_m,
                   ray.roughness, 1 / chance, static_cast<std::uint16_t>(target_of(ray)),
-                  CellTransport::PictureRay::no_lender, ray.kind, ray.one_of_many});
+                  CellTransport::PictureRay::no_lender, ray.kind, static_cast<std::uint8_t>(others),
+                  ray.one_of_many});
   return static_cast<std::uint16_t>(rays.size() - 1);
 }
 
@@ -261,6 +277,7 @@ std::uint16_t CellBaker::look_apart(
                   static_cast<std::uint16_t>(cell_pixels + pixel),
                   lender,
                   RayKind::camera,
+                  0,
                   false});
   return static_cast<std::uint16_t>(rays.size() - 1);
 }
@@ -271,6 +288,7 @@ void CellBaker::add_light_past_pictures(
   const auto slot = static_cast<std::uint16_t>(target_of(p));
   const auto number = static_cast<std::uint16_t>(light);
   const Vec3f origin = past_pictures_ ? offset_origin(p.hit, p.hit.geometric_normal) : Vec3f{};
+  if (past_pictures_ && grid_ && !shades_ring_) transport_->reach.add_receiver(*grid_, origin);
   if (may_be_passed(origin, direction, ray_far)) {
     const float chance =
         std::min(largest(p.throughput) * share_of_sample(p.slot) * part * lights_of_pixel, 1.0F);
@@ -330,11 +348,13 @@ float CellBaker::number_in_pixel(std::uint32_t pixel,
 // What pictures hide is looked at through a pixel's centre: where a further ray comes to a thing
 // before a picture, and the centre to one behind it, that will not do.
 void CellBaker::compare_with_centre(int index, const Further& f) {
-  if (needs_pictures_ || in(transport_->looks_apart, f.pixel)) return;
   const auto i = static_cast<std::size_t>(index);
-  const float centre_m = transport_->far_m[f.pixel];
-  const float own_m = hides_pictures(index) ? stream_.far_m[i] : ray_far;
   const Vec3f direction{stream_.dx[i], stream_.dy[i], stream_.dz[i]};
+  const float centre_m = transport_->far_m[f.pixel];
+  const float own_m = picture_end(index, frame_->camera, direction);
+  transport_->nearest_m = std::min({transport_->nearest_m, own_m, centre_m});
+  transport_->farthest_m = std::max({transport_->farthest_m, own_m, centre_m});
+  if (needs_pictures_ || in(transport_->looks_apart, f.pixel)) return;
   const bool may_differ =
       std::ranges::any_of(frame_->stalls.boxes(), [&](const Scene::Bounds& box) {
         const auto [first, last] = stretch_in(box, frame_->camera, direction, ray_far);

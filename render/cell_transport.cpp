@@ -159,21 +159,24 @@ void light_shadow_points(const CellTransport& cell,
   const bool dims = pictures && !pictures->shadowed_through.empty();
   std::size_t dimmed = 0;  // of the picture shadows, which are in order
   for (const CellTransport::ShadowPoint& point : cell.shadow_points) {
-    Vec3f open{}, lost{};
+    Vec3f open{}, lost{}, hidden{};
     for (std::uint32_t i = point.first; i < point.first + point.count; ++i) {
       const CellTransport::ShadowLight& s = cell.shadow_lights[i];
       const Vec3f e = light.lights[s.light].irradiance;
       open += e * s.open;
-      Vec3f own_lost = s.lost;
+      lost += e * s.lost;
       if (dims && dimmed < cell.picture_shadows.size() && cell.picture_shadows[dimmed].slot == i) {
-        const Vec3f all{s.open, s.open, s.open};
-        own_lost = all - (all - own_lost) * passed_of(pictures->shadowed_through[dimmed],
-                                                      cell.picture_shadows[dimmed].stands_for);
+        const Vec3f all{1, 1, 1};
+        hidden += e * (all * s.open - s.lost) * (all - pictures->shadowed_through[dimmed]) *
+                  cell.picture_shadows[dimmed].stands_for;
         ++dimmed;
       }
-      lost += e * own_lost;
     }
-    w.passing_at_points.push_back(passing(open, lost));
+    // Not bounded: of several points some stand for all.
+    const auto part = [](float gone, float all) { return all > 0 ? gone / all : 0.0F; };
+    w.passing_at_points.push_back(passing(open, lost) - Vec3f{part(hidden.x, open.x),
+                                                              part(hidden.y, open.y),
+                                                              part(hidden.z, open.z)});
     picture.share[point.slot] += with_mean(point.share * w.passing_at_points.back());
     w.open_at_points.push_back(open);
   }
@@ -400,7 +403,7 @@ void relight(const CellTransport& cell,
     const std::size_t to = cell_pixels + b.pixel;
     picture.added[to] += picture.added[b.centre] * n;
     picture.share[to] += picture.share[b.centre] * n;
-    picture.seen[to] += cell.base(b.centre).seen * n;
+    picture.seen[to] += picture.seen[b.centre] * n;
   }
   for (const CellTransport::Further& f : cell.further) {
     const auto n = static_cast<float>(f.count);

@@ -140,7 +140,8 @@ struct CellTransport {
     std::uint16_t target;
     std::uint16_t lender;  // the centre that has what is behind, or no_lender
     RayKind kind;
-    bool one_of_many;  // of rays all over a lobe
+    std::uint8_t behind;  // so many others on its path
+    bool one_of_many;     // of rays all over a lobe
     static constexpr std::uint16_t no_lender = 0xFFFF;
   };
   static constexpr std::size_t most_picture_rays = 31 * EnvironmentTerms::slots;

@@ -102,7 +102,10 @@ void KeptTransport::forget(Changes changes, const FrameContext& frame) {
   };
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     Cell& cell = cells_[i];
-    if (cell.stage == none) continue;
+    if (cell.stage == none) {
+      cell.needs_pictures = none;
+      continue;
+    }
     const CellTransport& transport = *cell.transport;
     if (transport.past_pictures) {
       const bool changed = any_past && (matters(but_apart, i, transport) ||
@@ -127,7 +130,9 @@ bool KeptTransport::stalls_matter(const std::vector<Scene::Bounds>& boxes,
   const CellTransport& cell = *cells_[i].transport;
   const bool parts = std::ranges::any_of(boxes, [&](const Scene::Bounds& box) {
     const auto [nearest, farthest] = distances_to(box, frame.camera);
-    return cell.nearest_m < farthest && cell.farthest_m > nearest &&
+    constexpr float margin = 1e-4F;  // of distances along rays
+    return cell.farthest_m > nearest * (1 - margin) &&
+           (cell.nearest_m < farthest * (1 + margin) || !render::none(cell.looks_apart)) &&
            may_be_seen(cones_[i], frame.camera, box);
   });
   if (parts || stalls.may_be_passed(cell.reach)) return true;
@@ -185,6 +190,7 @@ void KeptTransport::keep(int column, int row, int stage) {
   const std::size_t others = bytes_.fetch_add(bytes - cell.bytes) - cell.bytes;
   cell.bytes = bytes;
   cell.stage = stage;
+  cell.needs_pictures = none;
   if (!cell.transport->bent.empty()) bends_plate_ = true;
   if (others + bytes <= room()) return;
   // Too much: this cell's is given back.

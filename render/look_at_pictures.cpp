@@ -155,14 +155,18 @@ bool CellBaker::look_at_pictures(const FrameContext& frame,
   pictures_at_.clear();
   const Scene& scene = *frame.inputs.scene;
   const Scene::Places& places = scene.places();
+  std::size_t apart = 0;
   for (std::size_t i = 0; i < places.bounds.size(); ++i) {
-    if (places.apart[i] != 0) pictures_at_.push_back(places.bounds[i]);
+    const Scene::Bounds& bounds = places.bounds[i];
+    if (places.apart[i] == 0) continue;
+    ++apart;
+    if (bounds.lower.x <= bounds.upper.x) pictures_at_.push_back(bounds);
   }
   dims_.clear();
   for (const PreparedSurface& surface : scene.prepared()) {
     if (scene.shows_apart(surface.instance)) dims_.push_back(surface.prepared.get());
   }
-  takes_no_tree_ = dims_.size() == pictures_at_.size() &&
+  takes_no_tree_ = dims_.size() == apart &&
                    std::ranges::all_of(dims_, [](const Prepared* by) { return by->dim({}); });
   if (!cell.far_m.empty()) see_straight(cell, seen);
   if (!cell.picture_rays.empty()) see_along(cell, seen);

@@ -39,14 +39,18 @@ float volume(const Scene::Bounds& box) {
 // Boxes that hold what of one box lies outside of another.
 void add_rest(Scene::Bounds box, const Scene::Bounds& other, std::vector<Scene::Bounds>& rest) {
   const auto cut = [&](float Vec3f::*axis) {
-    const float low = std::clamp(other.lower.*axis, box.lower.*axis, box.upper.*axis);
-    const float high = std::clamp(other.upper.*axis, box.lower.*axis, box.upper.*axis);
+    if (box.upper.*axis < other.lower.*axis || box.lower.*axis > other.upper.*axis) {
+      rest.push_back(box);
+      return false;
+    }
+    const float low = std::max(other.lower.*axis, box.lower.*axis);
+    const float high = std::min(other.upper.*axis, box.upper.*axis);
     Scene::Bounds below = box, above = box;
     below.upper.*axis = low, above.lower.*axis = high;
     if (below.lower.*axis < low) rest.push_back(below);
     if (above.upper.*axis > high) rest.push_back(above);
     box.lower.*axis = low, box.upper.*axis = high;
-    return low < high;
+    return true;
   };
   if (cut(&Vec3f::x) && cut(&Vec3f::y)) cut(&Vec3f::z);
 }

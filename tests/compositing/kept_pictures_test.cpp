@@ -229,7 +229,7 @@ void expect_same_cold_and_warm(bool with_lit) {
     if (pick(2) > 0)
       picture = figure(0.02F * static_cast<float>(pick(9)), 0.1F * static_cast<float>(pick(9)));
     if (pick(2) == 0) at.person.x = 0.05F * static_cast<float>(pick(3));
-    if (pick(4) == 0) at.person.y = 0.4F * static_cast<float>(pick(2));
+    if (pick(4) == 0) at.person.y = 0.25F * static_cast<float>(pick(3));
     if (pick(3) == 0) at.box.x = -1.2F + 0.4F * static_cast<float>(pick(3));
     show(shot, at, picture);
     for (capture::Half& value : shot.plate.pixels) value ^= static_cast<capture::Half>(pick(1));
@@ -321,6 +321,33 @@ render::Scene::Places places_at(float x, float wide = 1) {
   places.pictures = {{figure(0)}};
   places.apart = {1};
   return places;
+}
+
+// Boxes may be flat.
+TEST(PictureStalls, TellWhatHasChangedBetweenThem) {
+  using Boxes = std::vector<render::Scene::Bounds>;
+  const auto changed = [](const render::Scene::Bounds& a, const render::Scene::Bounds& b) {
+    return render::PictureStalls::changed(render::PictureStalls(Boxes{a}),
+                                          render::PictureStalls(Boxes{b}));
+  };
+  const auto flat_at = [](float y) { return render::Scene::Bounds{{0, y, 0}, {1, y, 2}}; };
+  EXPECT_TRUE(changed(flat_at(2), flat_at(2)).empty());
+  for (const float y : {1.0F, 2.5F}) {
+    const Boxes both = changed(flat_at(2), flat_at(y));
+    for (const float at : {2.0F, y}) {
+      EXPECT_TRUE(std::ranges::any_of(both,
+                                      [&](const render::Scene::Bounds& box) {
+                                        return box.lower.y <= at && box.upper.y >= at &&
+                                               box.lower.x == 0 && box.upper.x == 1;
+                                      }))
+          << y << at;
+    }
+  }
+  // Of one that is wider on one side alone, no more than that side.
+  const Boxes rest = changed({{0, 0, 0}, {1, 1, 2}}, {{0, 0, 0}, {1.5F, 1, 2}});
+  ASSERT_EQ(rest.size(), 1U);
+  EXPECT_EQ(rest[0].lower, (Vec3f{1, 0, 0}));
+  EXPECT_EQ(rest[0].upper, (Vec3f{1.5F, 1, 2}));
 }
 
 TEST(StallFollower, KeepsAStallUntilItIsLeft) {
