@@ -19,7 +19,8 @@ namespace {
 
 // Where a pixel has more rays than that which pictures may come before, or lights that they may
 // dim, some stand for all: the dimmer ones, of which each is less of it than one of so many alike.
-constexpr float rays_of_pixel = 48, lights_of_pixel = 256;
+// While a cell has few of them, there is room for more.
+constexpr float rays_of_pixel = 48, many_rays_of_pixel = 384, lights_of_pixel = 256;
 
 std::uint32_t key_of(const TintedLight& tint) { return tint.light * 256U + tint.centre; }
 
@@ -175,11 +176,11 @@ void CellBaker::add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Ve
 // Of being followed, for a ray that is such a share of its pixel. The less room there is, the
 // fewer.
 float CellBaker::chance_of_picture_ray(float share) const {
-  constexpr float half = 0.5F * CellTransport::most_picture_rays;
+  constexpr float most = CellTransport::most_picture_rays;
   constexpr float least = 1.0F / 16;  // fewer would be sparks
   const auto taken = static_cast<float>(transport_->picture_rays.size());
-  const float room = std::clamp(2 - taken / half, least, 1.0F);
-  return std::min(share * rays_of_pixel * room, 1.0F);
+  const float many = taken < most / 4 ? many_rays_of_pixel : rays_of_pixel;
+  return std::min(share * many * std::clamp(2 - 2 * taken / most, least, 1.0F), 1.0F);
 }
 
 // A ray that pictures may come before; what it goes on to find is noted as behind it.

@@ -232,8 +232,14 @@ void show_picture_rays(const CellTransport& cell,
     const auto& [radiance, seen_through] = pictures->along[i];
     const Vec3f passed = passed_of(seen_through, ray.stands_for);
     const Four share{passed.x, passed.y, passed.z, mean(passed)};
-    picture.added[to] +=
-        four_of(ray.throughput * radiance * ray.stands_for) + share * picture.added[from];
+    const Four own = four_of(ray.throughput * radiance), behind = picture.added[from];
+    picture.added[to] += own + four_of(seen_through) * behind;
+    if (ray.stands_for > 1) {
+      // What is brighter than white behind this one need not be so behind the others.
+      const Four white = four_of(ray.throughput), others = behind < white ? behind : white;
+      picture.added[to] +=
+          (own - four_of(Vec3f{1, 1, 1} - seen_through) * others) * (ray.stands_for - 1);
+    }
     picture.share[to] += share * picture.share[from];
     picture.seen[to] += share[3] * picture.seen[from];
   };
