@@ -137,6 +137,21 @@ void CellBaker::clear_answer(ShadePoint& p) {
   p.video = {};
 }
 
+// The stream's first rays, as far as each goes.
+void CellBaker::intersect(int count, TraceContext& context) {
+  RayStream& s = stream_;
+  RTCRayHitNp rays;
+  rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
+              s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
+              s.far_m.data(), s.mask.data(), s.id.data(), s.flags.data()};
+  rays.hit.Ng_x = s.ngx.data(), rays.hit.Ng_y = s.ngy.data(), rays.hit.Ng_z = s.ngz.data();
+  rays.hit.u = s.u.data(), rays.hit.v = s.v.data();
+  rays.hit.primID = s.prim.data(), rays.hit.geomID = s.geom.data();
+  rays.hit.instID[0] = s.inst.data();
+  rtcIntersectNp(frame_->inputs.scene->embree(), &context.context, &rays,
+                 static_cast<unsigned>(count));
+}
+
 void CellBaker::trace(
     int count, bool coherent, RayKind kind, float cone_rad, LivePictures pictures) {
   RayStream& s = stream_;
@@ -156,16 +171,7 @@ void CellBaker::trace(
   TraceContext context(*frame_->inputs.scene, kind, coherent);
   context.cone_rad = cone_rad;
   context.pictures = past_pictures_ ? LivePictures::passed_apart : pictures;
-  RTCRayHitNp rays;
-  rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
-              s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
-              s.far_m.data(), s.mask.data(), s.id.data(), s.flags.data()};
-  rays.hit.Ng_x = s.ngx.data(), rays.hit.Ng_y = s.ngy.data(), rays.hit.Ng_z = s.ngz.data();
-  rays.hit.u = s.u.data(), rays.hit.v = s.v.data();
-  rays.hit.primID = s.prim.data(), rays.hit.geomID = s.geom.data();
-  rays.hit.instID[0] = s.inst.data();
-  rtcIntersectNp(frame_->inputs.scene->embree(), &context.context, &rays,
-                 static_cast<unsigned>(count));
+  intersect(count, context);
   frame_->inputs.scene->fetch_hits(s.geom.data(), s.prim.data(), s.inst.data(),
                                    static_cast<std::size_t>(count));
 }

@@ -22,6 +22,8 @@ inline constexpr float sample_limit = 64;
 // Of a pixel's first further samples, in terms of the effort's.
 inline constexpr float first_tolerance = 0.5F;
 
+struct TraceContext;
+
 // A stream of rays with their hits.
 struct RayStream {
   alignas(64) std::array<float, stream_rays> ox, oy, oz, dx, dy, dz, near_m, far_m, time;
@@ -188,6 +190,7 @@ class CellBaker final : public RaySink {
   // cell_baker.cpp
   bool find(int stage, bool past_pictures);
   static void clear_answer(ShadePoint& p);
+  void intersect(int count, TraceContext& context);
   void trace(int count,
              bool coherent,
              RayKind kind,
@@ -287,6 +290,8 @@ class CellBaker final : public RaySink {
                       const CellTransport::Shadowed& centres,
                       Vec3f direction,
                       float cone_rad);
+  void aim(
+      Vec3f from, Vec3f direction, float far_m, float width_m, float cone_rad, std::size_t number);
   void shoot_at_pictures();
 
   // cell_bounce.cpp

@@ -78,7 +78,14 @@ void KeptTransport::forget_all(const Scene& scene) {
 }
 
 void KeptTransport::forget(Changes changes, const FrameContext& frame) {
+  // Most often pictures alone have changed, and no cell was found with any.
+  const bool any_past =
+      !changes.but_apart.empty() || !changes.stalls.empty() || !changes.relit.empty();
+  const bool any_with = std::ranges::any_of(cells_, [](const Cell& cell) {
+    return cell.stage != none && !cell.transport->past_pictures;
+  });
   if (cones_.empty()) cones_ = cell_cones(*frame.inputs.directions, frame.turn);
+  if (!any_past && !any_with) return;
   SpaceGrid::Mask receivers{};
   for (const Cell& cell : cells_) {
     if (cell.stage == none) continue;
@@ -93,8 +100,6 @@ void KeptTransport::forget(Changes changes, const FrameContext& frame) {
   };
   // Cells that were found without pictures stay while these stay in their stalls.
   const MovedThings but_apart = things(changes.but_apart), stalls = things(changes.stalls);
-  const bool any_past =
-      !changes.but_apart.empty() || !changes.stalls.empty() || !changes.relit.empty();
   std::ranges::copy(changes.stalls, std::back_inserter(changes.moved));
   const MovedThings moved = things(changes.moved);
   const auto matters = [&](const MovedThings& things, std::size_t i, const CellTransport& cell) {

@@ -83,15 +83,7 @@ bool CellBaker::look_along(
     }
     TraceContext trace(scene, kind, coherent);
     trace.cone_rad = cone_rad;
-    RTCRayHitNp rays;
-    rays.ray = {s.ox.data(),    s.oy.data(),   s.oz.data(), s.near_m.data(),
-                s.dx.data(),    s.dy.data(),   s.dz.data(), s.time.data(),
-                s.far_m.data(), s.mask.data(), s.id.data(), s.flags.data()};
-    rays.hit.Ng_x = s.ngx.data(), rays.hit.Ng_y = s.ngy.data(), rays.hit.Ng_z = s.ngz.data();
-    rays.hit.u = s.u.data(), rays.hit.v = s.v.data();
-    rays.hit.primID = s.prim.data(), rays.hit.geomID = s.geom.data();
-    rays.hit.instID[0] = s.inst.data();
-    rtcIntersectNp(scene.embree(), &trace.context, &rays, static_cast<unsigned>(count));
+    intersect(count, trace);
     int met = 0;
     for (int k = 0; k < count; ++k) {
       const auto i = static_cast<std::size_t>(k);
@@ -261,6 +253,19 @@ void CellBaker::see_along(const CellTransport& cell, CellPictures& seen) {
   look();
 }
 
+// Adds a ray to the stream of those to light, which must not be full: for the `number`-th of who
+// asks.
+void CellBaker::aim(
+    Vec3f from, Vec3f direction, float far_m, float width_m, float cone_rad, std::size_t number) {
+  GatherWorkspace& w = gather_;
+  const auto i = static_cast<std::size_t>(w.rays++);
+  w.ox[i] = from.x, w.oy[i] = from.y, w.oz[i] = from.z;
+  w.dx[i] = direction.x, w.dy[i] = direction.y, w.dz[i] = direction.z;
+  w.ray_point[i] = static_cast<std::uint32_t>(number);
+  light_far_m_[i] = far_m;
+  shadow_width_m_[i] = width_m, shadow_cone_rad_[i] = cone_rad;
+}
+
 // The stream of shadow rays, at pictures alone: afterwards tr, tg, tb are what passes.
 void CellBaker::shoot_at_pictures() {
   GatherWorkspace& w = gather_;
@@ -314,8 +319,6 @@ void CellBaker::light_through(std::span<const CellTransport::PictureLight> all,
   const auto shoot = [&] {
     const auto n = static_cast<std::size_t>(w.rays);
     if (n == 0) return;
-    std::fill_n(shadow_width_m_.begin(), n, 0.0F);
-    std::fill_n(shadow_cone_rad_.begin(), n, 0.0F);
     shoot_at_pictures();
     if (passed.empty()) passed.assign(all.size(), {1, 1, 1});
     for (std::size_t i = 0; i < n; ++i) {
@@ -325,11 +328,7 @@ void CellBaker::light_through(std::span<const CellTransport::PictureLight> all,
   for (std::size_t n = 0; n < all.size(); ++n) {
     const CellTransport::PictureLight& l = all[n];
     if (!passes_picture(l.origin, l.direction, l.far_m)) continue;
-    const auto i = static_cast<std::size_t>(w.rays++);
-    w.ox[i] = l.origin.x, w.oy[i] = l.origin.y, w.oz[i] = l.origin.z;
-    w.dx[i] = l.direction.x, w.dy[i] = l.direction.y, w.dz[i] = l.direction.z;
-    w.ray_point[i] = static_cast<std::uint32_t>(n);
-    light_far_m_[i] = l.far_m;
+    aim(l.origin, l.direction, l.far_m, 0, 0, n);
     if (w.rays == stream_rays) shoot();
   }
   shoot();
@@ -455,13 +454,7 @@ bool CellBaker::look_for_light(const ShadowPlan& plan,
   };
   hidden_ = {};
   const auto look = [&](std::size_t k) {
-    const auto n = static_cast<std::size_t>(w.rays++);
-    w.ox[n] = centres.px[k], w.oy[n] = centres.py[k], w.oz[n] = centres.pz[k];
-    w.dx[n] = direction.x, w.dy[n] = direction.y, w.dz[n] = direction.z;
-    w.ray_point[n] = static_cast<std::uint32_t>(k);
-    shadow_width_m_[n] = centres.width_m[k];
-    shadow_cone_rad_[n] = cone_rad;
-    light_far_m_[n] = ray_far;
+    aim(centres.position(k), direction, ray_far, centres.width_m[k], cone_rad, k);
     if (w.rays == stream_rays) shoot();
   };
   for (const std::uint8_t bit : std::span(plan.squares).first(plan.count)) {
@@ -524,13 +517,7 @@ bool CellBaker::shade_lamps_by_pictures(const CellTransport::Shadowed& centres,
       const WayTo<float> way = way_to(from, lamp.position);
       const float far_m = way.distance_m * before_lamp;
       if (!(far_m > 0) || !passes_picture(from, way.direction, far_m)) continue;
-      const auto n = static_cast<std::size_t>(w.rays++);
-      w.ox[n] = from.x, w.oy[n] = from.y, w.oz[n] = from.z;
-      w.dx[n] = way.direction.x, w.dy[n] = way.direction.y, w.dz[n] = way.direction.z;
-      w.ray_point[n] = static_cast<std::uint32_t>(k);
-      shadow_width_m_[n] = centres.width_m[k];
-      shadow_cone_rad_[n] = side_m / way.distance_m;
-      light_far_m_[n] = far_m;
+      aim(from, way.direction, far_m, centres.width_m[k], side_m / way.distance_m, k);
       if (w.rays == stream_rays) shoot();
     }
     shoot();

@@ -48,8 +48,7 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
 // What a live frame may spend on cells.
 double Sharpening::rest_ms(bool at_rest) const {
   if (std::ranges::none_of(timed_, std::identity())) return 0;
-  // Finer cells take longer in every frame, where pictures of persons are looked at.
-  if (at_rest && relight_ms_ > share_at_rest * frame_ms_) return 0;
+  if (persons_ && at_rest && relight_ms_ > share_at_rest * frame_ms_) return 0;
   const double share = at_rest ? share_at_rest : share_of_frame;
   return std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
 }
@@ -99,7 +98,8 @@ void Sharpening::go_on(double left) {
   }
 }
 
-const SharpeningPlan& Sharpening::next(std::span<const int> kept) {
+const SharpeningPlan& Sharpening::next(std::span<const int> kept, bool persons) {
+  persons_ = persons;
   constexpr int none = render::KeptTransport::none;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
@@ -207,7 +207,8 @@ void render_sharpening(Sharpening& sharpening,
   using Milliseconds = std::chrono::duration<double, std::milli>;
   const Clock::time_point start = Clock::now();
   const auto frame = render::prepare_frame(inputs, job, plate);
-  const SharpeningPlan& plan = sharpening.next(inputs.kept->stages());
+  const SharpeningPlan& plan =
+      sharpening.next(inputs.kept->stages(), !inputs.scene->pictures().empty());
   job.stages = plan.stages;
   render::RenderStatistics ahead;
   const Clock::time_point begun = Clock::now();

@@ -34,7 +34,9 @@ class Sharpening {
 
   // Of the next frame, from what is still kept of the frames before
   // (render::KeptTransport::stages()). It stands until the next call.
-  const SharpeningPlan& next(std::span<const int> kept);
+  // Where `persons` are looked at in every frame, that takes the longer the finer cells are: a live
+  // show whose frames have no time left lets cells stay as they are.
+  const SharpeningPlan& next(std::span<const int> kept, bool persons = false);
   // The frame's stages with what was found ahead, and what that took.
   void found_ahead(std::span<const std::uint8_t> stages, double ms);
   // What rendering the frame took then, and whether what it found could not all be kept.
@@ -59,6 +61,7 @@ class Sharpening {
 
   double frame_ms_, frames_a_second_;
   bool live_;
+  bool persons_ = false;
   bool full_ = false, stopped_ = false;  // there is no memory for more
   double relight_ms_ = 0;                // a frame that finds no cell anew
   ByStage<double> cost_;                 // of a cell: live in ms, once one was timed

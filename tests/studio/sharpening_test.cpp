@@ -23,16 +23,19 @@ std::vector<int> as_kept(const std::vector<std::uint8_t>& stages) {
 constexpr std::array<double, render::refinement_stages> made_cost{1.0 / 64, 0.0625, 0.25, 1,
                                                                   1.1,      4,      16};
 
-// A machine on which every cell with one ray a pixel takes `cell_ms`, and the rest of a frame 3 ms.
+// A machine on which every cell with one ray a pixel takes `cell_ms`, and the rest of a frame
+// `rest_ms`.
 struct MadeMachine {
   double cell_ms;
   std::vector<int> kept = std::vector<int>(cells, none);
+  double rest_ms = 3;
+  bool persons = false;
 
   double ms_at(std::size_t stage) const { return cell_ms * made_cost[stage]; }
 
   // Shows a frame; returns what it takes.
   double show(Sharpening& sharpening) {
-    const SharpeningPlan& plan = sharpening.next(kept);
+    const SharpeningPlan& plan = sharpening.next(kept, persons);
     double ms = 0;
     std::size_t found = 0;
     std::vector<std::uint8_t> stages = plan.stages;
@@ -44,7 +47,7 @@ struct MadeMachine {
       ms += ms_at(stage);
     }
     sharpening.found_ahead(stages, ms);
-    double frame_ms = 3;
+    double frame_ms = rest_ms;
     for (std::size_t i = 0; i < cells; ++i) {
       if (kept[i] == none) frame_ms += ms_at(stages[i]);
     }
@@ -108,6 +111,30 @@ TEST(Sharpening, KeepsToTheTimeOfALiveFrame) {
     EXPECT_EQ(sharpening.share(), 1) << coarse_ms;
     EXPECT_EQ(late, 0) << coarse_ms;
     EXPECT_LT(frames, coarse_ms < 10 ? 20 : 150) << coarse_ms;
+  }
+}
+
+// Persons are looked at in every frame, and finer cells would take the longer: where that takes all
+// of the time, cells stay as they are. Without persons they go on.
+TEST(Sharpening, LetsCellsBeWherePersonsTakeAllOfTheTime) {
+  for (const bool persons : {false, true}) {
+    Sharpening sharpening({25, 1}, true);
+    MadeMachine machine{2};
+    machine.persons = persons;
+    for (int i = 0; i < 3; ++i) machine.show(sharpening);
+    machine.rest_ms = 38;
+    for (int i = 0; i < 15; ++i) machine.show(sharpening);
+    const double share = sharpening.share();
+    for (int i = 0; i < 10; ++i) machine.show(sharpening);
+    ASSERT_LT(share, 1);
+    if (persons) {
+      EXPECT_EQ(sharpening.share(), share);
+    } else {
+      EXPECT_GT(sharpening.share(), share);
+    }
+    machine.rest_ms = 3;
+    for (int i = 0; i < 40; ++i) machine.show(sharpening);
+    EXPECT_GT(sharpening.share(), share);
   }
 }
 
