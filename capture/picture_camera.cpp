@@ -111,10 +111,12 @@ class PictureCamera : public Camera {
                 Time jitter);
 
   const CameraInfo& info() const override { return info_; }
-  std::optional<Frame> next() override;
+  std::optional<Frame> next() override { return pass(true); }
+  bool skip() override { return pass(false).has_value(); }
   CameraStatistics statistics() const override { return statistics_; }
 
  private:
+  std::optional<Frame> pass(bool reads_picture);
   // The picture of an entry. Throws std::runtime_error.
   std::shared_ptr<const Image> load(std::size_t entry);
 
@@ -214,7 +216,7 @@ std::shared_ptr<const Image> PictureCamera::load(std::size_t entry) {
   return image;
 }
 
-std::optional<Frame> PictureCamera::next() {
+std::optional<Frame> PictureCamera::pass(bool reads_picture) {
   if (entry_ == entries_.size()) {
     if (!loop_) {
       return std::nullopt;
@@ -231,7 +233,7 @@ std::optional<Frame> PictureCamera::next() {
   frame.exposure_s = entry.exposure_s;
   frame.status = entry.status;
   frame.note = entry.note;
-  if (!entry.path.empty() && entry.status != FrameStatus::lost) {
+  if (reads_picture && !entry.path.empty() && entry.status != FrameStatus::lost) {
     try {
       last_image_ = load(entry_);
       shown_ = true;

@@ -67,7 +67,8 @@ class VideoFile : public Camera {
   VideoFile(const std::string& path, const CameraOptions& options, const LightCurves& curves);
 
   const CameraInfo& info() const override { return info_; }
-  std::optional<Frame> next() override;
+  std::optional<Frame> next() override { return pass(true); }
+  bool skip() override { return pass(false).has_value(); }
   std::optional<Sound> take_sound() override;
   CameraStatistics statistics() const override { return statistics_; }
 
@@ -78,6 +79,7 @@ class VideoFile : public Camera {
   bool jump_before(std::int64_t frame);
   std::optional<DecodedPicture> start_again();
   std::optional<DecodedPicture> first_again();
+  std::optional<Frame> pass(bool makes_picture);
   Frame make_frame(const DecodedPicture& picture);
   void linearise(const DecodedPicture& picture, Frame& frame);
   Time end_of_pass() const { return pass_start_ + clock_->end(); }
@@ -360,7 +362,7 @@ std::optional<DecodedPicture> VideoFile::first_again() {
   return decoder_->next();
 }
 
-std::optional<Frame> VideoFile::next() {
+std::optional<Frame> VideoFile::pass(bool makes_picture) {
   if (ended_) {
     return std::nullopt;
   }
@@ -375,6 +377,7 @@ std::optional<Frame> VideoFile::next() {
       ended_ = true;
       return std::nullopt;
     }
+    if (!makes_picture) picture->frame = nullptr;
     frame = make_frame(*picture);
   }
   ++statistics_.delivered;

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
-#include <vector>
 
 #include "capture/exr.h"
+#include "compositing/plate_footage.h"
 
 namespace studio {
 namespace {
@@ -17,21 +17,24 @@ constexpr int plate_frames = 48;
 constexpr float most_noise = 0.1F;
 
 // Of so many frames from one on, where the camera is.
-std::vector<capture::Image> spread_frames(capture::Camera& camera, int first, int count) {
+compositing::PlateFootage spread_frames(capture::Camera& camera, int first, int count) {
   // As many as there are, where that is told: of a short clip each one counts.
   const std::int64_t rest = camera.info().frames - first;
   if (camera.info().frames > 0 && rest > 0) {
     count = static_cast<int>(std::min<std::int64_t>(count, rest));
   }
   const int step = (count + plate_frames - 1) / plate_frames;
-  std::vector<capture::Image> frames;
+  compositing::PlateFootage footage;
   for (int i = 0; i < count; ++i) {
+    if (i % step != 0) {
+      if (!camera.skip()) break;
+      continue;
+    }
     const auto frame = camera.next();
     if (!frame) break;
-    const bool lost = frame->status == capture::FrameStatus::lost;
-    if (i % step == 0 && frame->image && !lost) frames.push_back(*frame->image);
+    if (frame->status != capture::FrameStatus::lost && frame->image) footage.add(*frame->image);
   }
-  return frames;
+  return footage;
 }
 
 compositing::CleanPlate read_plate(const std::string& path, capture::Transfer transfer) {
@@ -68,18 +71,18 @@ compositing::CleanPlate read_clean_plate(const std::string& path,
   if (!path.empty()) return read_plate(path, source.colour);
   VideoSource whole = source;
   whole.first = footage[0];
+  whole.loop = false;
   const auto camera = open_video(whole);
   if (camera->info().live) {
     throw std::runtime_error(needs_plate(source.uri));
   }
-  const std::vector<capture::Image> frames =
+  const compositing::PlateFootage frames =
       spread_frames(*camera, footage[0], footage[1] - footage[0] + 1);
-  if (frames.empty()) {
+  if (frames.count() == 0) {
     throw std::runtime_error(source.uri + " has no frame " + std::to_string(footage[0]) +
                              " to take the plate from");
   }
-  return method == compositing::KeyMethod::screen ? compositing::plate_from_footage(frames)
-                                                  : compositing::background_from_footage(frames);
+  return method == compositing::KeyMethod::screen ? frames.screen() : frames.background();
 }
 
 }  // namespace studio

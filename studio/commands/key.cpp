@@ -18,6 +18,7 @@
 #include "capture/exr.h"
 #include "compositing/exr_sequence.h"
 #include "compositing/keyer.h"
+#include "compositing/plate_footage.h"
 #include "studio/clean_plates.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/interruptible.h"
@@ -53,12 +54,24 @@ VideoSource source_of(const KeyOptions& options, const std::string& uri) {
   return source;
 }
 
-compositing::CleanPlate plate_of(const std::vector<capture::Image>& frames,
-                                 const KeyOptions& options) {
-  if (!options.person) return compositing::average_plate(frames);
-  return options.method == "screen" ? compositing::plate_from_footage(frames)
-                                    : compositing::background_from_footage(frames);
-}
+// A plate of frames that come one by one, as the options ask.
+class PlateMaker {
+ public:
+  explicit PlateMaker(const KeyOptions& options)
+      : person_(options.person), by_screen_(options.method == "screen") {}
+
+  void add(const capture::Image& frame) { person_ ? footage_.add(frame) : shots_.add(frame); }
+  std::size_t count() const { return person_ ? footage_.count() : shots_.count(); }
+  compositing::CleanPlate plate() const {
+    if (!person_) return shots_.average();
+    return by_screen_ ? footage_.screen() : footage_.background();
+  }
+
+ private:
+  bool person_, by_screen_;
+  compositing::PlateShots shots_;
+  compositing::PlateFootage footage_;
+};
 
 void make_plate(const KeyOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) {
@@ -68,7 +81,7 @@ void make_plate(const KeyOptions& options, Console& console) {
   spare_files(files_of(source.uri, "the plate's own footage"), options.out);
   spare_files(files_of(source.uri, "the plate's own footage"), console.figures_file());
   const auto camera = open_video(source);
-  std::vector<capture::Image> frames;
+  PlateMaker maker(options);
   const std::int64_t wanted = options.frames.value_or(plate_frames);
   std::int64_t passed = 0;
   for (; passed < wanted; ++passed) {
@@ -76,18 +89,19 @@ void make_plate(const KeyOptions& options, Console& console) {
     if (!frame) break;
     // What is lost repeats the picture before, and tells no noise.
     const bool good = frame->status == capture::FrameStatus::good;
-    if (frame->image && good) frames.push_back(*frame->image);
+    if (frame->image && good) maker.add(*frame->image);
   }
-  if (frames.empty()) throw std::runtime_error(source.uri + " gives no picture");
-  const std::int64_t bad = passed - static_cast<std::int64_t>(frames.size());
+  const std::size_t frames = maker.count();
+  if (frames == 0) throw std::runtime_error(source.uri + " gives no picture");
+  const std::int64_t bad = passed - static_cast<std::int64_t>(frames);
   if (bad > 0) {
     console.warn(fmt::format("{} of {} frames were lost or damaged, and left out", bad, passed));
   }
-  const compositing::CleanPlate plate = plate_of(frames, options);
+  const compositing::CleanPlate plate = maker.plate();
   capture::ExrOptions noise_too;
   // Of frames that are all the same, as of a video that holds still, it tells nothing.
   const bool differ = plate.noise_gain > 0 || plate.noise_floor > compositing::least_noise_floor;
-  if (frames.size() > 1 && differ && !options.person)
+  if (frames > 1 && differ && !options.person)
     noise_too.noise = {plate.noise_gain, plate.noise_floor};
   capture::write_exr(options.out, plate.light, noise_too);
   const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
@@ -102,8 +116,9 @@ void make_plate(const KeyOptions& options, Console& console) {
         "--person; what else it is, a garbage mask is to cut away",
         100 * elsewhere));
   }
-  Json figures{{"frames", frames.size()},      {"lost", bad},      {"width", plate.light.width},
-               {"height", plate.light.height}, {"colour", colour}, {"noise_gain", nullptr},
+  Json figures{{"frames", frames},           {"lost", bad},
+               {"width", plate.light.width}, {"height", plate.light.height},
+               {"colour", colour},           {"noise_gain", nullptr},
                {"noise_floor", nullptr}};
   std::string noise = "noise not measured";
   if (noise_too.noise) {
@@ -114,8 +129,7 @@ void make_plate(const KeyOptions& options, Console& console) {
   console.figures(json_text(figures));
   console.say(fmt::format("{}: {}x{}, {} of {} frames, {} screen, {}", options.out,
                           plate.light.width, plate.light.height, options.person ? "middle" : "mean",
-                          frames.size(), colour == "no" ? "no" : fmt::format("a {}", colour),
-                          noise));
+                          frames, colour == "no" ? "no" : fmt::format("a {}", colour), noise));
 }
 
 compositing::KeySettings settings_of(const KeyOptions& options) {

@@ -68,6 +68,22 @@ TEST(Sequence, IsInTheOrderOfNumbersWithGapsLost) {
   EXPECT_EQ(camera->statistics().lost, 1);
 }
 
+TEST(Sequence, ReadsNoPictureThatIsPassedOver) {
+  const std::filesystem::path directory = made::make_temporary_directory();
+  write_grey(directory / "1.png", 1);
+  std::ofstream(directory / "2.png") << "no picture";
+  write_grey(directory / "3.png", 3);
+  const auto camera = open_camera((directory / "%d.png").string());
+  ASSERT_TRUE(camera->next());
+  EXPECT_TRUE(camera->skip());
+  const std::optional<Frame> last = camera->next();
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->number, 2);
+  EXPECT_EQ(last->image->at(1, 1, 1), light_of(3));
+  EXPECT_FALSE(camera->skip());
+  EXPECT_EQ(camera->statistics().lost, 0);
+}
+
 TEST(Sequence, CountsDigitsAsPrintfDoes) {
   const std::filesystem::path directory = made::make_temporary_directory();
   write_grey(directory / "0007.png", 7);

@@ -72,6 +72,28 @@ TEST_F(VideoFile, CountsAndTimesEveryFrameInEveryContainer) {
   }
 }
 
+// What is passed over is not made, and all the rest is as without.
+TEST_F(VideoFile, PassesOverFrames) {
+  const std::string clip = make_clip("clip.mp4", "-c:v libx264 -bf 2");
+  const std::vector<Frame> all = all_frames(*open_camera(clip));
+  ASSERT_EQ(all.size(), 20U);
+  const auto camera = open_camera(clip);
+  for (const std::size_t n : {0U, 3U, 4U, 11U}) {
+    while (camera->statistics().delivered < static_cast<std::int64_t>(n)) {
+      EXPECT_TRUE(camera->skip());
+    }
+    const std::optional<Frame> frame = camera->next();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->number, all[n].number);
+    EXPECT_EQ(frame->time, all[n].time);
+    EXPECT_EQ(frame->image->pixels, all[n].image->pixels) << n;
+  }
+  for (int n = 12; n < 20; ++n) EXPECT_TRUE(camera->skip());
+  EXPECT_FALSE(camera->skip());
+  EXPECT_EQ(camera->next(), std::nullopt);
+  EXPECT_EQ(camera->statistics().delivered, 20);
+}
+
 TEST_F(VideoFile, TellsTheShapeOfPixelsWhicheverOfItsPartsDoes) {
   const std::string square = make_clip("square.mp4", "-c:v libx264");
   const std::string told = (directory_ / "told.mp4").string();

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -11,6 +13,7 @@
 
 #include "capture/counter_random.h"
 #include "compositing/made_clip.h"
+#include "compositing/plate_footage.h"
 
 namespace compositing::clean_plate_test {
 namespace {
@@ -114,6 +117,45 @@ TEST(PlateFromFootage, FindsTheScreenBehindAPersonWhoNeverLeaves) {
     off += std::abs(plate.light.pixels[i] / bare.pixels[i] - 1);
   }
   EXPECT_LT(off * 3 / static_cast<double>(bare.pixels.size()), 0.05);
+}
+
+// However long it is, frames of all of it are kept.
+TEST(PlateFootage, LooksAtFramesThatAreSpreadOverAllOfIt) {
+  constexpr std::array<float, 3> screen{0.04F, 0.4F, 0.06F}, coat{0.2F, 0.1F, 0.3F};
+  // A coat before the left half for most of the time, before the right half for the rest.
+  const auto frame_of = [&](int i) {
+    Image frame = even_picture(4, 8, screen);
+    for (int y = 0; y < 4; ++y) {
+      for (int x = i < 270 ? 0 : 4; x < (i < 270 ? 4 : 8); ++x) {
+        std::copy_n(coat.begin(), 3, &frame.pixels[frame.index(y, x)]);
+      }
+    }
+    return frame;
+  };
+  PlateFootage footage;
+  for (int i = 0; i < 330; ++i) footage.add(frame_of(i));
+  EXPECT_EQ(footage.count(), 330U);
+  const CleanPlate plate = footage.screen();
+  EXPECT_EQ(plate.known, 1);
+  for (std::size_t i = 0; i < plate.light.pixels.size(); ++i) {
+    ASSERT_NEAR(plate.light.pixels[i], screen[i % 3], 1e-3F * screen[i % 3]) << i;
+  }
+  // Most of the time tells a background.
+  const Image background = footage.background().light;
+  EXPECT_NEAR(background.at(1, 1, 0), coat[0], 1e-3F);
+  EXPECT_NEAR(background.at(1, 6, 0), screen[0], 1e-3F);
+}
+
+TEST(PlateFootage, RefusesFramesOfTwoSizesAndNone) {
+  PlateFootage footage;
+  EXPECT_THROW(static_cast<void>(footage.screen()), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(footage.background()), std::invalid_argument);
+  footage.add(even_picture(16, 16, {0, 1, 0}));
+  EXPECT_THAT(
+      [&] {
+        footage.add(even_picture(16, 18, {0, 1, 0}));
+      },
+      ThrowsMessage<std::invalid_argument>(HasSubstr("16x16 and 18x16")));
 }
 
 TEST(PlateLight, BlursAScreenAndNoOtherBackground) {

@@ -1,0 +1,245 @@
+// Plates from shots of the empty screen, and from footage alone.
+#include "compositing/plate_footage.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <stdexcept>
+#include <string>
+
+#include "capture/half.h"
+#include "capture/median.h"
+#include "capture/parallel_loop.h"
+#include "compositing/gap_filler.h"
+
+namespace compositing {
+namespace {
+
+using capture::HalfImage;
+using capture::Image;
+
+constexpr const char* no_frames = "a clean plate is made of at least one frame";
+constexpr std::size_t noise_step = 7;  // every so many values tell noise
+constexpr float clipped = 0.98F;       // has none
+// A pixel of which so few frames show the screen is not it: those may be something of its colour.
+constexpr std::size_t least_seen = 10;  // of so many frames, one
+// Mixed with hair or shadowed the screen is darker: the brighter half's middle.
+constexpr double bright_quantile = 0.75;
+constexpr int rows_of_task = 32;
+// An even number.
+constexpr std::size_t most_frames = 96;
+// How far from its median a pixel of a background that holds still may be: of its light, and more.
+constexpr float still_share = 0.1F, still_least = 4e-3F;
+
+template <class Picture>
+std::string size_of(const Picture& image) {
+  return std::to_string(image.width) + "x" + std::to_string(image.height);
+}
+
+template <class Picture>
+void check_frame(const Image& frame, const Picture* first) {
+  const std::size_t values = static_cast<std::size_t>(std::max(frame.height, 0)) *
+                             static_cast<std::size_t>(std::max(frame.width, 0)) * 3;
+  if (frame.channels != 3 || values == 0 || frame.pixels.size() != values) {
+    throw std::invalid_argument("a frame of a clean plate is not (height, width, 3)");
+  }
+  if (first != nullptr && (frame.height != first->height || frame.width != first->width)) {
+    throw std::invalid_argument("frames of a clean plate differ in size: " + size_of(*first) +
+                                " and " + size_of(frame));
+  }
+}
+
+}  // namespace
+
+void PlateShots::add(const Image& frame) {
+  check_frame(frame, count_ > 0 ? &sum_ : nullptr);
+  if (count_ == 0) sum_ = capture::make_image(frame.height, frame.width);
+  std::ranges::transform(frame.pixels, sum_.pixels, sum_.pixels.begin(),
+                         [](float value, float sum) { return sum + clean(value); });
+  const std::size_t measured = (frame.pixels.size() + noise_step - 1) / noise_step;
+  steps_.resize(measured), steps_count_.resize(measured);
+  for (std::size_t k = 0; k < measured && count_ > 0; ++k) {
+    const float a = clean(last_.pixels[k * noise_step]), b = clean(frame.pixels[k * noise_step]);
+    if (a >= clipped || b >= clipped) continue;
+    steps_[k] += 0.5F * (a - b) * (a - b);
+    ++steps_count_[k];
+  }
+  last_ = frame;
+  ++count_;
+}
+
+CleanPlate PlateShots::average() const {
+  if (count_ == 0) throw std::invalid_argument(no_frames);
+  CleanPlate plate;
+  plate.light = sum_;
+  for (float& value : plate.light.pixels) value /= static_cast<float>(count_);
+  plate.colour = most_saturated(spread_pixels(plate.light)).value_or(mean_colour(plate.light));
+  if (count_ < 2) return plate;
+  // Variance of one frame against its neighbour, as a line over light. That is blurred: its own
+  // noise would make the line flatter.
+  Image light = plate.light;
+  blur_screen(light);
+  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (std::size_t k = 0; k < steps_.size(); ++k) {
+    const double x = light.pixels[k * noise_step], y = steps_[k], times = steps_count_[k];
+    n += times, sx += times * x, sy += y, sxx += times * x * x, sxy += x * y;
+  }
+  const double spread = n * sxx - sx * sx;
+  if (n < 100 || !(spread > 0)) return plate;
+  const double gain = std::max(0.0, (n * sxy - sx * sy) / spread);
+  plate.noise_gain = static_cast<float>(gain);
+  plate.noise_floor = std::max(least_noise_floor, static_cast<float>((sy - gain * sx) / n));
+  return plate;
+}
+
+void PlateFootage::add(const Image& frame) {
+  check_frame(frame, frames_.empty() ? nullptr : &frames_.front());
+  if (count_++ % step_ != 0) return;
+  if (frames_.size() == most_frames) {
+    for (std::size_t i = 1; i < most_frames / 2; ++i) frames_[i] = std::move(frames_[2 * i]);
+    frames_.resize(most_frames / 2);
+    step_ *= 2;
+  }
+  HalfImage& half = frames_.emplace_back(HalfImage{frame.height, frame.width, {}, 3});
+  half.pixels.reserve(frame.pixels.size());
+  constexpr std::size_t at_once = 1024;
+  std::array<float, at_once> light;
+  std::array<capture::Half, at_once> codes;
+  for (std::size_t from = 0; from < frame.pixels.size(); from += at_once) {
+    const std::size_t count = std::min(at_once, frame.pixels.size() - from);
+    std::transform(&frame.pixels[from], &frame.pixels[from] + count, light.begin(),
+                   [](float value) { return std::min(clean(value), capture::half_max); });
+    capture::halves_from_floats({light.data(), count}, codes.data());
+    half.pixels.insert(half.pixels.end(), codes.begin(), codes.begin() + count);
+  }
+}
+
+// Spread evenly over all the pixels of the frames one after the other.
+std::vector<Light3> PlateFootage::spread_pixels() const {
+  if (frames_.empty()) throw std::invalid_argument(no_frames);
+  const std::size_t in_frame = frames_.front().pixels.size() / 3;
+  const std::size_t all = in_frame * frames_.size();
+  std::vector<Light3> some;
+  for (std::size_t i = 0; i < all; i += spread_step(all)) {
+    const capture::Half* from = &frames_[i / in_frame].pixels[3 * (i % in_frame)];
+    Light3& light = some.emplace_back();
+    capture::floats_from_halves({from, 3}, light.data());
+  }
+  return some;
+}
+
+CleanPlate PlateFootage::screen() const {
+  const std::vector<Light3> pixels = spread_pixels();
+  const ScreenColour colour = most_saturated(pixels).value_or(ScreenColour::green);
+  return screen(colour, find_key(pixels, colour));
+}
+
+CleanPlate PlateFootage::screen(ScreenColour colour) const {
+  return screen(colour, find_key(spread_pixels(), colour));
+}
+
+CleanPlate PlateFootage::screen(ScreenColour colour, const ScreenLight& key) const {
+  CleanPlate plate;
+  plate.colour = colour;
+  Image& light = plate.light = capture::make_image(frames_.front().height, frames_.front().width);
+  GapFiller filler(light.height, light.width, 3);
+  filler.clear();
+  const auto columns = static_cast<std::size_t>(light.width);
+  std::vector<int> known(static_cast<std::size_t>(light.height));
+  const auto rows = [&](const tbb::blocked_range<int>& range) {
+    // Of a row in each frame: its light, and the screen's excess, 0 where it shows none.
+    std::vector<float> lights(frames_.size() * columns * 3), excess(frames_.size() * columns);
+    std::vector<std::size_t> showing;
+    for (int y = range.begin(); y < range.end(); ++y) {
+      for (std::size_t f = 0; f < frames_.size(); ++f) {
+        float* const row = &lights[f * columns * 3];
+        capture::floats_from_halves({&frames_[f].pixels[light.index(y, 0)], columns * 3}, row);
+        for (std::size_t x = 0; x < columns; ++x) {
+          const ScreenLight seen =
+              screen_light({row[3 * x], row[3 * x + 1], row[3 * x + 2]}, colour);
+          excess[f * columns + x] = is_screen(seen, key) ? seen.excess : 0;
+        }
+      }
+      for (std::size_t x = 0; x < columns; ++x) {
+        const auto excess_in = [&](std::size_t frame) { return excess[frame * columns + x]; };
+        showing.clear();
+        for (std::size_t f = 0; f < frames_.size(); ++f) {
+          if (excess_in(f) > 0) showing.push_back(f);
+        }
+        if (showing.empty() || showing.size() * least_seen < frames_.size()) continue;
+        const double upper = bright_quantile * static_cast<double>(showing.size());
+        const auto middle = showing.begin() + static_cast<std::ptrdiff_t>(upper);
+        std::ranges::nth_element(showing, middle, {}, excess_in);
+        std::copy_n(&lights[(*middle * columns + x) * 3], 3, filler.value(y, static_cast<int>(x)));
+        filler.weight(y, static_cast<int>(x)) = 1;
+        ++known[static_cast<std::size_t>(y)];
+      }
+    }
+  };
+  capture::parallel_for(tbb::blocked_range<int>(0, light.height, rows_of_task), rows);
+  filler.fill();
+  for (int y = 0; y < light.height; ++y) {
+    std::copy_n(filler.value(y, 0), columns * 3, &light.pixels[light.index(y, 0)]);
+  }
+  plate.known = static_cast<float>(std::accumulate(known.begin(), known.end(), 0.0) /
+                                   static_cast<double>(light.pixels.size() / 3));
+  return plate;
+}
+
+CleanPlate PlateFootage::background() const {
+  CleanPlate plate;
+  plate.colour = most_saturated(spread_pixels()).value_or(ScreenColour::green);
+  Image& light = plate.light = capture::make_image(frames_.front().height, frames_.front().width);
+  const auto values = static_cast<std::size_t>(light.width) * 3;
+  std::vector<std::size_t> known(static_cast<std::size_t>(light.height));
+  const auto rows = [&](const tbb::blocked_range<int>& range) {
+    std::vector<float> lights(frames_.size() * values), seen(frames_.size());
+    for (int y = range.begin(); y < range.end(); ++y) {
+      const std::size_t first = light.index(y, 0);
+      for (std::size_t f = 0; f < frames_.size(); ++f) {
+        capture::floats_from_halves({&frames_[f].pixels[first], values}, &lights[f * values]);
+      }
+      for (std::size_t i = 0; i < values; ++i) {
+        for (std::size_t f = 0; f < seen.size(); ++f) seen[f] = lights[f * values + i];
+        const float median = light.pixels[first + i] = capture::median_in_place(seen);
+        const float near = still_share * median + still_least;
+        const auto alike =
+            std::ranges::count_if(seen, [&](float v) { return std::abs(v - median) <= near; });
+        known[static_cast<std::size_t>(y)] += 2 * static_cast<std::size_t>(alike) > seen.size();
+      }
+    }
+  };
+  capture::parallel_for(tbb::blocked_range<int>(0, light.height, rows_of_task), rows);
+  plate.known = static_cast<float>(
+      static_cast<double>(std::accumulate(known.begin(), known.end(), std::size_t{0})) /
+      static_cast<double>(light.pixels.size()));
+  return plate;
+}
+
+CleanPlate average_plate(std::span<const Image> frames) {
+  PlateShots shots;
+  for (const Image& frame : frames) shots.add(frame);
+  return shots.average();
+}
+
+CleanPlate plate_from_footage(std::span<const Image> frames) {
+  PlateFootage footage;
+  for (const Image& frame : frames) footage.add(frame);
+  return footage.screen();
+}
+
+CleanPlate plate_from_footage(std::span<const Image> frames, ScreenColour colour) {
+  PlateFootage footage;
+  for (const Image& frame : frames) footage.add(frame);
+  return footage.screen(colour);
+}
+
+CleanPlate background_from_footage(std::span<const Image> frames) {
+  PlateFootage footage;
+  for (const Image& frame : frames) footage.add(frame);
+  return footage.background();
+}
+
+}  // namespace compositing

@@ -1,0 +1,62 @@
+// A screen's own colour, found in pictures, and which pixels have it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "capture/image.h"
+#include "compositing/screen_colour.h"
+
+namespace compositing {
+
+// Light of a pixel; what is no number, negative or beyond measure is black.
+using Light3 = std::array<float, 3>;
+inline float clean(float value) { return value > 0 && value <= 1e9F ? value : 0; }
+inline Light3 clean_light(const float* light) {
+  return {clean(light[0]), clean(light[1]), clean(light[2])};
+}
+
+// Of so many pixels, those that are looked at where some thousands tell enough: every so many.
+inline std::size_t spread_step(std::size_t pixels) {
+  constexpr std::size_t enough = 50000;
+  return std::max<std::size_t>(1, pixels / enough);
+}
+std::vector<Light3> spread_pixels(const capture::Image& image);
+
+// A colour with its channels in the keyer's order, and how much of the screen's is in it.
+struct ScreenLight {
+  float first, second, third, excess;
+};
+
+// Of light that is clean.
+inline ScreenLight screen_light(const Light3& light, ScreenColour colour) {
+  const auto order = channels_of(colour);
+  const auto at = [&](std::size_t i) { return light[static_cast<std::size_t>(order[i])]; };
+  const float a = at(0), b = at(1), c = at(2);
+  return {a, b, c,
+          has_two_primaries(colour) ? screen_excess<true>(a, b, c) : screen_excess<false>(a, b, c)};
+}
+
+// The most saturated large colour: the median of what has most of the screen's excess. Of at least
+// one pixel, clean.
+ScreenLight find_key(std::span<const Light3> pixels, ScreenColour colour);
+
+// The colour whose key has the greatest excess: a screen's also where it is the lesser part of the
+// picture. Nothing if none has any.
+std::optional<ScreenColour> most_saturated(std::span<const Light3> pixels);
+
+// Whether that is the screen, somewhat brighter or darker.
+inline bool is_screen(const ScreenLight& light, const ScreenLight& key) {
+  constexpr float darkest = 0.35F, brightest = 3, chroma_tolerance = 0.12F;
+  const bool near = light.excess >= darkest * key.excess && light.excess <= brightest * key.excess;
+  const float off = std::abs(light.second * key.first - key.second * light.first) +
+                    std::abs(light.third * key.first - key.third * light.first);
+  return near && off < chroma_tolerance * key.first * light.first;
+}
+
+}  // namespace compositing
