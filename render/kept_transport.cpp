@@ -163,6 +163,13 @@ std::vector<int> KeptTransport::stages() const {
   return stages;
 }
 
+std::vector<std::uint64_t> KeptTransport::looks() const {
+  std::vector<std::uint64_t> looks;
+  looks.reserve(cells_.size());
+  for (const Cell& cell : cells_) looks.push_back(cell.stage == none ? 0 : cell.looks);
+  return looks;
+}
+
 CellTransport* KeptTransport::place(int column, int row) {
   Cell& cell = cells_[index(column, row)];
   // What was forgotten keeps its room for what comes, unless others may need it: a cell begins

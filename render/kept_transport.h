@@ -74,6 +74,11 @@ class KeptTransport {
   static constexpr int none = -1;
   std::vector<int> stages() const;
 
+  // Rays that looking at live pictures took in a cell: told by who lights it, in each frame.
+  void looked(int column, int row, std::uint64_t rays) { cells_[index(column, row)].looks = rays; }
+  // Of all cells, row by row, where they were looked at last; 0 of those that are not kept.
+  std::vector<std::uint64_t> looks() const;
+
   CausticFollower& caustics() { return caustics_; }
   // Of each frame in turn.
   const std::shared_ptr<BorderedLevels>& bordered_levels() const { return bordered_levels_; }
@@ -107,6 +112,7 @@ class KeptTransport {
     std::unique_ptr<LitCell> lit;  // of that transport
     std::size_t bytes = 0;         // counted in bytes_
     int stage = none;
+    std::uint64_t looks = 0;    // rays to live pictures, in the last frame
     int needs_pictures = none;  // the stage at which it was last found with them, for it had to be
   };
   std::size_t index(int column, int row) const {

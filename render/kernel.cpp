@@ -30,6 +30,8 @@ struct TileWorkspace::Impl {
              bool sees_pictures,
              RenderStatistics& statistics);
   void write(const FrameContext& frame, const TileView& tile, int x0, int y0) const;
+  bool look(
+      const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0);
   void write_kept(
       const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0);
 };
@@ -197,10 +199,23 @@ bool is_broken_plate(const TileView& tile, int x0, int y0) {
   return broken;
 }
 
+// What the frame's live pictures do to a cell, to `pictures`. Returns whether they do anything.
+bool TileWorkspace::Impl::look(
+    const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0) {
+  RenderStatistics taken;
+  const bool sees = baker.look_at_pictures(frame, cell, x0, y0, pictures, taken);
+  if (frame.inputs.kept) {
+    frame.inputs.kept->looked(x0 / cell_size, y0 / cell_size,
+                              taken.primary_rays + taken.shadow_rays + taken.secondary_rays);
+  }
+  *tile.statistics += taken;
+  return sees;
+}
+
 // A cell whose transport is kept: as it was lit last, if nothing that lights it has changed.
 void TileWorkspace::Impl::write_kept(
     const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0) {
-  if (baker.look_at_pictures(frame, cell, x0, y0, pictures, *tile.statistics)) {
+  if (look(frame, cell, tile, x0, y0)) {
     load_plate(tile, x0, y0);
     light(frame, cell, true, *tile.statistics);
     write(frame, tile, x0, y0);
@@ -253,9 +268,7 @@ void TileWorkspace::Impl::render_cell(const FrameContext& frame,
   } else {
     load_plate(tile, x0, y0);
     baker.bake(frame, stage, x0, y0, transport, *tile.statistics);
-    const bool sees_pictures =
-        baker.look_at_pictures(frame, transport, x0, y0, pictures, *tile.statistics);
-    light(frame, transport, sees_pictures, *tile.statistics);
+    light(frame, transport, look(frame, transport, tile, x0, y0), *tile.statistics);
     if (counts) write_counts(transport, tile, x0, y0);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
     if (memory) memory->found_with(baker.scratch_bytes());

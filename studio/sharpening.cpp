@@ -14,6 +14,10 @@ using render::finished_stage, render::one_ray_stage;
 
 constexpr double share_of_frame = 0.7;  // of its time, for rendering
 constexpr double share_at_rest = 0.88;  // ... where nothing is found anew, and cells can wait
+// Frames that took more than all of their time in the mean of so many make cells coarser, until
+// they should take less. In between nothing changes.
+constexpr double share_when_late = 1, share_when_shed = 0.85;
+constexpr int frames_to_tell = 8;
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
 // What a cell takes at each stage, of the coarsest one's, as long as nothing better is known: as in
@@ -37,6 +41,11 @@ std::size_t stride_of(std::size_t cells) {
   return stride;
 }
 
+// Where a cell goes back to that takes too long.
+std::uint8_t coarser(std::uint8_t stage) {
+  return static_cast<std::uint8_t>(stage > one_ray_stage ? one_ray_stage : stage - 1);
+}
+
 }  // namespace
 
 Sharpening::Sharpening(capture::Rational rate, bool live)
@@ -48,7 +57,7 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
 // What a live frame may spend on cells.
 double Sharpening::rest_ms(bool at_rest) const {
   if (std::ranges::none_of(timed_, std::identity())) return 0;
-  if (persons_ && at_rest && relight_ms_ > share_at_rest * frame_ms_) return 0;
+  if (looks_ && at_rest && relight_ms_ > share_at_rest * frame_ms_) return 0;
   const double share = at_rest ? share_at_rest : share_of_frame;
   return std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
 }
@@ -98,8 +107,32 @@ void Sharpening::go_on(double left) {
   }
 }
 
-const SharpeningPlan& Sharpening::next(std::span<const int> kept, bool persons) {
-  persons_ = persons;
+// Cells that are to be coarser, for looking at persons in them makes frames late: those in which
+// that takes most.
+std::vector<std::size_t> Sharpening::too_costly(std::span<const std::uint64_t> looks) {
+  if (!live_ || frames_shown_ < frames_to_tell || relight_ms_ <= share_when_late * frame_ms_) {
+    return {};
+  }
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    if (looks[i] > 0 && plan_.stages[i] > 0) order.push_back(i);
+  }
+  std::ranges::stable_sort(order, std::greater(), [&](std::size_t i) { return looks[i]; });
+  const auto all = static_cast<double>(std::reduce(looks.begin(), looks.end()));
+  double left = all * (1 - share_when_shed * frame_ms_ / relight_ms_);
+  double ms = share_of_frame * frame_ms_;  // to find them in
+  std::size_t count = 0;
+  for (; count < order.size() && left > 0 && ms > 0; ++count) {
+    left -= static_cast<double>(looks[order[count]]);
+    ms -= cost_[coarser(plan_.stages[order[count]])];
+  }
+  order.resize(count);
+  return order;
+}
+
+const SharpeningPlan& Sharpening::next(std::span<const int> kept,
+                                       std::span<const std::uint64_t> looks) {
+  looks_ = std::ranges::any_of(looks, [](std::uint64_t rays) { return rays > 0; });
   constexpr int none = render::KeptTransport::none;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
@@ -123,8 +156,14 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept, bool persons) 
   std::ranges::transform(kept, plan_.stages.begin(), [](int stage) {
     return static_cast<std::uint8_t>(stage == none ? finished_stage : stage);
   });
+  const std::vector<std::size_t> shed = too_costly(looks);
+  if (!shed.empty()) frames_shown_ = 0;
+  for (const std::size_t i : shed) {
+    plan_.stages[i] = coarser(plan_.stages[i]);
+    ++lost_[plan_.stages[i]];
+  }
   if (!full_) stopped_ = false;
-  if (!stopped_) go_on(left);
+  if (!stopped_ && shed.empty()) go_on(left);
   for (std::size_t i = 0; i < kept.size(); ++i) {
     if (kept[i] == none) plan_.stages[i] = static_cast<std::uint8_t>(first);
   }
@@ -157,6 +196,7 @@ void Sharpening::took(double render_ms, bool full) {
   stopped_ = stopped_ || (full && went_on_);
   if (!live_) return;
   if (std::ranges::all_of(lost_, [](std::size_t count) { return count == 0; })) {
+    ++frames_shown_;
     relight_ms_ = relight_ms_ > 0 ? relight_ms_ + (render_ms - relight_ms_) * followed : render_ms;
   } else {
     learn(lost_, std::max(render_ms - relight_ms_, 0.05 * render_ms));
@@ -207,8 +247,7 @@ void render_sharpening(Sharpening& sharpening,
   using Milliseconds = std::chrono::duration<double, std::milli>;
   const Clock::time_point start = Clock::now();
   const auto frame = render::prepare_frame(inputs, job, plate);
-  const SharpeningPlan& plan =
-      sharpening.next(inputs.kept->stages(), !inputs.scene->pictures().empty());
+  const SharpeningPlan& plan = sharpening.next(inputs.kept->stages(), inputs.kept->looks());
   job.stages = plan.stages;
   render::RenderStatistics ahead;
   const Clock::time_point begun = Clock::now();

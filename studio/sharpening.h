@@ -33,10 +33,12 @@ class Sharpening {
   Sharpening(capture::Rational rate, bool live);
 
   // Of the next frame, from what is still kept of the frames before
-  // (render::KeptTransport::stages()). It stands until the next call.
-  // Where `persons` are looked at in every frame, that takes the longer the finer cells are: a live
-  // show whose frames have no time left lets cells stay as they are.
-  const SharpeningPlan& next(std::span<const int> kept, bool persons = false);
+  // (render::KeptTransport::stages()), and what looking at persons took in each of these cells
+  // (looks(); empty = nothing anywhere). It stands until the next call.
+  // Looking takes the longer the finer cells are, in every frame: where that leaves a live show no
+  // time, cells stay as they are; where it makes frames late, those that take most of it are found
+  // anew, coarser.
+  const SharpeningPlan& next(std::span<const int> kept, std::span<const std::uint64_t> looks = {});
   // The frame's stages with what was found ahead, and what that took.
   void found_ahead(std::span<const std::uint8_t> stages, double ms);
   // What rendering the frame took then, and whether what it found could not all be kept.
@@ -57,11 +59,13 @@ class Sharpening {
   std::size_t after(std::size_t stage, std::size_t coarse) const;
   std::size_t stage_of_lost(std::size_t lost) const;
   void go_on(double left);
+  std::vector<std::size_t> too_costly(std::span<const std::uint64_t> looks);
   void learn(const ByStage<std::size_t>& found, double ms);
 
   double frame_ms_, frames_a_second_;
   bool live_;
-  bool persons_ = false;
+  bool looks_ = false;                   // at persons, anywhere
+  int frames_shown_ = 0;                 // since cells became coarser, without finding any
   bool full_ = false, stopped_ = false;  // there is no memory for more
   double relight_ms_ = 0;                // a frame that finds no cell anew
   ByStage<double> cost_;                 // of a cell: live in ms, once one was timed

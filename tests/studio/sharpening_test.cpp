@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <numeric>
 
 #include "studio/show.h"
 #include "tests/made_files.h"
@@ -29,30 +30,44 @@ struct MadeMachine {
   double cell_ms;
   std::vector<int> kept = std::vector<int>(cells, none);
   double rest_ms = 3;
-  bool persons = false;
+  std::array<std::size_t, 2>
+      person{};        // cells that show one: the first, and the one after the last
+  double look_ms = 0;  // for each of these, with a ray a pixel
 
   double ms_at(std::size_t stage) const { return cell_ms * made_cost[stage]; }
+  // What looking at the person takes in each cell, in microseconds.
+  std::vector<std::uint64_t> looks() const {
+    std::vector<std::uint64_t> looks(cells);
+    for (std::size_t i = person[0]; i < person[1]; ++i) {
+      if (kept[i] == none) continue;
+      looks[i] = static_cast<std::uint64_t>(1e3 * look_ms * (1 + kept[i]) / 4);
+    }
+    return looks;
+  }
 
   // Shows a frame; returns what it takes.
   double show(Sharpening& sharpening) {
-    const SharpeningPlan& plan = sharpening.next(kept, persons);
+    const SharpeningPlan& plan = sharpening.next(kept, looks());
     double ms = 0;
     std::size_t found = 0;
-    std::vector<std::uint8_t> stages = plan.stages;
+    std::vector<std::uint8_t> stages = plan.stages, ahead(cells);
     for (; found < plan.ahead.size() && ms < plan.ahead_ms; ++found) {
       const auto& [cell, stage] = plan.ahead[found];
       EXPECT_LT(stages[cell], stage);
       EXPECT_EQ(kept[cell], stages[cell]);
       stages[cell] = stage;
+      ahead[cell] = 1;
       ms += ms_at(stage);
     }
     sharpening.found_ahead(stages, ms);
     double frame_ms = rest_ms;
     for (std::size_t i = 0; i < cells; ++i) {
-      if (kept[i] == none) frame_ms += ms_at(stages[i]);
+      if (kept[i] != stages[i] && !ahead[i]) frame_ms += ms_at(stages[i]);
     }
-    sharpening.took(frame_ms, false);
     kept = as_kept(stages);
+    const std::vector<std::uint64_t> looked = looks();
+    frame_ms += 1e-3 * static_cast<double>(std::reduce(looked.begin(), looked.end()));
+    sharpening.took(frame_ms, false);
     return ms + frame_ms;
   }
 };
@@ -120,7 +135,7 @@ TEST(Sharpening, LetsCellsBeWherePersonsTakeAllOfTheTime) {
   for (const bool persons : {false, true}) {
     Sharpening sharpening({25, 1}, true);
     MadeMachine machine{2};
-    machine.persons = persons;
+    if (persons) machine.person = {0, 1}, machine.look_ms = 1e-3;
     for (int i = 0; i < 3; ++i) machine.show(sharpening);
     machine.rest_ms = 38;
     for (int i = 0; i < 15; ++i) machine.show(sharpening);
@@ -136,6 +151,37 @@ TEST(Sharpening, LetsCellsBeWherePersonsTakeAllOfTheTime) {
     for (int i = 0; i < 40; ++i) machine.show(sharpening);
     EXPECT_GT(sharpening.share(), share);
   }
+}
+
+// A person comes before sharp cells: frames are late for a moment, then coarser where the person
+// is, and stay so; when the person has gone, they are sharp again.
+TEST(Sharpening, GoesBackWherePersonsMakeFramesLate) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine{0.1};
+  for (int i = 0; i < 200; ++i) machine.show(sharpening);
+  ASSERT_EQ(sharpening.share(), 1);
+  machine.person = {300, 500};
+  machine.look_ms = 0.2;  // 70 ms where cells are finished
+  int late = 0;
+  for (int i = 0; i < 75; ++i) late += machine.show(sharpening) > 40;
+  EXPECT_LT(late, 50);
+  EXPECT_GT(late, 0);
+  int changes = 0;
+  for (int i = 0; i < 100; ++i) {
+    const std::vector<int> before = machine.kept;
+    EXPECT_LE(machine.show(sharpening), 40) << i;
+    changes += machine.kept != before;
+  }
+  EXPECT_LT(changes, 10);
+  for (std::size_t i = 0; i < cells; ++i) {
+    if (i < 300 || i >= 500) {
+      ASSERT_EQ(machine.kept[i], render::finished_stage) << i;
+    }
+  }
+  EXPECT_LT(sharpening.share(), 1);
+  machine.look_ms = 0;
+  for (int i = 0; i < 100; ++i) machine.show(sharpening);
+  EXPECT_EQ(sharpening.share(), 1);
 }
 
 // What is lost and can be found anew in the time of a frame is as fine as before at once.
