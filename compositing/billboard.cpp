@@ -39,17 +39,25 @@ Block block_of(const Material& material) {
   return block;
 }
 
-// Where its video shows the hit; false = nowhere.
-bool find(const Material& material, const Block& block, const HitPoint& hit, LookUp& at) {
+// Where its video shows a point; false = nowhere. `own` is where the billboard's mesh has it.
+bool find(const Material& material,
+          const Block& block,
+          Vec3f position,
+          GridPlace own,
+          float uv_per_metre,
+          LookUp& at) {
   if (block.camera.columns == 0) {
-    at = {{hit.u, hit.v}, hit.uv_per_metre};
+    at = {own, uv_per_metre};
     return true;
   }
   const auto found =
       seen_by_camera(block.camera, std::span(material.parameters).subspan(sizeof block),
-                     in_camera(block.camera, hit.position));
+                     in_camera(block.camera, position));
   if (found) at = *found;
   return found.has_value();
+}
+bool find(const Material& material, const Block& block, const HitPoint& hit, LookUp& at) {
+  return find(material, block, hit.position, {hit.u, hit.v}, hit.uv_per_metre, at);
 }
 
 // Points that are looked up together.
@@ -143,8 +151,8 @@ void show(const Block& block,
                 p.kind});
 }
 
-// A billboard where it stands in a frame: a parallelogram, whose rays to light take no tree.
-class StandingBillboard final : public render::Prepared {
+// A billboard where it stands in a frame: a parallelogram.
+class StandingBillboard final : public render::StandingPicture {
  public:
   StandingBillboard(const Material& material,
                     const std::array<float, 12>& set_from_object,
@@ -162,57 +170,79 @@ class StandingBillboard final : public render::Prepared {
     uv_per_metre_ = 1 / std::sqrt(area);
   }
 
-  bool dim(const render::LightRays& rays) const override {
-    for (std::size_t first = 0; first < rays.count; first += 8) {
-      const std::size_t n = std::min<std::size_t>(rays.count - first, 8);
-      const auto eight = [&](const float* from) {
-        std::array<float, 8> some{};
-        std::copy_n(from + first, n, some.begin());
-        return render::load_eight(some.data());
-      };
-      const Eights o{eight(rays.ox), eight(rays.oy), eight(rays.oz)};
-      const Eights d{eight(rays.dx), eight(rays.dy), eight(rays.dz)};
-      const Eight facing = dot(d, normal_);
-      const Eight t = dot(corner_ - o, normal_) / facing;
-      const Eights at = o + d * t;
-      const Eight u = dot(at - corner_, along_right_), v = dot(at - corner_, along_up_);
-      unsigned met = render::bits_of((t > 0) & (t < eight(rays.far_m)) & (u >= 0) & (u <= 1) &
-                                     (v >= 0) & (v <= 1));
-      for (met &= (1U << n) - 1; met != 0; met &= met - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(met)), ray = first + i;
-        const float slant = std::max(std::abs(facing[i]), 1e-6F);
-        const float width_m = rays.width_m[ray] + rays.cone_rad[ray] * t[i];
-        const Vec3f share =
-            passed_at(u[i], 1 - v[i], {at.x[i], at.y[i], at.z[i]}, width_m / std::sqrt(slant));
-        rays.red[ray] *= share.x, rays.green[ray] *= share.y, rays.blue[ray] *= share.z;
+  void dim(const render::LightRays& light) const override {
+    for_each_met(light.rays, [&](std::size_t ray, const Met& met) {
+      const float slant = std::max(std::abs(met.facing), 1e-6F);
+      const float width_m = light.width_m[ray] + light.cone_rad[ray] * met.distance_m;
+      LookUp at{};
+      if (!find(material_, block_, met.position, {met.u, met.v}, uv_per_metre_, at)) return;
+      const Vec3f share = dimmed(block_, *picture_, at.place.u, at.place.v,
+                                 width_m / std::sqrt(slant) * at.uv_per_metre);
+      light.red[ray] *= share.x, light.green[ray] *= share.y, light.blue[ray] *= share.z;
+    });
+  }
+
+  void meet(const render::SightRays& rays, std::vector<render::Sight>& sights) const override {
+    for_each_met(rays, [&](std::size_t ray, const Met& met) {
+      LookUp at{};
+      if (!find(material_, block_, met.position, {met.u, met.v}, uv_per_metre_, at)) return;
+      sights.push_back({static_cast<std::uint32_t>(ray), met.distance_m, met.position,
+                        met.facing > 0 ? -normal_ : normal_, at.place.u, at.place.v,
+                        at.uv_per_metre});
+    });
+  }
+
+  void see(std::span<render::Sight> sights) const override {
+    std::array<render::PicturePlace, together> places;
+    std::array<std::array<float, 4>, together> found;
+    for (; !sights.empty(); sights = sights.subspan(std::min(sights.size(), together))) {
+      const auto some = sights.first(std::min(sights.size(), together));
+      std::ranges::transform(some, places.begin(), [](const render::Sight& s) {
+        return render::PicturePlace{s.u, s.v, s.footprint_m * s.uv_per_metre};
+      });
+      picture_->look_up_all(std::span(places).first(some.size()),
+                            std::span(found).first(some.size()));
+      for (std::size_t i = 0; i < some.size(); ++i) {
+        some[i].radiance = foreground(block_, found[i]);
+        some[i].passed = grey(1 - found[i][3]);
       }
     }
-    return true;
   }
 
  private:
   using Eight = render::Eight;
-  struct Eights {
-    Eight x, y, z;
-    friend Eights operator+(const Eights& a, const Eights& b) {
-      return {a.x + b.x, a.y + b.y, a.z + b.z};
-    }
-    friend Eights operator*(const Eights& a, Eight by) { return {a.x * by, a.y * by, a.z * by}; }
-    friend Eights operator-(Vec3f a, const Eights& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-    friend Eights operator-(const Eights& a, Vec3f b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-    friend Eight dot(const Eights& a, Vec3f b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-  };
+  using Eights = calibrate::Vec3T<Eight>;
 
-  Vec3f passed_at(float u, float v, Vec3f position, float footprint_m) const {
-    float uv_per_metre = uv_per_metre_;
-    if (block_.camera.columns != 0) {
-      const auto found =
-          seen_by_camera(block_.camera, std::span(material_.parameters).subspan(sizeof block_),
-                         in_camera(block_.camera, position));
-      if (!found) return grey(1);
-      u = found->place.u, v = found->place.v, uv_per_metre = found->uv_per_metre;
+  // Where a ray meets it: (u, v) as its mesh has them, and the cosine between ray and normal.
+  struct Met {
+    float distance_m, facing, u, v;
+    Vec3f position;
+  };
+  template <class Visit>
+  void for_each_met(const render::SightRays& rays, Visit&& visit) const {
+    for (std::size_t first = 0; first < rays.count; first += 8) {
+      const std::size_t n = std::min<std::size_t>(rays.count - first, 8);
+      const auto eight = [&](const float* from) {
+        if (n == 8) return render::load_eight(from + first);
+        std::array<float, 8> some{};
+        std::copy_n(from + first, n, some.begin());
+        return render::load_eight(some.data());
+      };
+      const auto along = [](const Eights& a, Vec3f b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+      const Eights d{eight(rays.dx), eight(rays.dy), eight(rays.dz)};
+      const Eights from_corner{eight(rays.ox) - corner_.x, eight(rays.oy) - corner_.y,
+                               eight(rays.oz) - corner_.z};
+      const Eight facing = along(d, normal_), t = -along(from_corner, normal_) / facing;
+      const Eights at{from_corner.x + d.x * t, from_corner.y + d.y * t, from_corner.z + d.z * t};
+      const Eight u = along(at, along_right_), v = along(at, along_up_);
+      unsigned met = render::bits_of((t > 0) & (t < eight(rays.far_m)) & (u >= 0) & (u <= 1) &
+                                     (v >= 0) & (v <= 1));
+      for (met &= (1U << n) - 1; met != 0; met &= met - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(met));
+        visit(first + i,
+              Met{t[i], facing[i], u[i], 1 - v[i], corner_ + Vec3f{at.x[i], at.y[i], at.z[i]}});
+      }
     }
-    return dimmed(block_, *picture_, u, v, footprint_m * uv_per_metre);
   }
 
   Block block_;
@@ -262,7 +292,9 @@ class BillboardShader final : public render::Shader {
 
   bool lets_light_through(const Material&) const override { return true; }
   bool glows_by_means() const override { return true; }
-  bool only_shows(const Material& material) const override { return block_of(material).lit == 0; }
+  bool only_shows(const Material& material, const render::Mesh& mesh) const override {
+    return block_of(material).lit == 0 && is_billboard_mesh(mesh);
+  }
 
   std::vector<std::size_t> pictures_of(const Material& material) const override {
     return {block_of(material).picture};

@@ -130,7 +130,8 @@ float KeyedPicture::quick_alpha(float u, float v, float footprint_uv) const {
 }
 
 std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv) const {
-  const float inside = share_inside(u, v, footprint_uv, aspect_);
+  if (texture_->is_clear(u, v, footprint_uv)) return {};
+  const float inside = inside_of(u, v, footprint_uv, aspect_);
   if (!(inside > 0)) return {};
   std::array<float, 4> rgba = texture_->filtered(u, v, footprint_uv);
   for (float& value : rgba) value = std::max(value * inside, 0.0F);

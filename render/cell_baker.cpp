@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "render/cones.h"
 #include "render/embree_context.h"
 #include "render/kept_transport.h"
 #include "render/lanes.h"
@@ -252,26 +253,11 @@ void CellBaker::set_point(ShadePoint& p, int index, std::uint32_t pixel, std::ui
   p.media.count = 0;
 }
 
-// By how much directions differ across a pixel of the picture and down it, in the camera's frame.
-std::array<Vec3f, 2> CellBaker::sides_of(int x, int y) const {
-  const auto& table = *frame_->inputs.directions;
-  const auto at = [&](std::size_t t) { return Vec3f{table.x[t], table.y[t], table.z[t]}; };
-  const std::size_t here = table.index(y, x);
-  // Half of the way from the one before to the one after, or what there is of it.
-  const auto across = [&](std::size_t before, std::size_t after) {
-    const Vec3f a = at(before), b = at(after), middle = at(here);
-    const bool has_a = a != Vec3f{}, has_b = b != Vec3f{};
-    if (has_a && has_b) return (b - a) * 0.5F;
-    return has_b ? b - middle : has_a ? middle - a : Vec3f{};
-  };
-  const auto row = static_cast<std::size_t>(table.width + 2);
-  return {across(here - 1, here + 1), across(here - row, here + row)};
-}
-
 // The cone of a camera ray, which is as wide and high as so many pixels are there.
 void CellBaker::set_camera_cone(ShadePoint& p, int index, float pixels) const {
-  const auto [right, down] = sides_of(x0_ + static_cast<int>(p.pixel) % cell_size,
-                                      y0_ + static_cast<int>(p.pixel) / cell_size);
+  const auto [right, down] =
+      pixel_sides(*frame_->inputs.directions, x0_ + static_cast<int>(p.pixel) % cell_size,
+                  y0_ + static_cast<int>(p.pixel) / cell_size);
   const float far_m = stream_.far_m[static_cast<std::size_t>(index)];
   arrive(p, {}, {frame_->turn.to_set(right) * pixels, frame_->turn.to_set(down) * pixels}, far_m);
 }

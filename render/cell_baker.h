@@ -51,14 +51,6 @@ class CellBaker final : public RaySink {
 
   void push(const ShadePoint& from, const NewRay& ray) override;
 
-  // What the frame's live pictures do to a cell that was found without them. False if nothing.
-  bool look_at_pictures(const FrameContext& frame,
-                        const CellTransport& cell,
-                        int x0,
-                        int y0,
-                        CellPictures& seen,
-                        RenderStatistics& statistics);
-
  private:
   static constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
   static constexpr int ring_pixels = ring_size * ring_size;
@@ -199,7 +191,6 @@ class CellBaker final : public RaySink {
   void set_camera_ray(int i, Vec3f v_cam);
   void turn_camera_rays(int count);
   void set_point(ShadePoint& p, int i, std::uint32_t pixel, std::uint32_t slot);
-  std::array<Vec3f, 2> sides_of(int x, int y) const;
   void set_camera_cone(ShadePoint& p, int i, float pixels) const;
   void trace_centres();
   void shade_centres();
@@ -261,48 +252,10 @@ class CellBaker final : public RaySink {
   void compare_with_centre(int index, const Further& f);
   bool hides_pictures(int index) const;
   float picture_end(int index, Vec3f from, Vec3f direction) const;
-  template <class SetPoint>
-  bool look_along(int count, bool coherent, RayKind kind, float cone_rad, SetPoint&& set_point);
-  bool passes_picture(Vec3f from, Vec3f direction, float far_m) const;
-  void see_straight(const CellTransport& cell, CellPictures& seen);
-  void see_along(const CellTransport& cell, CellPictures& seen);
-  void light_through(std::span<const CellTransport::PictureLight> all, std::vector<Vec3f>& passed);
-  struct ShadowPlan;
   void find_smooth_squares(const CellMask& receiving, CellTransport::Shadowed& centres) const;
-  bool is_soft_in(std::size_t bit,
-                  const CellTransport::Shadowed& centres,
-                  Vec3f direction,
-                  float cone_rad) const;
-  void plan_square(std::size_t bit,
-                   const CellTransport::Shadowed& centres,
-                   Vec3f direction,
-                   float cone_rad,
-                   ShadowPlan& plan) const;
-  bool shade_centres_by_pictures(const CellTransport::Shadowed& centres,
-                                 const LitCentres& lit_centres,
-                                 const CellVisibility& visibility,
-                                 LostLight& lost);
-  bool shade_lamps_by_pictures(const CellTransport::Shadowed& centres,
-                               const CellLamps& lamps,
-                               const CellMask& receiving,
-                               ColourPlanes& lost);
-  bool look_for_light(const ShadowPlan& plan,
-                      const CellTransport::Shadowed& centres,
-                      Vec3f direction,
-                      float cone_rad);
-  void aim(
-      Vec3f from, Vec3f direction, float far_m, float width_m, float cone_rad, std::size_t number);
-  void shoot_at_pictures();
-
   // cell_bounce.cpp
   void mark_passed(std::size_t count);
   void bounce();
-  static void set_bounced_cone(ShadePoint& p,
-                               const Spread& steps,
-                               const Spread& spread,
-                               float roughness,
-                               bool one_of_many,
-                               float far_m);
   void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
 
   // cell_mirrored.cpp
@@ -537,14 +490,6 @@ class CellBaker final : public RaySink {
   bool sets_centres_ = false;    // receivers are centres', or what these mirror
   bool past_pictures_ = false;   // live pictures are passed; of this frame's, see `transport_`
   bool needs_pictures_ = false;  // ... which will not do: the cell is to be found with them
-  // What rays saw of pictures, how far they came, and where they end, while they are looked along.
-  std::array<CellPictures::Seen, stream_rays> along_;
-  std::array<float, stream_rays> came_m_, end_m_;
-  std::vector<Scene::Bounds> pictures_at_;
-  std::vector<const Prepared*> dims_;  // of these
-  bool takes_no_tree_ = false;         // what they dim
-  std::array<float, stream_rays> shadow_width_m_, shadow_cone_rad_, light_far_m_;
-  ColourPlanes hidden_;  // of one light, from centres
 };
 
 // Calls `call` with each shader and its points, in the order in which shaders first appear.

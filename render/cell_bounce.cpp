@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "render/cell_baker.h"
+#include "render/cones.h"
 #include "render/embree_context.h"
 #include "render/trace.h"
 
@@ -10,13 +11,6 @@ namespace render {
 namespace {
 
 bool sees_stand_ins(RayKind kind) { return kind == RayKind::camera || kind == RayKind::bent; }
-
-// Of parts of a lobe, over their width.
-constexpr float overlap = 1.05F;
-
-// The full angle of a disc that holds half of its light as near its middle as a lobe does: half of
-// a lobe lies within 2 alpha of the mirrored direction.
-float lobe_width(float roughness) { return 2 * 2 / 0.7F * roughness * roughness; }
 
 }  // namespace
 
@@ -30,19 +24,6 @@ void CellBaker::mark_passed(std::size_t count) {
     grid_->mark_line({s.ox[i], s.oy[i], s.oz[i]}, {s.dx[i], s.dy[i], s.dz[i]}, far_m,
                      transport_->reach.passed);
   }
-}
-
-// How wide a ray looks that came so far.
-void CellBaker::set_bounced_cone(ShadePoint& p,
-                                 const Spread& steps,
-                                 const Spread& spread,
-                                 float roughness,
-                                 bool one_of_many,
-                                 float far_m) {
-  arrive(p, steps, spread, far_m);
-  // A ray all over a lobe stands for a part of it, and these overlap.
-  p.blur_m = one_of_many ? overlap * std::sqrt(length(cross(p.steps.a, p.steps.b)))
-                         : far_m * lobe_width(roughness);
 }
 
 // What a cut ray meets is not shaded: it is taken for a surface like that which mirrors it, in the
@@ -123,7 +104,7 @@ void CellBaker::bounce() {
           hit ? points_[static_cast<std::size_t>(count++)] : points_[stream_rays - ++leaving];
       set_point(p, static_cast<int>(i), q.pixel, q.slot);
       if (!hit) group_[leaving - 1] = &p;
-      if (hit) set_bounced_cone(p, q.steps, q.spread, q.roughness, q.one_of_many, stream_.far_m[i]);
+      if (hit) arrive_bounced(p, q.steps, q.spread, q.roughness, q.one_of_many, stream_.far_m[i]);
       p.throughput = q.throughput;
       if (hit && q.media.count > 0) {
         p.throughput =

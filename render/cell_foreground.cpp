@@ -24,15 +24,10 @@ bool only_glows(const ShadePoint& p) {
 // Whether a ray through any of the cell's pixels may meet what shows live pictures.
 bool CellBaker::may_see_pictures() const {
   const Scene::Places& places = frame_->inputs.scene->places();
-  const KeptTransport* kept = frame_->inputs.kept;
   std::optional<CellCone> cone;
   for (std::size_t i = 0; i < places.bounds.size(); ++i) {
     if (places.pictures[i].empty()) continue;
-    if (!cone) {
-      cone = kept && !kept->cones().empty()
-                 ? kept->cones()[frame_->cell_at(x0_ / cell_size, y0_ / cell_size)]
-                 : cell_cone(*frame_->inputs.directions, frame_->turn, x0_, y0_);
-    }
+    if (!cone) cone = cone_of_cell(*frame_, x0_, y0_);
     if (may_be_seen(*cone, frame_->camera, places.bounds[i])) return true;
   }
   return false;

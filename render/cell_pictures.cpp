@@ -1,5 +1,5 @@
 // Cells that are found without live pictures: what is noted of rays and light that these may come
-// into the way of. What they do there is looked at in each frame (look_at_pictures.cpp).
+// into the way of. What they do there is looked at in each frame (picture_looker.cpp).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 #include "render/blocker_boxes.h"
 #include "render/cell_baker.h"
 #include "render/cell_squares.h"
+#include "render/cones.h"
 #include "render/embree_context.h"
 #include "render/lamp_way.h"
 #include "render/smooth_blocks.h"
@@ -264,8 +265,9 @@ std::uint16_t CellBaker::look_apart(
   }
   const float chance = chance_of_picture_ray(1 / static_cast<float>(samples_each_));
   if (!(number_in_pixel(f.pixel, f.index, 0) < chance)) return no_picture_ray;
-  const auto [right, down] = sides_of(x0_ + static_cast<int>(pixel % cell_size),
-                                      y0_ + static_cast<int>(pixel / cell_size));
+  const auto [right, down] =
+      pixel_sides(*frame_->inputs.directions, x0_ + static_cast<int>(pixel % cell_size),
+                  y0_ + static_cast<int>(pixel / cell_size));
   base_[slots + rays.size()] = {};
   rays.push_back({frame_->camera,
                   direction,

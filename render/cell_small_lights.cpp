@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "render/cell_baker.h"
+#include "render/cones.h"
 
 namespace render {
 namespace {
@@ -47,7 +48,7 @@ void CellBaker::mark_small_lights() {
       if (!is_inside(own)) continue;
       const Vec3f off = light.direction - at(x0_ + x, y0_ + y);
       if (!(dot(off, off) < far * far)) continue;
-      const auto sides = sides_of(x0_ + x, y0_ + y);
+      const auto sides = pixel_sides(*frame_->inputs.directions, x0_ + x, y0_ + y);
       const bool crosses = std::ranges::all_of(sides, [&](Vec3f side) {
         const float width = length(side);
         return std::abs(dot(off, side)) < (0.5F * width + light.half_rad) * width;

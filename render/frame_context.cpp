@@ -371,7 +371,29 @@ void add_camera(FrameContext& context) {
   context.rows = (d.height + cell_size - 1) / cell_size;
 }
 
+void add_pictures(FrameContext& context) {
+  const Scene& scene = *context.inputs.scene;
+  const std::vector<Instance>& instances = scene.description().instances;
+  std::size_t moving = 0;
+  for (std::uint32_t i = 0; i < instances.size(); ++i) {
+    if (!instances[i].moves) continue;
+    const Scene::Bounds& bounds = scene.places().bounds[moving++];
+    if (!scene.shows_apart(i)) continue;
+    const auto own = std::ranges::find(scene.prepared(), i, &PreparedSurface::instance);
+    if (own != scene.prepared().end() && own->prepared->picture()) {
+      context.pictures.push_back({bounds, own->prepared->picture()});
+    }
+  }
+}
+
 }  // namespace
+
+CellCone cone_of_cell(const FrameContext& context, int x0, int y0) {
+  const KeptTransport* kept = context.inputs.kept;
+  return kept && !kept->cones().empty()
+             ? kept->cones()[context.cell_at(x0 / cell_size, y0 / cell_size)]
+             : cell_cone(*context.inputs.directions, context.turn, x0, y0);
+}
 
 FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) {
   check_frame(inputs, job);
@@ -395,6 +417,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
     const Scene::Places& places = inputs.scene->places();
     const bool given = inputs.stalls && inputs.stalls->hold(places);
     context.stalls = given ? *inputs.stalls : PictureStalls(places);
+    add_pictures(context);
   }
   context.light_rows = LightRows(planned_table->lights);
   context.soft_lights = SoftLights(*planned_table, job.effort.soft_lights);

@@ -10,6 +10,7 @@
 #include "render/cell_baker.h"
 #include "render/kept_transport.h"
 #include "render/lanes.h"
+#include "render/picture_looker.h"
 #include "render/stand_in_parameters.h"
 #include "render/trace.h"
 
@@ -17,6 +18,7 @@ namespace render {
 
 struct TileWorkspace::Impl {
   CellBaker baker;
+  PictureLooker looker;
   CellTransport transport;
   RelightWorkspace relight;
   CellPicture picture;
@@ -203,7 +205,7 @@ bool is_broken_plate(const TileView& tile, int x0, int y0) {
 bool TileWorkspace::Impl::look(
     const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0) {
   RenderStatistics taken;
-  const bool sees = baker.look_at_pictures(frame, cell, x0, y0, pictures, taken);
+  const bool sees = looker.look(frame, cell, x0, y0, pictures, taken);
   if (frame.inputs.kept) {
     frame.inputs.kept->looked(x0 / cell_size, y0 / cell_size,
                               taken.primary_rays + taken.shadow_rays + taken.secondary_rays);

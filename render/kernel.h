@@ -6,6 +6,7 @@
 
 #include "render/bordered_levels.h"
 #include "render/camera_turn.h"
+#include "render/cell_reach.h"
 #include "render/glowing_parts.h"
 #include "render/light_gather.h"
 #include "render/picture_stalls.h"
@@ -60,7 +61,15 @@ struct FrameContext {
   // Of live pictures that cells are found without, and that are looked at anew in every frame;
   // none where pictures belong to what cells are found with.
   PictureStalls stalls;
+  // These pictures, each where it stands in this frame.
+  struct Picture {
+    Scene::Bounds bounds;
+    const StandingPicture* standing = nullptr;
+  };
+  std::vector<Picture> pictures;
 };
+// What is seen in the cell whose top-left pixel is (x0, y0).
+CellCone cone_of_cell(const FrameContext& context, int x0, int y0);
 // Throws std::invalid_argument where the job's numbers make no sense (sizes, effort, lights not
 // finite).
 FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job);

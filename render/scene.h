@@ -31,7 +31,6 @@ inline constexpr unsigned mask_virtual = 1;       // virtual objects
 inline constexpr unsigned mask_stand_in = 2;      // stand-ins, seen by camera and reflection rays
 inline constexpr unsigned mask_real_blocker = 4;  // stand-ins that block real light
 inline constexpr unsigned mask_occluder = 8;
-inline constexpr unsigned mask_picture = 16;  // Scene::shows_apart()
 // In the mask of a shadow ray: clear bodies block it.
 inline constexpr unsigned ray_glass_blocks = 1U << 31;
 

@@ -132,7 +132,7 @@ void Scene::Compiled::find_pictures(const SceneDescription& description) {
       }
     }
     const bool one = mesh->materials.size() == 1 && by.size() == 1;
-    shows_apart.push_back(one && shaders[by[0]]->only_shows(description.materials[by[0]]));
+    shows_apart.push_back(one && shaders[by[0]]->only_shows(description.materials[by[0]], *mesh));
   }
   for (const Instance& instance : description.instances) {
     if (!pictures_of_mesh[instance.mesh].empty() && !instance.moves) {
@@ -148,9 +148,7 @@ void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
   const bool all_placed = instance == Part::none;
   const Instance still;
   const Instance& placing = all_placed ? still : description.instances[instance];
-  const bool shows_apart = !all_placed && compiled->shows_apart[placing.mesh] != 0;
-  rtcSetGeometryMask(
-      geometry, all_placed ? ~mask_picture : mask_of(placing) | (shows_apart ? mask_picture : 0U));
+  rtcSetGeometryMask(geometry, all_placed ? ~0U : mask_of(placing));
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR,
                           placing.set_from_object.data());
   rtcCommitGeometry(geometry);

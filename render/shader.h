@@ -102,29 +102,53 @@ class RaySink {
   virtual void push(const ShadePoint& from, const NewRay& ray) = 0;
 };
 
-// Rays towards lights, side by side.
-struct LightRays {
+// Rays that look for pictures, side by side.
+struct SightRays {
   std::size_t count = 0;
   const float *ox = nullptr, *oy = nullptr, *oz = nullptr;
   const float *dx = nullptr, *dy = nullptr, *dz = nullptr;  // unit
-  const float* far_m = nullptr;                             // where the light is
+  const float* far_m = nullptr;  // where they end; of what is none, 0 or less
+};
+// Those that look for lights: they end there.
+struct LightRays {
+  SightRays rays;
   // How wide each begins, in metres, and by how much it widens a metre.
   const float *width_m = nullptr, *cone_rad = nullptr;
   float *red = nullptr, *green = nullptr, *blue = nullptr;  // what passes, so far
 };
+// Where a ray meets a picture, and what it sees of it.
+struct Sight {
+  std::uint32_t ray = 0;
+  float distance_m = 0;
+  Vec3f position, normal;  // unit, on the side that the ray comes from
+  float u = 0, v = 0, uv_per_metre = 0;
+  float footprint_m = 0;                 // how wide it looks, from who asks
+  Vec3f radiance{}, passed = {1, 1, 1};  // of what is behind
+};
+
+class StandingPicture;
 
 // What a shader has found out beforehand about an instance and the pictures on it: what it may ask
 // at every point without finding it again. Immutable, and refers to nothing but pictures.
 class Prepared {
  public:
   virtual ~Prepared() = default;
-  // Dims rays to light by what the instance lets pass of each: what Shader::transmittance() says of
-  // them, without any tree. False if it has no such way, and nothing was done.
-  virtual bool dim(const LightRays& rays) const {
-    static_cast<void>(rays);
-    return false;
-  }
+  // Of what only shows (Shader::only_shows()); else null.
+  virtual const StandingPicture* picture() const { return nullptr; }
 };
+
+// A picture that only shows, where it stands: rays look at it without any tree.
+class StandingPicture : public Prepared {
+ public:
+  const StandingPicture* picture() const final { return this; }
+  // Dims rays by what the picture lets pass of each, as Shader::transmittance() says.
+  virtual void dim(const LightRays& rays) const = 0;
+  // Adds where rays meet it before they end, in their order.
+  virtual void meet(const SightRays& rays, std::vector<Sight>& sights) const = 0;
+  // What such sights show, as Shader::layer() says.
+  virtual void see(std::span<Sight> sights) const = 0;
+};
+
 struct PreparedSurface {
   std::uint32_t instance = 0, material = 0;
   std::shared_ptr<const Prepared> prepared;
@@ -191,10 +215,11 @@ class Shader {
     static_cast<void>(material);
     return {};
   }
-  // Whether, with pictures, it does nothing but what layer() tells, without any albedo, and looks
-  // at shadow rays as wide as transmittance() is told.
-  virtual bool only_shows(const Material& material) const {
-    static_cast<void>(material);
+  // Whether, with pictures, it does nothing on a mesh but what layer() tells, without any albedo,
+  // and looks at shadow rays as wide as transmittance() is told. Then prepare() gives a
+  // StandingPicture.
+  virtual bool only_shows(const Material& material, const Mesh& mesh) const {
+    static_cast<void>(material), static_cast<void>(mesh);
     return false;
   }
   // Called when a scene is made, for every instance that shows live pictures by the material,

@@ -280,6 +280,7 @@ TEST(KeptPictures, DimLightAsTheirShaderDoes) {
   for (const bool filmed : {false, true}) {
     for (const float translucency : {0.0F, 0.6F}) {
       render::SceneDescription scene = scene_of({});
+      scene.instances.resize(1);
       const BillboardSettings settings{.translucency = translucency};
       scene.materials[0] = filmed ? make_billboard_material("person", settings, camera)
                                   : make_billboard_material("person", settings);
@@ -301,13 +302,19 @@ TEST(KeptPictures, DimLightAsTheirShaderDoes) {
         far[i] = i % 2 == 0 ? render::ray_far : 1.5F;
         red[i] = green[i] = blue[i] = 1;
       }
-      ASSERT_TRUE(compiled.prepared()[0].prepared->dim(
-          {count, ox.data(), oy.data(), oz.data(), dx.data(), dy.data(), dz.data(), far.data(),
-           wide.data(), cone.data(), red.data(), green.data(), blue.data()}));
+      const render::StandingPicture* picture = compiled.prepared()[0].prepared->picture();
+      ASSERT_NE(picture, nullptr);
+      picture->dim(
+          {{count, ox.data(), oy.data(), oz.data(), dx.data(), dy.data(), dz.data(), far.data()},
+           wide.data(),
+           cone.data(),
+           red.data(),
+           green.data(),
+           blue.data()});
       int dimmed = 0, unlike = 0;
       for (std::size_t i = 0; i < count; ++i) {
-        const Vec3f share = transmittance(compiled, {ox[i], oy[i], oz[i]}, {dx[i], dy[i], dz[i]}, 0,
-                                          far[i], render::mask_picture);
+        const Vec3f share =
+            transmittance(compiled, {ox[i], oy[i], oz[i]}, {dx[i], dy[i], dz[i]}, 0, far[i], ~0U);
         dimmed += share.x < 0.5F;
         unlike += std::abs(share.x - red[i]) > 0.02F || std::abs(share.z - blue[i]) > 0.02F;
       }
