@@ -222,6 +222,7 @@ class CellBaker final : public RaySink {
   void keep_distances();
   bool may_shade(const CellVisibility& visibility, const CellMask& receiving) const;
   void sort_tints(CellVisibility& visibility) const;
+  Scene::Bounds box_around(const CellMask& receiving) const;
   void keep_shadowed(const CellMask& receiving,
                      std::vector<CellTransport::Shadowed>& shadowed) const;
   bool may_be_passed(Vec3f from, Vec3f direction, float far_m) const {

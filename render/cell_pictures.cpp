@@ -91,12 +91,21 @@ void CellBaker::sort_tints(CellVisibility& visibility) const {
   if (past_pictures_) std::ranges::sort(visibility.tints, {}, key_of);
 }
 
+Scene::Bounds CellBaker::box_around(const CellMask& receiving) const {
+  const Receivers& r = receivers_;
+  Scene::Bounds box = no_bounds;
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (!in(receiving, k)) continue;
+    const Vec3f at{r.px[k], r.py[k], r.pz[k]};
+    box = joined(box, {at, at});
+  }
+  return box;
+}
+
 // Whether pictures may come into the way of any light of the table to centres.
 bool CellBaker::may_shade(const CellVisibility& visibility, const CellMask& receiving) const {
   if (!past_pictures_ || shades_ring_ || none(receiving)) return false;
-  CellTransport::Shadowed centres;
-  centres.px = receivers_.px, centres.py = receivers_.py, centres.pz = receivers_.pz;
-  const Scene::Bounds box = centres.box(receiving);
+  const Scene::Bounds box = box_around(receiving);
   for (std::size_t i = 0; i < visibility.lit.size(); ++i) {
     if (none(visibility.lit[i])) continue;
     const DirectionRange to = frame_->soft_lights.range(i);
@@ -113,6 +122,7 @@ void CellBaker::keep_shadowed(const CellMask& receiving,
   const Receivers& r = receivers_;
   CellTransport::Shadowed& all = shadowed.emplace_back();
   all.px = r.px, all.py = r.py, all.pz = r.pz;
+  all.box = box_around(receiving);
   const auto apart = [&](std::size_t a, std::size_t b) {
     const bool same = in(receiving, b) && r.surface[a] == r.surface[b];
     return same ? length(all.position(b) - all.position(a)) : 0.0F;

@@ -280,14 +280,6 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
          (texel(y1, x0) * (1 - u) + texel(y1, x1) * u) * v;
 }
 
-Scene::Bounds CellTransport::Shadowed::box(const CellMask& centres) const {
-  Scene::Bounds box = no_bounds;
-  for (std::size_t k = 0; k < cell_pixels; ++k) {
-    if (in(centres, k)) box = joined(box, {position(k), position(k)});
-  }
-  return box;
-}
-
 void CellTransport::clear() {
   empty = true;
   blocks = {};

@@ -97,8 +97,7 @@ bool PictureLooker::look(const FrameContext& frame,
                                 cell.visibility, seen.lost);
   }
   if (!cell.shadowed.empty() && !cell.lamps.numbers.empty()) {
-    seen.shades_lamps =
-        shade_lamps(cell.shadowed.front(), cell.lamps, cell.receiving, seen.lamps_lost);
+    seen.shades_lamps = shade_lamps(cell.shadowed.front(), cell.lamps, seen.lamps_lost);
   }
   if (!cell.mirrored_shadowed.empty()) {
     const CellTransport::Mirrored& m = cell.mirrored.front();
@@ -301,7 +300,6 @@ bool PictureLooker::shade_centres(const CellTransport::Shadowed& centres,
                                   const LitCentres& lit_centres,
                                   const CellVisibility& visibility,
                                   LostLight& lost) {
-  const Scene::Bounds box = centres.box(lit_centres.receiving);
   const auto& lights = frame_->job->lights.lights;
   const bool soft = frame_->job->effort.soft_lights;
   auto glass = visibility.tints.begin();
@@ -309,9 +307,10 @@ bool PictureLooker::shade_centres(const CellTransport::Shadowed& centres,
   for (std::size_t i = 0; i < std::min(lights.size(), visibility.lit.size()); ++i) {
     const DirectionalLight& light = lights[i];
     const DirectionRange to{light.direction, light.direction};
-    const bool may_meet = std::ranges::any_of(
-        frame_->pictures,
-        [&](const FrameContext::Picture& picture) { return may_be_met(picture.bounds, box, to); });
+    const bool may_meet =
+        std::ranges::any_of(frame_->pictures, [&](const FrameContext::Picture& picture) {
+          return may_be_met(picture.bounds, centres.box, to);
+        });
     if (!may_meet || none(visibility.lit[i])) continue;
     ShadowPlan plan;
     for (std::size_t word = 0; word < 4; ++word) {
@@ -400,9 +399,8 @@ bool PictureLooker::look_for_light(const ShadowPlan& plan,
 // The light of lamps: each centre looks for each of them, as large as it is.
 bool PictureLooker::shade_lamps(const CellTransport::Shadowed& centres,
                                 const CellLamps& lamps,
-                                const CellMask& receiving,
                                 ColourPlanes& lost) {
-  const Scene::Bounds box = centres.box(receiving);
+  const Scene::Bounds& box = centres.box;
   const Vec3f middle = (box.lower + box.upper) * 0.5F, half = (box.upper - box.lower) * 0.5F;
   bool any = false;
   for (std::size_t i = 0; i < lamps.numbers.size(); ++i) {

@@ -71,7 +71,6 @@ class PictureLooker {
                      LostLight& lost);
   bool shade_lamps(const CellTransport::Shadowed& centres,
                    const CellLamps& lamps,
-                   const CellMask& receiving,
                    ColourPlanes& lost);
   bool look_for_light(const ShadowPlan& plan,
                       const CellTransport::Shadowed& centres,

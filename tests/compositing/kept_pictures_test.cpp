@@ -273,54 +273,119 @@ TEST(KeptPictures, LeaveNothingBehind) {
   }
 }
 
-// Rays to light are dimmed without a tree as by the tree's filter.
-TEST(KeptPictures, DimLightAsTheirShaderDoes) {
+// A billboard that leans, alone, of whole pictures or of a camera's.
+render::Scene leaning_billboard(bool filmed, float translucency) {
   const BillboardCamera camera{{"pinhole", 96, 192, {180, 180, 47.5, 95.5}},
                                calibrate::look_at({0.2, -3, 1.1}, {0, 0, 1}, 0)};
+  render::SceneDescription scene = scene_of({});
+  scene.instances.resize(1);
+  const BillboardSettings settings{.gain = {0.9F, 1.1F, 1}, .translucency = translucency};
+  scene.materials[0] = filmed ? make_billboard_material("person", settings, camera)
+                              : make_billboard_material("person", settings);
+  scene.instances[0].set_from_object = {0.9F, -0.3F, 0.1F, 0.2F, 0.4F, 0.8F,
+                                        0,    0.1F,  0,    0.1F, 1.9F, 0.05F};
+  return render::Scene(std::move(scene), {figure(0.1F)});
+}
+
+// From all about it, towards it; every other one may end before it.
+struct RaysAbout {
+  static constexpr std::size_t count = 2003;
+  std::array<std::vector<float>, 7> columns;
+
+  RaysAbout() {
+    std::mt19937 random(9);
+    std::uniform_real_distribution<float> at(-1.5F, 1.5F);
+    for (std::vector<float>& column : columns) column.assign(count, 0);
+    auto& [ox, oy, oz, dx, dy, dz, far] = columns;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec3f to = normalize(Vec3f{0.3F * at(random), 0.3F * at(random), 1 + at(random)} -
+                                 Vec3f{at(random), at(random), 0});
+      ox[i] = at(random), oy[i] = at(random), oz[i] = at(random);
+      dx[i] = to.x, dy[i] = to.y, dz[i] = to.z;
+      far[i] = i % 2 == 0 ? render::ray_far : 1.5F;
+    }
+  }
+  Vec3f origin(std::size_t i) const { return {columns[0][i], columns[1][i], columns[2][i]}; }
+  Vec3f direction(std::size_t i) const { return {columns[3][i], columns[4][i], columns[5][i]}; }
+  float far_m(std::size_t i) const { return columns[6][i]; }
+  render::SightRays sights() const {
+    const auto& [ox, oy, oz, dx, dy, dz, far] = columns;
+    return {count, ox.data(), oy.data(), oz.data(), dx.data(), dy.data(), dz.data(), far.data()};
+  }
+};
+
+// Rays to light are dimmed without a tree as by the tree's filter.
+TEST(KeptPictures, DimLightAsTheirShaderDoes) {
+  const RaysAbout rays;
   for (const bool filmed : {false, true}) {
     for (const float translucency : {0.0F, 0.6F}) {
-      render::SceneDescription scene = scene_of({});
-      scene.instances.resize(1);
-      const BillboardSettings settings{.translucency = translucency};
-      scene.materials[0] = filmed ? make_billboard_material("person", settings, camera)
-                                  : make_billboard_material("person", settings);
-      scene.instances[0].set_from_object = {0.9F, -0.3F, 0.1F, 0.2F, 0.4F, 0.8F,
-                                            0,    0.1F,  0,    0.1F, 1.9F, 0.05F};
-      const render::Scene compiled(std::move(scene), {figure(0.1F)});
-      ASSERT_EQ(compiled.prepared().size(), 1U);
-      std::mt19937 random(9);
-      std::uniform_real_distribution<float> at(-1.5F, 1.5F);
-      constexpr std::size_t count = 2003;
-      std::array<std::vector<float>, 12> columns;
-      for (std::vector<float>& column : columns) column.assign(count, 0);
-      auto& [ox, oy, oz, dx, dy, dz, far, wide, cone, red, green, blue] = columns;
-      for (std::size_t i = 0; i < count; ++i) {
-        const Vec3f to = normalize(Vec3f{0.3F * at(random), 0.3F * at(random), 1 + at(random)} -
-                                   Vec3f{at(random), at(random), 0});
-        ox[i] = at(random), oy[i] = at(random), oz[i] = at(random);
-        dx[i] = to.x, dy[i] = to.y, dz[i] = to.z;
-        far[i] = i % 2 == 0 ? render::ray_far : 1.5F;
-        red[i] = green[i] = blue[i] = 1;
-      }
-      const render::StandingPicture* picture = compiled.prepared()[0].prepared->picture();
+      const render::Scene scene = leaning_billboard(filmed, translucency);
+      ASSERT_EQ(scene.prepared().size(), 1U);
+      const render::StandingPicture* picture = scene.prepared()[0].prepared->picture();
       ASSERT_NE(picture, nullptr);
+      std::vector<float> none(rays.count), red(rays.count, 1), green(red), blue(red);
       picture->dim(
-          {{count, ox.data(), oy.data(), oz.data(), dx.data(), dy.data(), dz.data(), far.data()},
-           wide.data(),
-           cone.data(),
-           red.data(),
-           green.data(),
-           blue.data()});
+          {rays.sights(), none.data(), none.data(), red.data(), green.data(), blue.data()});
       int dimmed = 0, unlike = 0;
-      for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t i = 0; i < rays.count; ++i) {
         const Vec3f share =
-            transmittance(compiled, {ox[i], oy[i], oz[i]}, {dx[i], dy[i], dz[i]}, 0, far[i], ~0U);
+            transmittance(scene, rays.origin(i), rays.direction(i), 0, rays.far_m(i), ~0U);
         dimmed += share.x < 0.5F;
         unlike += std::abs(share.x - red[i]) > 0.02F || std::abs(share.z - blue[i]) > 0.02F;
       }
       EXPECT_GT(dimmed, 20);
       EXPECT_LT(unlike, 3) << filmed << translucency;  // at its very rim
     }
+  }
+}
+
+// And rays that look at them see what rays through the tree do.
+TEST(KeptPictures, ShowWhatTheirShaderDoes) {
+  const RaysAbout rays;
+  constexpr float footprint_m = 0.02F;
+  for (const bool filmed : {false, true}) {
+    const render::Scene scene = leaning_billboard(filmed, 0);
+    const render::SceneDescription& set = scene.description();
+    const render::StandingPicture* picture = scene.prepared()[0].prepared->picture();
+    ASSERT_NE(picture, nullptr);
+    std::vector<render::Sight> sights;
+    picture->meet(rays.sights(), sights);
+    ASSERT_TRUE(std::ranges::is_sorted(sights, {}, &render::Sight::ray));
+    for (render::Sight& sight : sights) sight.footprint_m = footprint_m;
+    picture->see(sights);
+    auto sight = sights.begin();
+    int seen = 0, unlike = 0;
+    for (std::size_t i = 0; i < rays.count; ++i) {
+      render::Layer layer{{}, {1, 1, 1}};
+      float distance_m = 0;
+      const auto met =
+          closest_hit(scene, rays.origin(i), rays.direction(i), 0, ~0U, render::RayKind::camera);
+      if (met && met->distance < rays.far_m(i)) {
+        render::HitPoint hit;
+        scene.read_hit(met->geom_id, met->prim_id, met->inst_id, met->u, met->v, rays.direction(i),
+                       hit);
+        layer = *scene.shader_of(hit.material)
+                     .layer({&set, &scene, scene.pictures(), scene.prepared()},
+                            set.materials[hit.material], hit, rays.direction(i),
+                            render::RayKind::camera, footprint_m);
+        distance_m = met->distance;
+      }
+      render::Sight own;
+      if (sight != sights.end() && sight->ray == i) own = *sight++;
+      const bool open = layer.passed == Vec3f{1, 1, 1};
+      seen += !open;
+      unlike += length(own.radiance - layer.radiance) > 0.02F ||
+                length(own.passed - layer.passed) > 0.02F ||
+                (!open && std::abs(own.distance_m - distance_m) > 1e-4F);
+      if (own.distance_m > 0) {
+        EXPECT_LT(dot(own.normal, rays.direction(i)), 0);
+        EXPECT_LT(length(rays.origin(i) + rays.direction(i) * own.distance_m - own.position),
+                  1e-4F);
+      }
+    }
+    EXPECT_EQ(sight, sights.end());
+    EXPECT_GT(seen, 20);
+    EXPECT_LT(unlike, 3) << filmed;  // at its very rim
   }
 }
 
