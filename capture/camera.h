@@ -83,7 +83,8 @@ class Camera {
   // `lost`, and the previous image. Never throws for damage inside a stream once it is open.
   virtual std::optional<Frame> next() = 0;
   // Passes over that frame, for which a file's picture need not be made; false at the end. A lost
-  // frame later then comes with the image of the last one that was not passed over.
+  // frame later may then come with an image of before it, or none, and what is wrong with a picture
+  // that was not made counts nowhere.
   virtual bool skip() { return next().has_value(); }
   // The sound up to and including the last frame's time that was not taken yet; after the end, up
   // to where the next frame would have been. What is not taken within 10 s is dropped.

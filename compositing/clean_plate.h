@@ -40,19 +40,20 @@ struct CleanPlate {
 
 // The mean of frames of the empty screen, of one size, at least one. Noise is measured if there are
 // two or more. Values that are not finite, or below 0, count as 0. The screen's colour is the most
-// saturated large one; it need not fill the picture. Throws std::invalid_argument if there are no
-// frames, sizes differ, or a frame is not (height, width, 3).
+// saturated large one of the mean; it need not fill the picture. Throws std::invalid_argument if
+// there are no frames, sizes differ, or a frame is not (height, width, 3).
 CleanPlate average_plate(std::span<const capture::Image> frames);
 
 // The same from footage in which the person never leaves: for each pixel the upper quartile of
 // those frames that show the screen there, and where none does, what surrounds it. `known` tells
 // the share that was seen. `colour` as the footage's most saturated large colour if not given.
-// Frames as above.
+// Frames as above; of more than 96, some that are spread over all.
 CleanPlate plate_from_footage(std::span<const capture::Image> frames);
 CleanPlate plate_from_footage(std::span<const capture::Image> frames, ScreenColour colour);
 
 // The same of any still background, from footage in which the person moves: of each pixel the
 // median over the frames. `known` tells the share of pixels in which most frames are near it.
+// Frames as above.
 CleanPlate background_from_footage(std::span<const capture::Image> frames);
 
 // Takes the noise out of a screen's light, which is smooth, in place: mean over a box of 5x5

@@ -22,7 +22,7 @@ using capture::Image;
 
 constexpr const char* no_frames = "a clean plate is made of at least one frame";
 constexpr std::size_t noise_step = 7;  // every so many values tell noise
-constexpr float clipped = 0.98F;       // has none
+constexpr double clipped = 0.98;       // has none
 // A pixel of which so few frames show the screen is not it: those may be something of its colour.
 constexpr std::size_t least_seen = 10;  // of so many frames, one
 // Mixed with hair or shadowed the screen is darker: the brighter half's middle.
@@ -54,16 +54,15 @@ void check_frame(const Image& frame, const Picture* first) {
 }  // namespace
 
 void PlateShots::add(const Image& frame) {
-  check_frame(frame, count_ > 0 ? &sum_ : nullptr);
-  if (count_ == 0) sum_ = capture::make_image(frame.height, frame.width);
-  std::ranges::transform(frame.pixels, sum_.pixels, sum_.pixels.begin(),
-                         [](float value, float sum) { return sum + clean(value); });
+  check_frame(frame, count_ > 0 ? &last_ : nullptr);
+  sum_.resize(frame.pixels.size());
+  for (std::size_t i = 0; i < sum_.size(); ++i) sum_[i] += clean(frame.pixels[i]);
   const std::size_t measured = (frame.pixels.size() + noise_step - 1) / noise_step;
   steps_.resize(measured), steps_count_.resize(measured);
   for (std::size_t k = 0; k < measured && count_ > 0; ++k) {
-    const float a = clean(last_.pixels[k * noise_step]), b = clean(frame.pixels[k * noise_step]);
+    const double a = clean(last_.pixels[k * noise_step]), b = clean(frame.pixels[k * noise_step]);
     if (a >= clipped || b >= clipped) continue;
-    steps_[k] += 0.5F * (a - b) * (a - b);
+    steps_[k] += 0.5 * (a - b) * (a - b);
     ++steps_count_[k];
   }
   last_ = frame;
@@ -73,8 +72,10 @@ void PlateShots::add(const Image& frame) {
 CleanPlate PlateShots::average() const {
   if (count_ == 0) throw std::invalid_argument(no_frames);
   CleanPlate plate;
-  plate.light = sum_;
-  for (float& value : plate.light.pixels) value /= static_cast<float>(count_);
+  plate.light = capture::make_image(last_.height, last_.width);
+  std::ranges::transform(sum_, plate.light.pixels.begin(), [&](double sum) {
+    return static_cast<float>(sum / static_cast<double>(count_));
+  });
   plate.colour = most_saturated(spread_pixels(plate.light)).value_or(mean_colour(plate.light));
   if (count_ < 2) return plate;
   // Variance of one frame against its neighbour, as a line over light. That is blurred: its own
@@ -149,7 +150,7 @@ CleanPlate PlateFootage::screen(ScreenColour colour, const ScreenLight& key) con
   const auto columns = static_cast<std::size_t>(light.width);
   std::vector<int> known(static_cast<std::size_t>(light.height));
   const auto rows = [&](const tbb::blocked_range<int>& range) {
-    // Of a row in each frame: its light, and the screen's excess, 0 where it shows none.
+    // Of a row in each frame: its light, and the screen's excess, below 0 where it shows none.
     std::vector<float> lights(frames_.size() * columns * 3), excess(frames_.size() * columns);
     std::vector<std::size_t> showing;
     for (int y = range.begin(); y < range.end(); ++y) {
@@ -159,14 +160,14 @@ CleanPlate PlateFootage::screen(ScreenColour colour, const ScreenLight& key) con
         for (std::size_t x = 0; x < columns; ++x) {
           const ScreenLight seen =
               screen_light({row[3 * x], row[3 * x + 1], row[3 * x + 2]}, colour);
-          excess[f * columns + x] = is_screen(seen, key) ? seen.excess : 0;
+          excess[f * columns + x] = is_screen(seen, key) ? seen.excess : -1;
         }
       }
       for (std::size_t x = 0; x < columns; ++x) {
         const auto excess_in = [&](std::size_t frame) { return excess[frame * columns + x]; };
         showing.clear();
         for (std::size_t f = 0; f < frames_.size(); ++f) {
-          if (excess_in(f) > 0) showing.push_back(f);
+          if (excess_in(f) >= 0) showing.push_back(f);
         }
         if (showing.empty() || showing.size() * least_seen < frames_.size()) continue;
         const double upper = bright_quantile * static_cast<double>(showing.size());

@@ -24,11 +24,12 @@ class PlateShots {
 
  private:
   std::size_t count_ = 0;
-  capture::Image sum_, last_;
+  capture::Image last_;
+  std::vector<double> sum_;
   // Of each value that noise is measured at: half the squares of the steps from frame to frame, and
   // how many there were, for none counts that is clipped.
-  std::vector<float> steps_;
-  std::vector<std::uint16_t> steps_count_;
+  std::vector<double> steps_;
+  std::vector<std::uint32_t> steps_count_;
 };
 
 // Frames in which a person never leaves. Keeps at most 96 of them, spread evenly over all, as

@@ -8,7 +8,6 @@
 
 #include "render/cell_baker.h"
 #include "render/embree_context.h"
-#include "render/kept_transport.h"
 #include "render/straight_on.h"
 
 namespace render {

@@ -21,9 +21,6 @@ struct TraceContext {
   float* transmittance_r = nullptr;
   float* transmittance_g = nullptr;
   float* transmittance_b = nullptr;
-  // How wide they begin and by what angle they widen, per ray id; null: they are lines.
-  const float* shadow_width_m = nullptr;
-  const float* shadow_cone_rad = nullptr;
 
   TraceContext(const Scene& traced, RayKind ray_kind, bool coherent)
       : scene(&traced), kind(ray_kind) {

@@ -27,6 +27,9 @@ std::array<float, 2> distances_to(const Scene::Bounds& box, Vec3f from) {
 
 void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame) {
   const Scene& scene = *frame.inputs.scene;
+  if (frame.pictures.empty()) {
+    for (Cell& cell : cells_) cell.looks_ms = 0;
+  }
   const bool same_size = frame.columns == columns_ && frame.rows == rows_;
   auto moved = Scene::moved(places_, scene.places());
   const bool same_transport = keys.transport == keys_.transport;
@@ -163,23 +166,27 @@ std::vector<int> KeptTransport::stages() const {
   return stages;
 }
 
-std::vector<std::uint64_t> KeptTransport::looks() const {
-  std::vector<std::uint64_t> looks;
+std::vector<float> KeptTransport::looks_ms() const {
+  const auto threads = static_cast<float>(tbb::this_task_arena::max_concurrency());
+  std::vector<float> looks;
   looks.reserve(cells_.size());
-  for (const Cell& cell : cells_) looks.push_back(cell.stage == none ? 0 : cell.looks);
+  for (const Cell& cell : cells_) {
+    looks.push_back(cell.stage == none ? 0.0F : cell.looks_ms / threads);
+  }
   return looks;
 }
 
-CellTransport* KeptTransport::place(int column, int row) {
+CellTransport* KeptTransport::place(int column, int row, int stage) {
   Cell& cell = cells_[index(column, row)];
   // What was forgotten keeps its room for what comes, unless others may need it: a cell begins
   // again coarse, and takes a hundredth of what it took in the end.
-  if (cell.stage == none && scarce_) {
+  const bool coarser = cell.stage > stage;
+  if ((cell.stage == none && scarce_) || coarser) {
     bytes_ -= cell.bytes;
     cell = {};
   }
   // What is kept already stays as it is, rather than make room for the same in more detail.
-  if (bytes_ >= room() && (!cell.transport || cell.stage != none)) {
+  if (bytes_ >= room() && !coarser && (!cell.transport || cell.stage != none)) {
     full_ = true;
     return nullptr;
   }

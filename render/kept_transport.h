@@ -56,8 +56,9 @@ class KeptTransport {
   // Of a cell that is not kept, but is known to be one that has to be found with live pictures:
   // what that depends on. Else null.
   const CellReach* reach_with_pictures(int column, int row, int stage) const;
-  // Where to put it, or null if the memory is used up; keep() makes it count.
-  CellTransport* place(int column, int row);
+  // Where to put it, or null if the memory is used up, unless it is coarser than what is kept;
+  // keep() makes it count.
+  CellTransport* place(int column, int row, int stage);
   void keep(int column, int row, int stage);
 
   // A kept cell as it was lit last: valid where find() finds it, `light` is the frame's, and so are
@@ -74,10 +75,12 @@ class KeptTransport {
   static constexpr int none = -1;
   std::vector<int> stages() const;
 
-  // Rays that looking at live pictures took in a cell: told by who lights it, in each frame.
-  void looked(int column, int row, std::uint64_t rays) { cells_[index(column, row)].looks = rays; }
-  // Of all cells, row by row, where they were looked at last; 0 of those that are not kept.
-  std::vector<std::uint64_t> looks() const;
+  // What looking at live pictures took in a cell, on its thread: told by who lights it, in each
+  // frame.
+  void looked(int column, int row, float ms) { cells_[index(column, row)].looks_ms = ms; }
+  // Of all cells, row by row, what that was of the last frame's time, which all threads share; 0
+  // of cells that are not kept.
+  std::vector<float> looks_ms() const;
 
   CausticFollower& caustics() { return caustics_; }
   // Of each frame in turn.
@@ -112,7 +115,7 @@ class KeptTransport {
     std::unique_ptr<LitCell> lit;  // of that transport
     std::size_t bytes = 0;         // counted in bytes_
     int stage = none;
-    std::uint64_t looks = 0;    // rays to live pictures, in the last frame
+    float looks_ms = 0;         // at live pictures, in the last frame
     int needs_pictures = none;  // the stage at which it was last found with them, for it had to be
   };
   std::size_t index(int column, int row) const {

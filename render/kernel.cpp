@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -204,13 +205,14 @@ bool is_broken_plate(const TileView& tile, int x0, int y0) {
 // What the frame's live pictures do to a cell, to `pictures`. Returns whether they do anything.
 bool TileWorkspace::Impl::look(
     const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0) {
-  RenderStatistics taken;
-  const bool sees = looker.look(frame, cell, x0, y0, pictures, taken);
-  if (frame.inputs.kept) {
-    frame.inputs.kept->looked(x0 / cell_size, y0 / cell_size,
-                              taken.primary_rays + taken.shadow_rays + taken.secondary_rays);
+  using Clock = std::chrono::steady_clock;
+  const bool tells = frame.inputs.kept && !frame.pictures.empty();
+  const Clock::time_point start = tells ? Clock::now() : Clock::time_point{};
+  const bool sees = looker.look(frame, cell, x0, y0, pictures, *tile.statistics);
+  if (tells) {
+    const std::chrono::duration<float, std::milli> taken = Clock::now() - start;
+    frame.inputs.kept->looked(x0 / cell_size, y0 / cell_size, taken.count());
   }
-  *tile.statistics += taken;
   return sees;
 }
 
@@ -274,7 +276,7 @@ void TileWorkspace::Impl::render_cell(const FrameContext& frame,
     if (counts) write_counts(transport, tile, x0, y0);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
     if (memory) memory->found_with(baker.scratch_bytes());
-    if (CellTransport* room = memory ? memory->place(column, row) : nullptr) {
+    if (CellTransport* room = memory ? memory->place(column, row, stage) : nullptr) {
       *room = transport;
       memory->keep(column, row, stage);
     }
@@ -290,7 +292,7 @@ bool find_cell(const FrameContext& context,
                RenderStatistics& statistics) {
   prepare_thread();
   KeptTransport& memory = *context.inputs.kept;
-  CellTransport* room = memory.place(column, row);
+  CellTransport* room = memory.place(column, row, stage);
   if (!room) return false;
   TileWorkspace::Impl& impl = workspace.impl();
   impl.baker.bake(context, stage, column * cell_size, row * cell_size, impl.transport, statistics);

@@ -169,8 +169,9 @@ void PictureLooker::see_straight(const CellTransport& cell, CellPictures& seen) 
     const bool inside = static_cast<int>(k % cell_size) < cell.blocks.columns &&
                         static_cast<int>(k / cell_size) < cell.blocks.rows;
     const Vec3f direction = inside ? direction_at(k) : Vec3f{};
-    const bool looks = direction != Vec3f{} && !in(cell.looks_apart, k);
-    rays_.add(frame_->camera, frame_->turn.to_set(direction), looks ? cell.far_m[k] : -1.0F, k);
+    const float far_m = direction != Vec3f{} && !in(cell.looks_apart, k) ? cell.far_m[k] : 0.0F;
+    statistics_->primary_rays += far_m > 0;
+    rays_.add(frame_->camera, frame_->turn.to_set(direction), far_m, k);
   }
   see([&](const Sight& sight) {
     const int x = x0_ + static_cast<int>(sight.ray % cell_size),
@@ -180,7 +181,6 @@ void PictureLooker::see_straight(const CellTransport& cell, CellPictures& seen) 
     const auto across = [&](Vec3f side) { return length(side - along * dot(along, side)); };
     return sight.distance_m * std::sqrt(across(right) * across(down));
   });
-  statistics_->primary_rays += sights_.size();
   rays_.count = 0;
   seen.has_foreground = !sights_.empty();
   if (!seen.has_foreground) return;
@@ -205,7 +205,7 @@ void PictureLooker::see_along(const CellTransport& cell, CellPictures& seen) {
                      sight.distance_m);
       return std::max(point_.footprint_m, point_.blur_m);
     });
-    statistics_->secondary_rays += sights_.size();
+    statistics_->secondary_rays += static_cast<std::uint64_t>(rays_.count);
     if (!sights_.empty() && seen.along.empty()) seen.along.assign(all.size(), {{}, {1, 1, 1}});
     put_together([&](std::size_t ray, const CellPictures::Seen& together) {
       seen.along[rays_.asker[ray]] = together;

@@ -216,7 +216,6 @@ Facet facet_of(const Mesh& mesh,
 [[gnu::always_inline]] inline Vec3f Scene::Impl::passes(const RTCFilterFunctionNArguments* args,
                                                         unsigned lane,
                                                         RayKind kind,
-                                                        float width_m,
                                                         float cone_rad) const {
   const unsigned n = args->N;
   const Vec3f incoming = ray_of(args, lane).direction;
@@ -226,10 +225,7 @@ Facet facet_of(const Mesh& mesh,
            RTCHitN_v(args->hit, n, lane), incoming, hit);
   const ShadeContext context{&description, nullptr, pictures, prepared};
   const float slant = std::max(std::abs(dot(incoming, hit.geometric_normal)), 1e-6F);
-  const float across_m = width_m + cone_rad * RTCRayN_tfar(args->ray, n, lane);
-  // Of shadow rays as large as what their cone cuts out, which is longer than wide.
-  const float footprint_m =
-      kind == RayKind::shadow ? across_m / std::sqrt(slant) : across_m / slant;
+  const float footprint_m = cone_rad * RTCRayN_tfar(args->ray, n, lane) / slant;
   return compiled->shaders[hit.material]->transmittance(
       context, description.materials[hit.material], hit, incoming, kind, footprint_m);
 }
@@ -289,7 +285,7 @@ void Scene::Impl::filter_closest(const RTCFilterFunctionNArguments* args) {
   const bool past_picture = impl.is_past_picture(args);
   for (unsigned i = 0; i < args->N; ++i) {
     if (!args->valid[i]) continue;
-    if (past_picture || impl.passes(args, i, context.kind, 0, context.cone_rad) == Vec3f{1, 1, 1} ||
+    if (past_picture || impl.passes(args, i, context.kind, context.cone_rad) == Vec3f{1, 1, 1} ||
         impl.stands_back(args, i)) {
       args->valid[i] = 0;
     }
@@ -317,10 +313,7 @@ void Scene::Impl::filter_any(const RTCFilterFunctionNArguments* args) {
     }
     const auto& anywhere = impl.compiled->shadow[material];
     const unsigned id = RTCRayN_id(args->ray, args->N, i);
-    const float width_m = context.shadow_width_m ? context.shadow_width_m[id] : 0;
-    const float cone_rad = context.shadow_width_m ? context.shadow_cone_rad[id] : 0;
-    const Vec3f share =
-        anywhere ? *anywhere : impl.passes(args, i, RayKind::shadow, width_m, cone_rad);
+    const Vec3f share = anywhere ? *anywhere : impl.passes(args, i, RayKind::shadow, 0);
     if (share == Vec3f{}) continue;
     if (context.transmittance_r) {
       context.transmittance_r[id] *= share.x;

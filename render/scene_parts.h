@@ -254,7 +254,6 @@ struct Scene::Impl {
   Vec3f passes(const RTCFilterFunctionNArguments* args,
                unsigned lane,
                RayKind kind,
-               float width_m,
                float cone_rad) const;
   bool is_past_picture(const RTCFilterFunctionNArguments* args) const;
   bool stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const;

@@ -215,9 +215,8 @@ class Shader {
     static_cast<void>(material);
     return {};
   }
-  // Whether, with pictures, it does nothing on a mesh but what layer() tells, without any albedo,
-  // and looks at shadow rays as wide as transmittance() is told. Then prepare() gives a
-  // StandingPicture.
+  // Whether, with pictures, it does nothing on a mesh but what layer() tells, without any albedo.
+  // Then prepare() gives a StandingPicture.
   virtual bool only_shows(const Material& material, const Mesh& mesh) const {
     static_cast<void>(material), static_cast<void>(mesh);
     return false;

@@ -15,9 +15,12 @@ using render::finished_stage, render::one_ray_stage;
 constexpr double share_of_frame = 0.7;  // of its time, for rendering
 constexpr double share_at_rest = 0.88;  // ... where nothing is found anew, and cells can wait
 // Frames that took more than all of their time in the mean of so many make cells coarser, until
-// they should take less. In between nothing changes.
-constexpr double share_when_late = 1, share_when_shed = 0.85;
-constexpr int frames_to_tell = 8;
+// they should take less; not where looking takes less than a part of their time, nor any more once
+// that twice in a row brought hardly a part of what was foreseen, until looking takes otherwise.
+constexpr double share_when_late = 1, share_when_shed = 0.85, looks_that_matter = 0.05;
+constexpr double part_that_helps = 0.25, looks_that_differ = 0.25;
+constexpr int frames_to_tell = 8, most_in_vain = 2;
+constexpr double small_finding = 0.3;   // of a frame's time: what else it takes is told from it
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
 // What a cell takes at each stage, of the coarsest one's, as long as nothing better is known: as in
@@ -54,12 +57,16 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
       live_(live),
       cost_(expected_cost) {}
 
-// What a live frame may spend on cells.
+// What a live frame may spend on cells that are lost, or else go on: these can wait, where finer
+// ones would take longer to look at.
 double Sharpening::rest_ms(bool at_rest) const {
   if (std::ranges::none_of(timed_, std::identity())) return 0;
-  if (looks_ && at_rest && relight_ms_ > share_at_rest * frame_ms_) return 0;
   const double share = at_rest ? share_at_rest : share_of_frame;
   return std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
+}
+double Sharpening::time_to_go_on(bool at_rest) const {
+  if (!looks_matter()) return rest_ms(at_rest);
+  return std::clamp(share_at_rest * frame_ms_ - relight_ms_, 0.0, rest_ms(at_rest));
 }
 
 // What is found anew is as fine at once as there is time for.
@@ -107,32 +114,38 @@ void Sharpening::go_on(double left) {
   }
 }
 
+bool Sharpening::looks_matter() const { return looks_ms_ > looks_that_matter * frame_ms_; }
+
 // Cells that are to be coarser, for looking at persons in them makes frames late: those in which
 // that takes most.
-std::vector<std::size_t> Sharpening::too_costly(std::span<const std::uint64_t> looks) {
-  if (!live_ || frames_shown_ < frames_to_tell || relight_ms_ <= share_when_late * frame_ms_) {
+std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms) {
+  if (!live_ || !looks_matter() || shed_.frames < frames_to_tell ||
+      relight_ms_ <= share_when_late * frame_ms_) {
     return {};
   }
+  const bool same_looks = std::abs(looks_ms_ - shed_.looks_ms) < looks_that_differ * shed_.looks_ms;
+  if (shed_.in_vain >= most_in_vain && same_looks) return {};
   std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < looks.size(); ++i) {
-    if (looks[i] > 0 && plan_.stages[i] > 0) order.push_back(i);
+  for (std::size_t i = 0; i < looks_ms.size(); ++i) {
+    if (looks_ms[i] > 0 && plan_.stages[i] > 0) order.push_back(i);
   }
-  std::ranges::stable_sort(order, std::greater(), [&](std::size_t i) { return looks[i]; });
-  const auto all = static_cast<double>(std::reduce(looks.begin(), looks.end()));
-  double left = all * (1 - share_when_shed * frame_ms_ / relight_ms_);
-  double ms = share_of_frame * frame_ms_;  // to find them in
+  std::ranges::stable_sort(order, std::greater(), [&](std::size_t i) { return looks_ms[i]; });
+  const double wanted_ms = relight_ms_ - share_when_shed * frame_ms_;
+  double finding_ms = 0;
   std::size_t count = 0;
-  for (; count < order.size() && left > 0 && ms > 0; ++count) {
-    left -= static_cast<double>(looks[order[count]]);
-    ms -= cost_[coarser(plan_.stages[order[count]])];
+  shed_.before_ms = looks_ms_;
+  for (; count < order.size() && shed_.foreseen_ms < wanted_ms &&
+         finding_ms < share_of_frame * frame_ms_;
+       ++count) {
+    shed_.foreseen_ms += looks_ms[order[count]];
+    finding_ms += cost_[coarser(plan_.stages[order[count]])];
   }
   order.resize(count);
   return order;
 }
 
-const SharpeningPlan& Sharpening::next(std::span<const int> kept,
-                                       std::span<const std::uint64_t> looks) {
-  looks_ = std::ranges::any_of(looks, [](std::uint64_t rays) { return rays > 0; });
+const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const float> looks_ms) {
+  looks_ms_ = std::accumulate(looks_ms.begin(), looks_ms.end(), 0.0);
   constexpr int none = render::KeptTransport::none;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
@@ -142,7 +155,7 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept,
   lost_[first] = lost;
   double left = 0;
   if (live_) {
-    left = rest_ms(lost == 0);
+    left = time_to_go_on(lost == 0);
   } else {
     double rest = 0;
     for (std::size_t stage = one_ray_stage; stage < finished_stage;) {
@@ -156,14 +169,17 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept,
   std::ranges::transform(kept, plan_.stages.begin(), [](int stage) {
     return static_cast<std::uint8_t>(stage == none ? finished_stage : stage);
   });
-  const std::vector<std::size_t> shed = too_costly(looks);
-  if (!shed.empty()) frames_shown_ = 0;
-  for (const std::size_t i : shed) {
-    plan_.stages[i] = coarser(plan_.stages[i]);
-    ++lost_[plan_.stages[i]];
+  if (shed_.foreseen_ms > 0 && shed_.frames > 0) {
+    const bool helped = shed_.before_ms - looks_ms_ > part_that_helps * shed_.foreseen_ms;
+    shed_.in_vain = helped ? 0 : shed_.in_vain + 1;
+    shed_.looks_ms = looks_ms_;
+    shed_.foreseen_ms = 0;
   }
+  const std::vector<std::size_t> shed = too_costly(looks_ms);
+  shed_.now = !shed.empty();
+  for (const std::size_t i : shed) plan_.stages[i] = coarser(plan_.stages[i]);
   if (!full_) stopped_ = false;
-  if (!stopped_ && shed.empty()) go_on(left);
+  if (!stopped_ && !shed_.now) go_on(left);
   for (std::size_t i = 0; i < kept.size(); ++i) {
     if (kept[i] == none) plan_.stages[i] = static_cast<std::uint8_t>(first);
   }
@@ -195,12 +211,23 @@ void Sharpening::took(double render_ms, bool full) {
   full_ = full;
   stopped_ = stopped_ || (full && went_on_);
   if (!live_) return;
-  if (std::ranges::all_of(lost_, [](std::size_t count) { return count == 0; })) {
-    ++frames_shown_;
-    relight_ms_ = relight_ms_ > 0 ? relight_ms_ + (render_ms - relight_ms_) * followed : render_ms;
-  } else {
-    learn(lost_, std::max(render_ms - relight_ms_, 0.05 * render_ms));
+  if (shed_.now) {
+    // What that took, and what it brought, cannot be told apart.
+    shed_.frames = 0;
+    return;
   }
+  const double finding_ms = std::transform_reduce(
+      lost_.begin(), lost_.end(), cost_.begin(), 0.0, std::plus(),
+      [](std::size_t count, double cost) { return static_cast<double>(count) * cost; });
+  const bool known = std::ranges::any_of(timed_, std::identity());
+  // Where finding takes a small part, it is the rest that has changed.
+  if (finding_ms > 0 && (!known || finding_ms > small_finding * render_ms)) {
+    learn(lost_, std::max(render_ms - relight_ms_, 0.05 * render_ms));
+    return;
+  }
+  const double ms = render_ms - finding_ms;
+  ++shed_.frames;
+  relight_ms_ = relight_ms_ > 0 ? relight_ms_ + (ms - relight_ms_) * followed : ms;
 }
 
 double Sharpening::share() const {
@@ -247,7 +274,7 @@ void render_sharpening(Sharpening& sharpening,
   using Milliseconds = std::chrono::duration<double, std::milli>;
   const Clock::time_point start = Clock::now();
   const auto frame = render::prepare_frame(inputs, job, plate);
-  const SharpeningPlan& plan = sharpening.next(inputs.kept->stages(), inputs.kept->looks());
+  const SharpeningPlan& plan = sharpening.next(inputs.kept->stages(), inputs.kept->looks_ms());
   job.stages = plan.stages;
   render::RenderStatistics ahead;
   const Clock::time_point begun = Clock::now();

@@ -33,12 +33,12 @@ class Sharpening {
   Sharpening(capture::Rational rate, bool live);
 
   // Of the next frame, from what is still kept of the frames before
-  // (render::KeptTransport::stages()), and what looking at persons took in each of these cells
-  // (looks(); empty = nothing anywhere). It stands until the next call.
+  // (render::KeptTransport::stages()), and what looking at persons took of the last frame's time in
+  // each of these cells (looks_ms(); empty = nothing anywhere). It stands until the next call.
   // Looking takes the longer the finer cells are, in every frame: where that leaves a live show no
   // time, cells stay as they are; where it makes frames late, those that take most of it are found
-  // anew, coarser.
-  const SharpeningPlan& next(std::span<const int> kept, std::span<const std::uint64_t> looks = {});
+  // anew, coarser, as long as that helps.
+  const SharpeningPlan& next(std::span<const int> kept, std::span<const float> looks_ms = {});
   // The frame's stages with what was found ahead, and what that took.
   void found_ahead(std::span<const std::uint8_t> stages, double ms);
   // What rendering the frame took then, and whether what it found could not all be kept.
@@ -56,16 +56,26 @@ class Sharpening {
   using ByStage = std::array<T, render::refinement_stages>;
 
   double rest_ms(bool at_rest) const;
+  double time_to_go_on(bool at_rest) const;
   std::size_t after(std::size_t stage, std::size_t coarse) const;
   std::size_t stage_of_lost(std::size_t lost) const;
   void go_on(double left);
-  std::vector<std::size_t> too_costly(std::span<const std::uint64_t> looks);
+  bool looks_matter() const;
+  std::vector<std::size_t> too_costly(std::span<const float> looks_ms);
   void learn(const ByStage<std::size_t>& found, double ms);
 
   double frame_ms_, frames_a_second_;
   bool live_;
-  bool looks_ = false;                   // at persons, anywhere
-  int frames_shown_ = 0;                 // since cells became coarser, without finding any
+  double looks_ms_ = 0;  // at persons, of the last frame
+  // Cells that became coarser for these.
+  struct Shed {
+    bool now = false;                       // in this frame
+    int frames = 0;                         // since, that told `relight_ms_`
+    double before_ms = 0, foreseen_ms = 0;  // that looks took, and by how much it should be less
+    int in_vain = 0;                        // so often in a row it was not
+    double looks_ms = 0;                    // then
+  };
+  Shed shed_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
   double relight_ms_ = 0;                // a frame that finds no cell anew
   ByStage<double> cost_;                 // of a cell: live in ms, once one was timed

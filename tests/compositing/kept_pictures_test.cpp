@@ -50,7 +50,8 @@ std::shared_ptr<const KeyedPicture> figure(float lean, float red = 0.7F) {
 
 struct Places {
   Vec3f person{0, 0, 0}, box{-0.8F, -0.5F, 0};
-  bool with_lit = false;  // and somebody in the set's light beside
+  bool with_lit = false;     // and somebody in the set's light beside
+  bool with_second = false;  // and somebody before the person, in part
 };
 
 // A person between a box and a wall, on a floor that catches shadows, with a mirror behind and a
@@ -68,15 +69,25 @@ render::SceneDescription scene_of(const Places& at, const char* shader = "billbo
   person.set_from_object = {1, 0, 0, at.person.x, 0, 1, 0, at.person.y, 0, 0, 2, at.person.z};
   person.moves = true;
   furnish(scene, {0.9F, 1.4F}, {0.55F, -0.6F, 0.6F});
-  if (at.with_lit) {
+  const auto add = [&](render::Material material, const std::array<float, 12>& set_from_object) {
     const auto number = static_cast<std::uint32_t>(scene.materials.size());
-    scene.materials.push_back(make_billboard_material("lit", {.picture = 1, .lit = true}));
+    render::Instance& somebody = scene.instances.emplace_back();
+    somebody.name = material.name;
+    somebody.mesh = static_cast<std::uint32_t>(scene.meshes.size());
+    somebody.moves = true;
+    somebody.set_from_object = set_from_object;
+    scene.materials.push_back(std::move(material));
     scene.meshes.push_back(std::make_shared<render::Mesh>(make_billboard_mesh(number)));
-    render::Instance& lit = scene.instances.emplace_back();
-    lit.name = "lit";
-    lit.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
-    lit.moves = true;
-    lit.set_from_object = {0.6F, 0, 0, 0.7F, 0, 1, 0, -0.3F, 0, 0, 1.2F, 0};
+  };
+  if (at.with_lit) {
+    add(make_billboard_material("lit", {.picture = 1, .lit = true}),
+        {0.6F, 0, 0, 0.7F, 0, 1, 0, -0.3F, 0, 0, 1.2F, 0});
+  }
+  if (at.with_second) {
+    render::Material second =
+        make_billboard_material("second", {.picture = 1, .gain = {1, 0.5F, 1}});
+    second.shader = shader;
+    add(std::move(second), {0.8F, 0.1F, 0, 0.25F, -0.2F, 1, 0, -0.5F, 0, 0, 1.7F, 0});
   }
   scene.materials.push_back(render::make_standard_material("box", {}));
   scene.meshes.push_back(
@@ -148,8 +159,7 @@ void add_lamps(render::LightTable& lights) {
 }
 
 // Before, behind, in mirrors, through glass, in shadow and at things' edges.
-void expect_as_if_found_with(bool lamps) {
-  const Places at;
+void expect_as_if_found_with(bool lamps, const Places& at = {}) {
   MadeShot shot = shot_of(at, figure(0.1F));
   MadeShot with = shot_of(at, figure(0.1F), "found_with");
   if (lamps) add_lamps(shot.job.lights), add_lamps(with.job.lights);
@@ -195,6 +205,24 @@ TEST(KeptPictures, AreEachPixelsOwnInBlocks) {
 
 TEST(KeptPictures, LookAsIfFoundWithThem) { expect_as_if_found_with(false); }
 TEST(KeptPictures, DimLampsAsIfFoundWithThem) { expect_as_if_found_with(true); }
+TEST(KeptPictures, LookAsIfFoundWithThemOneBeforeTheOther) {
+  expect_as_if_found_with(false, {.with_second = true});
+}
+
+// What looking takes is told, of cells where there is anything to look at.
+TEST(KeptPictures, TellWhatTheyTake) {
+  MadeShot shot = shot_of({}, figure(0));
+  render::KeptTransport kept;
+  rendered(shot, &kept);
+  const std::vector<float> looks = kept.looks_ms();
+  EXPECT_TRUE(std::ranges::all_of(looks, [](float ms) { return ms >= 0 && ms < 1e3F; }));
+  EXPECT_GT(std::ranges::max(looks), 0);
+  render::SceneDescription set = scene_of({});
+  set.instances.erase(set.instances.begin());
+  shot.scene = std::make_unique<render::Scene>(std::move(set));
+  rendered(shot, &kept);
+  EXPECT_EQ(kept.looks_ms(), std::vector<float>(looks.size(), 0.0F));
+}
 
 TEST(KeptPictures, TakeNoRaysOfTheSet) {
   MadeShot shot = shot_of({}, figure(0));

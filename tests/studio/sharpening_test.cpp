@@ -30,24 +30,30 @@ struct MadeMachine {
   double cell_ms;
   std::vector<int> kept = std::vector<int>(cells, none);
   double rest_ms = 3;
-  std::array<std::size_t, 2>
-      person{};        // cells that show one: the first, and the one after the last
-  double look_ms = 0;  // for each of these, with a ray a pixel
+  std::size_t person_begin = 0, person_end = 0;  // cells that show one
+  double look_ms = 0;  // for each of these, finished; in proportion to `look_cost`
+  std::array<double, render::refinement_stages> look_cost{0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1};
+  std::size_t moving = 0;  // so many cells, the first ones, are lost in every frame
 
   double ms_at(std::size_t stage) const { return cell_ms * made_cost[stage]; }
-  // What looking at the person takes in each cell, in microseconds.
-  std::vector<std::uint64_t> looks() const {
-    std::vector<std::uint64_t> looks(cells);
-    for (std::size_t i = person[0]; i < person[1]; ++i) {
+  std::vector<float> looks_ms() const {
+    std::vector<float> looks(cells);
+    for (std::size_t i = person_begin; i < person_end; ++i) {
       if (kept[i] == none) continue;
-      looks[i] = static_cast<std::uint64_t>(1e3 * look_ms * (1 + kept[i]) / 4);
+      looks[i] = static_cast<float>(look_ms * look_cost[static_cast<std::size_t>(kept[i])]);
     }
     return looks;
+  }
+  double share_of_person() const {
+    const auto sum = std::reduce(kept.begin() + static_cast<std::ptrdiff_t>(person_begin),
+                                 kept.begin() + static_cast<std::ptrdiff_t>(person_end));
+    return sum / static_cast<double>((person_end - person_begin) * render::finished_stage);
   }
 
   // Shows a frame; returns what it takes.
   double show(Sharpening& sharpening) {
-    const SharpeningPlan& plan = sharpening.next(kept, looks());
+    std::fill_n(kept.begin(), moving, none);
+    const SharpeningPlan& plan = sharpening.next(kept, looks_ms());
     double ms = 0;
     std::size_t found = 0;
     std::vector<std::uint8_t> stages = plan.stages, ahead(cells);
@@ -65,10 +71,16 @@ struct MadeMachine {
       if (kept[i] != stages[i] && !ahead[i]) frame_ms += ms_at(stages[i]);
     }
     kept = as_kept(stages);
-    const std::vector<std::uint64_t> looked = looks();
-    frame_ms += 1e-3 * static_cast<double>(std::reduce(looked.begin(), looked.end()));
+    const std::vector<float> looked = looks_ms();
+    frame_ms += std::reduce(looked.begin(), looked.end());
     sharpening.took(frame_ms, false);
     return ms + frame_ms;
+  }
+  // Shows so many; returns how many are late.
+  int late_of(int frames, Sharpening& sharpening) {
+    int late = 0;
+    for (int i = 0; i < frames; ++i) late += show(sharpening) > 40;
+    return late;
   }
 };
 
@@ -135,9 +147,9 @@ TEST(Sharpening, LetsCellsBeWherePersonsTakeAllOfTheTime) {
   for (const bool persons : {false, true}) {
     Sharpening sharpening({25, 1}, true);
     MadeMachine machine{2};
-    if (persons) machine.person = {0, 1}, machine.look_ms = 1e-3;
+    if (persons) machine.person_end = 100, machine.look_ms = 0.1;
     for (int i = 0; i < 3; ++i) machine.show(sharpening);
-    machine.rest_ms = 38;
+    machine.rest_ms = persons ? 33 : 38;
     for (int i = 0; i < 15; ++i) machine.show(sharpening);
     const double share = sharpening.share();
     for (int i = 0; i < 10; ++i) machine.show(sharpening);
@@ -154,34 +166,69 @@ TEST(Sharpening, LetsCellsBeWherePersonsTakeAllOfTheTime) {
 }
 
 // A person comes before sharp cells: frames are late for a moment, then coarser where the person
-// is, and stay so; when the person has gone, they are sharp again.
+// is, and stay so; when the person has gone, they are sharp again. Whatever else moves a little.
 TEST(Sharpening, GoesBackWherePersonsMakeFramesLate) {
+  for (const std::size_t moving : {0U, 1U}) {
+    Sharpening sharpening({25, 1}, true);
+    MadeMachine machine{0.1};
+    machine.moving = moving;
+    machine.late_of(200, sharpening);
+    ASSERT_EQ(sharpening.share(), 1);
+    machine.person_begin = 300, machine.person_end = 500;
+    machine.look_ms = 0.35;
+    const int late = machine.late_of(75, sharpening);
+    EXPECT_LT(late, 50);
+    EXPECT_GT(late, 0);
+    EXPECT_EQ(machine.late_of(100, sharpening), 0);
+    int changes = 0;
+    for (int i = 0; i < 100; ++i) {
+      const std::vector<int> before = machine.kept;
+      EXPECT_LE(machine.show(sharpening), 40) << i;
+      changes += machine.kept != before;
+    }
+    EXPECT_LT(changes, 10);
+    EXPECT_LT(machine.share_of_person(), 1);
+    EXPECT_GT(machine.share_of_person(), 0.3);
+    for (std::size_t i = moving; i < cells; ++i) {
+      if (i < 300 || i >= 500) {
+        ASSERT_EQ(machine.kept[i], render::finished_stage) << i;
+      }
+    }
+    machine.look_ms = 0;
+    machine.late_of(100, sharpening);
+    EXPECT_EQ(sharpening.share(), 1);
+  }
+}
+
+// Not where that helps nothing: looking takes next to nothing, or the same in coarse cells.
+TEST(Sharpening, StaysWhereGoingBackWouldNotHelp) {
   Sharpening sharpening({25, 1}, true);
   MadeMachine machine{0.1};
-  for (int i = 0; i < 200; ++i) machine.show(sharpening);
-  ASSERT_EQ(sharpening.share(), 1);
-  machine.person = {300, 500};
-  machine.look_ms = 0.2;  // 70 ms where cells are finished
-  int late = 0;
-  for (int i = 0; i < 75; ++i) late += machine.show(sharpening) > 40;
-  EXPECT_LT(late, 50);
-  EXPECT_GT(late, 0);
-  int changes = 0;
-  for (int i = 0; i < 100; ++i) {
-    const std::vector<int> before = machine.kept;
-    EXPECT_LE(machine.show(sharpening), 40) << i;
-    changes += machine.kept != before;
-  }
-  EXPECT_LT(changes, 10);
-  for (std::size_t i = 0; i < cells; ++i) {
-    if (i < 300 || i >= 500) {
-      ASSERT_EQ(machine.kept[i], render::finished_stage) << i;
-    }
-  }
-  EXPECT_LT(sharpening.share(), 1);
-  machine.look_ms = 0;
-  for (int i = 0; i < 100; ++i) machine.show(sharpening);
-  EXPECT_EQ(sharpening.share(), 1);
+  machine.late_of(200, sharpening);
+  machine.person_begin = 300, machine.person_end = 500;
+  machine.look_ms = 1e-3;
+  machine.rest_ms = 42;
+  machine.late_of(300, sharpening);
+  EXPECT_EQ(machine.share_of_person(), 1);
+  machine.look_ms = 0.2;
+  machine.look_cost.fill(1);
+  machine.rest_ms = 3;
+  machine.late_of(600, sharpening);
+  EXPECT_GT(machine.share_of_person(), 0.3);
+}
+
+// Frames are late for looks and for other things: what can be had is, and it ends.
+TEST(Sharpening, GoesBackNoFurtherThanHelps) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine{0.1};
+  machine.late_of(200, sharpening);
+  machine.person_begin = 300, machine.person_end = 500;
+  machine.look_ms = 0.1;
+  machine.rest_ms = 60;
+  machine.late_of(600, sharpening);
+  const std::vector<int> before = machine.kept;
+  machine.late_of(200, sharpening);
+  EXPECT_EQ(machine.kept, before);
 }
 
 // What is lost and can be found anew in the time of a frame is as fine as before at once.
