@@ -93,8 +93,6 @@ ExposureChoice choose_exposures(const RadianceRange& scene, const ChoiceSettings
   choice.exposures_s.push_back(ends.steps > 0 ? ends.longest_s : ends.shortest_s);
   choice.too_bright = ends.wanted_shortest_s < settings.possible.shortest_s;
   choice.too_dark = ends.wanted_longest_s > settings.possible.longest_s;
-  choice.resolved = {ends.least_value / choice.exposures_s.back(),
-                     settings.fullest / choice.exposures_s.front()};
   return choice;
 }
 

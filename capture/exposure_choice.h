@@ -27,10 +27,8 @@ struct ChoiceSettings {
 struct ExposureChoice {
   std::vector<double> exposures_s;  // the shortest first
   double relative_error = 0;        // that was asked for, or had to be
-  // What they resolve: less than was asked for if the camera's range ends before.
-  RadianceRange resolved;
-  bool too_bright = false;  // the shortest possible exposure is too long
-  bool too_dark = false;    // the longest possible exposure is too short
+  bool too_bright = false;          // the shortest possible exposure is too long
+  bool too_dark = false;            // the longest possible exposure is too short
 };
 
 // The deviation of a radiance as the best merge of these exposures has it (Granados et al., see

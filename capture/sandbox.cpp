@@ -243,10 +243,8 @@ bool SandboxedChild::write(std::span<const std::byte> bytes) {
 }
 
 void SandboxedChild::reap() {
-  rusage usage{};
-  while (wait4(child_, &status_, 0, &usage) < 0 && errno == EINTR) {
+  while (waitpid(child_, &status_, 0) < 0 && errno == EINTR) {
   }
-  peak_memory_bytes_ = static_cast<std::size_t>(usage.ru_maxrss) * 1024;
   child_ = -1;
 }
 

@@ -48,10 +48,8 @@ class SandboxedChild {
   // Once a stop is requested, reading, writing and ending() soon throw std::runtime_error.
   void give_up_on(std::stop_token stop) { stop_ = std::move(stop); }
 
-  // Waits for its end, and says in words how it came: empty if it exited with status 0. The peak
-  // memory is known afterwards.
+  // Waits for its end, and says in words how it came: empty if it exited with status 0.
   std::string ending();
-  std::size_t peak_memory_bytes() const { return peak_memory_bytes_; }
 
  private:
   void start(const std::string& program, int input_fd);
@@ -64,7 +62,6 @@ class SandboxedChild {
   int input_fd_ = -1;   // where we write; -1 = nowhere
   int output_fd_ = -1;  // where we read
   int status_ = 0;
-  std::size_t peak_memory_bytes_ = 0;
 };
 
 }  // namespace capture

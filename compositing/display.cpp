@@ -6,10 +6,10 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numeric>
 #include <stdexcept>
 
 #include "capture/parallel_loop.h"
+#include "compositing/view_transform.h"
 
 namespace compositing {
 namespace {
@@ -219,27 +219,27 @@ auto emit_triples(std::span<Code> rgb) {
 
 }  // namespace
 
-Display::Display(const DisplaySettings& settings)
-    : view_(settings), table_size_(settings.table_size) {
+Display::Display(const DisplaySettings& settings) : table_size_(settings.table_size) {
+  const ViewTransform view(settings);
   if (table_size_ < 2 || table_size_ > 129) {
     throw std::invalid_argument("a display table has 2 to 129 nodes per axis, not " +
                                 std::to_string(table_size_));
   }
-  if (view_.mixes_channels()) {
-    bake();
+  if (view.mixes_channels()) {
+    bake(view);
     require_finite(nodes_, settings);
   } else {
-    make_exact_tables(settings);
+    make_exact_tables(view, settings);
   }
 }
 
-void Display::make_exact_tables(const DisplaySettings& settings) {
+void Display::make_exact_tables(const ViewTransform& view, const DisplaySettings& settings) {
   std::vector<float> greys(half_count * 3);
   for (std::size_t bits = 0; bits < half_count; ++bits) {
     std::fill_n(greys.begin() + static_cast<std::ptrdiff_t>(bits * 3), 3,
                 finite_value(static_cast<capture::Half>(bits)));
   }
-  view_.apply(greys);
+  view.apply(greys);
   require_finite(greys, settings);
   codes_.resize(half_count * 3);
   bytes_.resize(half_count * 3);
@@ -252,9 +252,9 @@ void Display::make_exact_tables(const DisplaySettings& settings) {
   }
 }
 
-void Display::bake() {
+void Display::bake(const ViewTransform& view) {
   // A saturated colour goes on changing for some two stops after the greys are white.
-  const double white = find_brightest_grey(view_);
+  const double white = find_brightest_grey(view);
   const Shaper shaper(table_size_, white / 4, white * 4);
   positions_.resize(half_count);
   for (std::size_t bits = 0; bits < half_count; ++bits) {
@@ -272,7 +272,7 @@ void Display::bake() {
       for (const float b : axis) rgb.insert(rgb.end(), {r, g, b});
     }
   }
-  view_.apply(rgb);
+  view.apply(rgb);
   nodes_.assign(rgb.size() / 3 * 4, 0.0F);
   for (std::size_t i = 0; i < rgb.size(); ++i) {
     const float value = rgb[i];
@@ -373,25 +373,6 @@ std::int64_t Display::to_rgb32(const capture::HalfImage& rgba,
                                std::span<std::uint32_t> words,
                                const ToneCurve& tone) const {
   return convert_image(rgba, words, 1, [&](auto in, auto out) { return to_rgb32(in, out, tone); });
-}
-
-CodeError Display::measure_error(const capture::HalfImage& rgba) const {
-  std::vector<std::uint8_t> codes(rgba.pixels.size() / 4 * 3);
-  to_rgb8(rgba, codes);
-  std::vector<float> exact(codes.size());
-  for (std::size_t i = 0; i < exact.size(); ++i) {
-    exact[i] = finite_value(rgba.pixels[i / 3 * 4 + i % 3]);
-  }
-  view_.apply(exact);
-  std::vector<double> differences(exact.size());
-  for (std::size_t i = 0; i < exact.size(); ++i) {
-    differences[i] = std::abs(codes[i] - 255.0 * std::clamp(exact[i], 0.0F, 1.0F));
-  }
-  if (differences.empty()) return {};
-  std::sort(differences.begin(), differences.end());
-  const double sum = std::accumulate(differences.begin(), differences.end(), 0.0);
-  return {sum / static_cast<double>(differences.size()), differences[differences.size() * 99 / 100],
-          differences.back()};
 }
 
 }  // namespace compositing

@@ -8,11 +8,13 @@
 
 #include "capture/image.h"
 #include "compositing/tone.h"
-#include "compositing/view_transform.h"
 
 namespace compositing {
 
-// Which display and view; see list_displays for the names. "" is the config's default.
+class ViewTransform;
+
+// Which display and view; "" is the config's default. A name that is none is refused with the list
+// of those that are.
 struct DisplaySettings {
   std::string display = "Rec.1886";     // or "sRGB"
   std::string view = "Un-tone-mapped";  // keeps the plate's own look; or "ACES SDR"
@@ -20,14 +22,6 @@ struct DisplaySettings {
   std::string config_file = {};         // an OpenColorIO config; "" = the one in code
   std::string working_space = {};       // its name of linear Rec.709; "" = found by known names
   std::string look_file = {};           // a .clf or .cube of working values, before the view
-};
-
-// Distance between a display's codes and the exact view, in 8-bit codes. 0.25 in the mean is the
-// price of rounding alone.
-struct CodeError {
-  double mean = 0;
-  double p99 = 0;
-  double max = 0;
 };
 
 // Immutable once made: any number of threads may convert.
@@ -72,12 +66,9 @@ class Display {
   // Whether the exact tables serve.
   bool separable() const { return nodes_.empty(); }
 
-  // Compares to_rgb8 with the exact view over an image's pixels; slow.
-  CodeError measure_error(const capture::HalfImage& rgba) const;
-
  private:
-  void make_exact_tables(const DisplaySettings& settings);
-  void bake();
+  void make_exact_tables(const ViewTransform& view, const DisplaySettings& settings);
+  void bake(const ViewTransform& view);
   template <typename Code, typename Emit>
   void emit_codes(std::span<const capture::Half> rgba,
                   const std::vector<Code>& table,
@@ -93,7 +84,6 @@ class Display {
                              std::size_t values_per_pixel,
                              Run run) const;
 
-  ViewTransform view_;
   std::vector<std::uint16_t> codes_;  // separable: (3, 65536) codes of 16 bits
   std::vector<std::uint8_t> bytes_;   // separable: (3, 65536) codes of 8 bits
   std::vector<float> positions_;      // baked: place of each half on an axis, 0..table_size - 1

@@ -3,9 +3,12 @@
 
 #include <OpenColorIO/OpenColorIO.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "compositing/display.h"
 
@@ -149,18 +152,6 @@ ocio::ConstConfigRcPtr open_config(const std::string& file) {
   }
 }
 
-std::vector<DisplayViews> displays_of(const ocio::ConstConfigRcPtr& config) {
-  std::vector<DisplayViews> displays;
-  for (int d = 0; d < config->getNumDisplays(); ++d) {
-    DisplayViews entry{config->getDisplay(d), {}};
-    for (int v = 0; v < config->getNumViews(entry.display.c_str()); ++v) {
-      entry.views.emplace_back(config->getView(entry.display.c_str(), v));
-    }
-    displays.push_back(std::move(entry));
-  }
-  return displays;
-}
-
 std::string quoted_list(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "\"" : ", \"") + name + "\"";
@@ -170,17 +161,20 @@ std::string quoted_list(const std::vector<std::string>& names) {
 void require_view(const ocio::ConstConfigRcPtr& config,
                   const std::string& display,
                   const std::string& view) {
-  std::vector<std::string> names;
-  for (const DisplayViews& entry : displays_of(config)) {
-    names.push_back(entry.display);
-    if (entry.display != display) continue;
-    for (const std::string& name : entry.views) {
-      if (name == view) return;
-    }
-    throw std::invalid_argument("display \"" + display + "\" has no view \"" + view +
-                                "\"; it has " + quoted_list(entry.views));
+  std::vector<std::string> displays;
+  for (int d = 0; d < config->getNumDisplays(); ++d) displays.emplace_back(config->getDisplay(d));
+  if (std::ranges::find(displays, display) == displays.end()) {
+    throw std::invalid_argument("no display \"" + display + "\"; there are " +
+                                quoted_list(displays));
   }
-  throw std::invalid_argument("no display \"" + display + "\"; there are " + quoted_list(names));
+  std::vector<std::string> views;
+  for (int v = 0; v < config->getNumViews(display.c_str()); ++v) {
+    views.emplace_back(config->getView(display.c_str(), v));
+  }
+  if (std::ranges::find(views, view) == views.end()) {
+    throw std::invalid_argument("display \"" + display + "\" has no view \"" + view +
+                                "\"; it has " + quoted_list(views));
+  }
 }
 
 // The config's own name for scene-linear Rec.709.
@@ -257,9 +251,5 @@ void ViewTransform::apply(std::span<float> rgb) const {
 }
 
 bool ViewTransform::mixes_channels() const { return processor_->cpu->hasChannelCrosstalk(); }
-
-std::vector<DisplayViews> list_displays(const std::string& config_file) {
-  return displays_of(open_config(config_file));
-}
 
 }  // namespace compositing

@@ -3,8 +3,6 @@
 
 #include <memory>
 #include <span>
-#include <string>
-#include <vector>
 
 namespace compositing {
 
@@ -32,15 +30,5 @@ class ViewTransform {
   struct Processor;
   std::unique_ptr<const Processor> processor_;
 };
-
-// A display and the views that it offers.
-struct DisplayViews {
-  std::string display;
-  std::vector<std::string> views;
-};
-
-// What may be asked for: of the config in code, or of a config file. The first is the default.
-// Throws std::runtime_error like ViewTransform.
-std::vector<DisplayViews> list_displays(const std::string& config_file = {});
 
 }  // namespace compositing

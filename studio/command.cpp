@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "studio/commands/commands.h"
@@ -23,14 +25,38 @@ struct Declared {
   std::function<void(Console&)> run;
 };
 
-int report_usage(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App* used = &app;
+// Where choices of a list were given as words of their own, which CLI11 takes for positionals or
+// does not expect: what to write instead. Else "".
+std::string spaced_choices(CLI::App& app) {
+  std::vector<std::string> words;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_positional()) std::ranges::copy(option->results(), std::back_inserter(words));
+  }
+  std::ranges::copy(app.remaining(), std::back_inserter(words));
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_delimiter() != ',' || option->empty()) continue;
+    const CLI::Validator& refuse = *option->get_validator();
+    std::vector<std::string> meant;
+    std::ranges::copy_if(words, std::back_inserter(meant),
+                         [&](const std::string& word) { return refuse(word).empty(); });
+    if (meant.empty()) continue;
+    return fmt::format("\"{}\" was not expected: write {} {},{}", fmt::join(meant, " "),
+                       option->get_name(), fmt::join(option->results(), ","),
+                       fmt::join(meant, ","));
+  }
+  return "";
+}
+
+int report_usage(CLI::App& app, const CLI::ParseError& error) {
+  CLI::App* used = &app;
   std::string name = "platelight";
   while (!used->get_subcommands().empty()) {
     used = used->get_subcommands().back();
     name += " " + used->get_name();
   }
-  std::string reason = error.what();
+  const bool has_extras = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+  std::string reason = has_extras ? spaced_choices(*used) : "";
+  if (reason.empty()) reason = error.what();
   std::ranges::replace(reason, '\n', ' ');
   fmt::print(stderr, "{}: {} (see {} --help)\n", name, reason, name);
   return 2;

@@ -18,6 +18,7 @@
 #include "studio/set_digest.h"
 #include "studio/show.h"
 #include "studio/show_inputs.h"
+#include "studio/timed_source.h"
 
 namespace studio {
 namespace {
@@ -80,14 +81,33 @@ std::vector<EffortSetting> settings_to_measure(const render::Effort& base, bool 
 
 [[noreturn]] void refuse_live(const Set& set, Place place, const std::string& what) {
   throw SetError({{set.path, place.line, place.column,
-                   what + " is a live camera: frames would be measured at its pace, and against "
-                          "the reference of another moment. Record it first (platelight capture "
-                          "record), and chart the set with what was recorded (replay:DIR)"}});
+                   what + " is a live camera: each setting would be measured with other frames "
+                          "than the reference. Record it first (platelight capture record), and "
+                          "chart the set with what was recorded (replay:DIR)"}});
+}
+
+// Throws SetError also where it cannot be opened.
+void refuse_if_live(const Set& set, Place place, const std::string& uri) {
+  bool live = false;
+  try {
+    live = open_video({uri, fs::absolute(set.path).parent_path().string()})->info().live;
+  } catch (const std::exception& error) {
+    throw SetError({{set.path, place.line, place.column, error.what()}});
+  }
+  if (live) refuse_live(set, place, uri);
 }
 
 // Throws SetError for a set whose frames are not the same each time.
 void require_recorded(const Set& set) {
   if (open_plate(set)->is_live()) refuse_live(set, set.camera.source_place, "the plate");
+  for (const VideoSettings& video : set.videos) {
+    refuse_if_live(set, video.source_place, video.source);
+  }
+  for (const PersonSettings& person : set.persons) {
+    for (const PersonCamera& camera : person.cameras) {
+      refuse_if_live(set, camera.place, camera.source);
+    }
+  }
   const auto& probe = set.probe;
   if (!probe || probe->kind != ProbeSettings::Kind::camera) return;
   if (ProbeSource(set).holds_camera_of(set)) refuse_live(set, probe->source_place, "the probe");

@@ -17,8 +17,8 @@ struct SetChartSettings {
 // are recorded into a temporary directory, so that the set's own takes stay as they are. Measures
 // the time from frame to frame and the error of the last one against the reference. The
 // chart's stage is "NAME.chart" for a set file NAME.toml. Throws SetError as Show, and for a set
-// whose plate or probe is live, and std::runtime_error for a set whose last frame nothing virtual
-// is in.
+// with a live camera, be it plate, probe, a video or a person's, and std::runtime_error for a set
+// whose last frame nothing virtual is in.
 Chart chart_set(const std::string& set_path, const SetChartSettings& settings, Console& console);
 
 }  // namespace studio

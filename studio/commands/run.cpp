@@ -1,5 +1,6 @@
 // platelight run: puts a set on air.
 #include <algorithm>
+#include <exception>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -205,6 +206,15 @@ void report_end(const ShowStatus& status, const Set& set, Console& console) {
   }
 }
 
+// Of a show that an error ended. That one is to be told, even where these cannot be written.
+void write_figures_so_far(const Set& set, const ShowStatus& status, Console& console) {
+  try {
+    console.figures(show_figures(set, status, {}));
+  } catch (const std::exception& error) {
+    console.warn(error.what());
+  }
+}
+
 void run(const RunOptions& options, Console& console) {
   // Before it is read: what is saved while the scene loads is a change.
   std::error_code unreadable;
@@ -244,7 +254,7 @@ void run(const RunOptions& options, Console& console) {
   }
 
   ShownFrame last;
-  {
+  try {
     const Interruptible ctrl_c;
     show.run([&](const ShownFrame& shown) {
       const auto status = show.status();
@@ -255,6 +265,9 @@ void run(const RunOptions& options, Console& console) {
       if (ctrl_c.is_interrupted() || in_vain) show.post(Quit{});
       last = shown;
     });
+  } catch (const std::exception&) {
+    write_figures_so_far(set, *show.status(), console);
+    throw;
   }
   watch.reset();
 

@@ -81,7 +81,6 @@ TEST(ChooseExposures, SaysWhereTheCameraEnds) {
   EXPECT_TRUE(sun.too_bright);
   EXPECT_FALSE(sun.too_dark);
   EXPECT_DOUBLE_EQ(sun.exposures_s.front(), camera.possible.shortest_s);
-  EXPECT_NEAR(sun.resolved.most, 0.7 / 2e-5, 1);
   const ExposureChoice night = choose_exposures({1e-4, 1}, camera);
   EXPECT_TRUE(night.too_dark);
   EXPECT_DOUBLE_EQ(night.exposures_s.back(), camera.possible.longest_s);

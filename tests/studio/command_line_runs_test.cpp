@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -12,6 +13,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -24,6 +26,7 @@
 #include "capture/camera.h"
 #include "capture/exr.h"
 #include "capture/png.h"
+#include "studio/command.h"
 #include "studio/commands/benches.h"
 #include "studio/commands/interruptible.h"
 #include "tests/studio/command_line.h"
@@ -179,6 +182,34 @@ TEST_F(LiveInputs, AreMeasuredAsThePicturesCome) {
   Console console(true, "");
   bench_inputs(write_made_set(dir_, "counted:"), 1, 40, console);
   EXPECT_GE(given, 20);
+}
+
+using BreakingInputs = MadeShowTest;
+
+// A camera that cannot be read from its sixth frame on.
+class BreakingCamera final : public GreyCamera {
+ public:
+  BreakingCamera() : GreyCamera(100, {25, 1}, 0) {}
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (frame && frame->number == 5) throw std::runtime_error("its disk is gone");
+    return frame;
+  }
+};
+
+TEST_F(BreakingInputs, LeaveTheFiguresOfTheFramesBefore) {
+  capture::register_camera("breaking", [](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<BreakingCamera>();
+  });
+  const std::string set = write_made_set(dir_, "breaking:");
+  const std::string json_path = (dir_ / "run.json").string();
+  const std::array words{"platelight", "run", set.c_str(), "--quiet", "--json", json_path.c_str()};
+  const auto run = [&] { run_command_line(static_cast<int>(words.size()), words.data()); };
+  EXPECT_THAT(run, testing::ThrowsMessage<std::runtime_error>(HasSubstr("its disk is gone")));
+  const auto figures = nlohmann::json::parse(content_of(json_path));
+  EXPECT_GT(figures["frames"], 0);
+  EXPECT_LT(figures["frames"], 6);
+  EXPECT_GT(figures["rays"]["primary"], 0);
 }
 
 TEST_F(Runs, CountInTensWhateverNumbersBeginWith) {

@@ -80,6 +80,18 @@ TEST_F(CommandLine, ReturnsTwoAndOneLineForWrongUsage) {
   }
 }
 
+TEST_F(CommandLine, TellsHowToWriteAListThatIsGivenWithSpaces) {
+  for (const char* words :
+       {"still a.toml -o a.png --overlay grid axes", "still --overlay grid axes a.toml -o a.png",
+        "still --overlay grid, axes -o a.png a.toml"}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 2) << words;
+    expect_one_line(outcome.err);
+    EXPECT_THAT(outcome.err, HasSubstr("\"axes\" was not expected: write --overlay grid,axes"));
+  }
+  EXPECT_THAT(run("still a.toml b.toml --overlay grid -o a.png").err, HasSubstr("b.toml"));
+}
+
 TEST_F(CommandLine, TakesNoNumberThatIsNone) {
   for (const char* words : {"run a.toml --error nan", "run a.toml --fps -NaN",
                             "capture record v4l2:/dev/none take --seconds nan"}) {

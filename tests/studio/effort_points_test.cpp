@@ -185,6 +185,16 @@ TEST_F(LiveSets, AreChartedOnceTheyAreRecorded) {
       [&] { static_cast<void>(chart_set(live_probe, settings, console)); },
       ThrowsMessage<SetError>(testing::AllOf(
           HasSubstr("probe.toml:7:10: the probe is a live camera"), HasSubstr("capture record"))));
+  for (const char* more :
+       {"[[object]]\nname = \"set\"\nmade = \"tv\"\n"
+        "[[video]]\nobject = \"set/tv\"\nsource = \"live_grey:1000,50\"\n",
+        "[[billboard]]\nheight = 2\nposition = [0, 0, 0]\nsource = \"live_grey:1000,50\"\n"}) {
+    const std::string live_video = write_made_set(dir_, "grey:9,25,0", more);
+    EXPECT_THAT(
+        [&] { static_cast<void>(chart_set(live_video, settings, console)); },
+        ThrowsMessage<SetError>(testing::AllOf(HasSubstr(":10: live_grey:1000,50 is a live camera"),
+                                               HasSubstr("capture record"))));
+  }
 }
 
 }  // namespace
