@@ -11,7 +11,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "studio/commands/commands.h"
@@ -24,6 +23,15 @@ struct Declared {
   CLI::App* app = nullptr;
   std::function<void(Console&)> run;
 };
+
+std::string joined(const std::vector<std::string>& words, char between) {
+  std::string all;
+  for (const std::string& word : words) {
+    if (!all.empty()) all += between;
+    all += word;
+  }
+  return all;
+}
 
 // Where choices of a list were given as words of their own, which CLI11 takes for positionals or
 // does not expect: what to write instead. Else "".
@@ -40,9 +48,8 @@ std::string spaced_choices(CLI::App& app) {
     std::ranges::copy_if(words, std::back_inserter(meant),
                          [&](const std::string& word) { return refuse(word).empty(); });
     if (meant.empty()) continue;
-    return fmt::format("\"{}\" was not expected: write {} {},{}", fmt::join(meant, " "),
-                       option->get_name(), fmt::join(option->results(), ","),
-                       fmt::join(meant, ","));
+    return fmt::format("\"{}\" was not expected: write {} {},{}", joined(meant, ' '),
+                       option->get_name(), joined(option->results(), ','), joined(meant, ','));
   }
   return "";
 }
