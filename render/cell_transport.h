@@ -160,7 +160,7 @@ struct CellTransport {
     alignas(64) std::array<float, cell_pixels> px, py, pz, width_m;
     std::uint32_t smooth = 0;  // squares that are one smooth surface, a bit each (cell_squares.h)
 
-    Scene::Bounds box;         // around them
+    Scene::Bounds box;  // around them
 
     Vec3f position(std::size_t k) const { return {px[k], py[k], pz[k]}; }
   };
