@@ -170,6 +170,8 @@ class StandingBillboard final : public render::StandingPicture {
     uv_per_metre_ = 1 / std::sqrt(area);
   }
 
+  bool shows_nothing() const override { return picture_->shows_nothing(); }
+
   void dim(const render::LightRays& light) const override {
     for_each_met(light.rays, [&](std::size_t ray, const Met& met) {
       const float slant = std::max(std::abs(met.facing), 1e-6F);

@@ -23,6 +23,7 @@ class KeyedPicture final : public render::LivePicture {
   bool is_clear(float u, float v, float footprint_uv) const override {
     return texture_->is_clear(u, v, footprint_uv);
   }
+  bool shows_nothing() const override { return texture_->is_bare(); }
   // Bilinear in one level.
   float quick_alpha(float u, float v, float footprint_uv) const override;
   float most_alpha(float u0, float v0, float u1, float v1) const override;

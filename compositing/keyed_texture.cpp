@@ -195,7 +195,8 @@ void KeyedTexture::find_bare() {
       nearer(row, column, {{-1, -1}, {-1, 0}, {-1, 1}, {0, -1}});
     }
   }
-  for (int row = rows - 1; row >= 0; --row) {
+  bare_everywhere_ = std::ranges::all_of(bare_, [](std::uint8_t away) { return away == 255; });
+  for (int row = rows - 1; row >= 0 && !bare_everywhere_; --row) {
     for (int column = columns - 1; column >= 0; --column) {
       nearer(row, column, {{1, 1}, {1, 0}, {1, -1}, {0, 1}});
     }

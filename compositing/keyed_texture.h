@@ -35,7 +35,9 @@ class KeyedTexture {
     return k == 0 ? frame_.image() : coarser_[k - 1];
   }
 
-  // Whether filtered() is all 0 here: not where the person is near.
+  // Whether filtered() is all 0 everywhere: nobody is there.
+  bool is_bare() const { return bare_everywhere_; }
+  // Whether it is here: not where the person is near.
   bool is_clear(float u, float v, float footprint_uv) const;
   // Red, green, blue and alpha at (u, v), filtered over a square of `footprint_uv`, of the places
   // that render::find_video_samples() has.
@@ -48,6 +50,7 @@ class KeyedTexture {
   std::vector<capture::HalfImage> coarser_;
   // Of each 8x8 pixels: how many such blocks away the nearest is that is not bare, 0 to 255.
   std::vector<std::uint8_t> bare_;
+  bool bare_everywhere_ = false;
 };
 
 // One that took a picture.

@@ -38,6 +38,7 @@ class PartOfPicture final : public render::LivePicture {
   bool is_clear(float u, float v, float footprint_uv) const override {
     return picture_->is_clear(across(u), down(v), footprint_uv * side_);
   }
+  bool shows_nothing() const override { return picture_->shows_nothing(); }
   float most_alpha(float u0, float v0, float u1, float v1) const override {
     return picture_->most_alpha(across(u0), down(v0), across(u1), down(v1));
   }

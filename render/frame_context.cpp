@@ -380,9 +380,9 @@ void add_pictures(FrameContext& context) {
     const Scene::Bounds& bounds = scene.places().bounds[moving++];
     if (!scene.shows_apart(i)) continue;
     const auto own = std::ranges::find(scene.prepared(), i, &PreparedSurface::instance);
-    if (own != scene.prepared().end() && own->prepared->picture()) {
-      context.pictures.push_back({bounds, own->prepared->picture()});
-    }
+    const StandingPicture* picture =
+        own != scene.prepared().end() ? own->prepared->picture() : nullptr;
+    if (picture && !picture->shows_nothing()) context.pictures.push_back({bounds, picture});
   }
 }
 

@@ -36,6 +36,8 @@ class LivePicture {
     static_cast<void>(u), static_cast<void>(v), static_cast<void>(footprint_uv);
     return false;
   }
+  // Whether look_up() has nothing anywhere: said only where that is quick to tell.
+  virtual bool shows_nothing() const { return false; }
   // What no alpha in the rectangle from (u0, v0) to (u1, v1) exceeds, whatever the footprint of a
   // look-up whose square, widened three times, lies in it. 1 where it would take long to say.
   virtual float most_alpha(float u0, float v0, float u1, float v1) const {

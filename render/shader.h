@@ -141,6 +141,8 @@ class Prepared {
 class StandingPicture : public Prepared {
  public:
   const StandingPicture* picture() const final { return this; }
+  // Whether it shows nothing anywhere in this frame, and may be passed over.
+  virtual bool shows_nothing() const = 0;
   // Dims rays by what the picture lets pass of each, as Shader::transmittance() says.
   virtual void dim(const LightRays& rays) const = 0;
   // Adds where rays meet it before they end, in their order.

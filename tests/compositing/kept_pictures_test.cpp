@@ -290,6 +290,7 @@ TEST(KeptPictures, LeaveNothingBehind) {
   rendered(shot, &kept);
   show(shot, {}, nobody);
   const FrameResult empty = rendered(shot, &kept);
+  EXPECT_EQ(std::ranges::max(kept.looks_ms()), 0) << "nobody is looked for";
   render::SceneDescription set = scene_of({});
   set.instances.erase(set.instances.begin());
   MadeShot without = shot_of({}, figure(0));

@@ -153,6 +153,17 @@ TEST(KeyedTexture, IsClearByItsOwnFrameAlone) {
   EXPECT_GT(not_clear, 200);
 }
 
+TEST(KeyedTexture, IsBareWhereNobodyIs) {
+  KeyedTexture texture;
+  capture::Image picture = capture::make_image(70, 90, 4);
+  for (const bool somebody : {false, true, false}) {
+    picture.at(69, 89, 3) = somebody ? 0.1F : 0;
+    texture.take(picture);
+    EXPECT_EQ(texture.is_bare(), !somebody);
+    EXPECT_EQ(texture.is_clear(0.95F, 0.95F, 0), !somebody);
+  }
+}
+
 TEST(KeyedTexture, IsClearOnlyWhereALookUpFindsNothing) {
   std::mt19937 random(8);
   std::uniform_real_distribution<float> one(0, 1);
