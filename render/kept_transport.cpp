@@ -27,9 +27,6 @@ std::array<float, 2> distances_to(const Scene::Bounds& box, Vec3f from) {
 
 void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame) {
   const Scene& scene = *frame.inputs.scene;
-  if (frame.pictures.empty()) {
-    for (Cell& cell : cells_) cell.looks_ms = 0;
-  }
   const bool same_size = frame.columns == columns_ && frame.rows == rows_;
   auto moved = Scene::moved(places_, scene.places());
   const bool same_transport = keys.transport == keys_.transport;
@@ -170,10 +167,14 @@ std::vector<float> KeptTransport::looks_ms() const {
   const auto threads = static_cast<float>(tbb::this_task_arena::max_concurrency());
   std::vector<float> looks;
   looks.reserve(cells_.size());
-  for (const Cell& cell : cells_) {
-    looks.push_back(cell.stage == none ? 0.0F : cell.looks_ms / threads);
-  }
+  for (const Cell& cell : cells_) looks.push_back(cell.times.look_ms / threads);
   return looks;
+}
+
+float KeptTransport::finding_ms() const {
+  float all = 0;
+  for (const Cell& cell : cells_) all += cell.times.find_ms;
+  return all / static_cast<float>(tbb::this_task_arena::max_concurrency());
 }
 
 CellTransport* KeptTransport::place(int column, int row, int stage) {
@@ -182,9 +183,12 @@ CellTransport* KeptTransport::place(int column, int row, int stage) {
   // again coarse, and takes a hundredth of what it took in the end.
   const bool coarser = cell.stage > stage;
   if ((cell.stage == none && scarce_) || coarser) {
+    const std::size_t replaced = coarser ? cell.bytes : 0;
     bytes_ -= cell.bytes;
     cell = {};
+    cell.replaced = replaced;
   }
+  if (coarser) full_ = false;
   // What is kept already stays as it is, rather than make room for the same in more detail.
   if (bytes_ >= room() && !coarser && (!cell.transport || cell.stage != none)) {
     full_ = true;
@@ -211,7 +215,8 @@ void KeptTransport::keep(int column, int row, int stage) {
   cell.stage = stage;
   cell.needs_pictures = none;
   if (!cell.transport->bent.empty()) bends_plate_ = true;
-  if (others + bytes <= room()) return;
+  const bool less = bytes <= std::exchange(cell.replaced, std::size_t{0});
+  if (others + bytes <= room() || less) return;
   // Too much: this cell's is given back.
   full_ = true;
   bytes_ -= cell.bytes;

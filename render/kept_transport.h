@@ -75,12 +75,18 @@ class KeptTransport {
   static constexpr int none = -1;
   std::vector<int> stages() const;
 
-  // What looking at live pictures took in a cell, on its thread: told by who lights it, in each
-  // frame.
-  void looked(int column, int row, float ms) { cells_[index(column, row)].looks_ms = ms; }
-  // Of all cells, row by row, what that was of the last frame's time, which all threads share; 0
-  // of cells that are not kept.
+  // What finding a cell, and looking at live pictures in it, took on its thread.
+  struct CellTimes {
+    float find_ms = 0, look_ms = 0;
+  };
+  // Told by who renders it, in each frame.
+  void took(int column, int row, const CellTimes& times) {
+    cells_[index(column, row)].times = times;
+  }
+  // Of the last frame's time, which all threads share: that of looking, of all cells, row by row,
+  // and that of finding together.
   std::vector<float> looks_ms() const;
+  float finding_ms() const;
 
   CausticFollower& caustics() { return caustics_; }
   // Of each frame in turn.
@@ -115,7 +121,8 @@ class KeptTransport {
     std::unique_ptr<LitCell> lit;  // of that transport
     std::size_t bytes = 0;         // counted in bytes_
     int stage = none;
-    float looks_ms = 0;         // at live pictures, in the last frame
+    CellTimes times;            // in the last frame
+    std::size_t replaced = 0;   // bytes of a finer one in whose place it is
     int needs_pictures = none;  // the stage at which it was last found with them, for it had to be
   };
   std::size_t index(int column, int row) const {

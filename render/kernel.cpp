@@ -24,6 +24,7 @@ struct TileWorkspace::Impl {
   RelightWorkspace relight;
   CellPicture picture;
   CellPictures pictures;  // of the cell at work
+  KeptTransport::CellTimes times;
   std::array<Four, cell_pixels> plate;
 
   void render_cell(const FrameContext& frame, const TileView& tile, int x0, int y0);
@@ -202,17 +203,20 @@ bool is_broken_plate(const TileView& tile, int x0, int y0) {
   return broken;
 }
 
+template <class Work>
+void timed(float& ms, const Work& work) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  work();
+  ms = std::chrono::duration<float, std::milli>(Clock::now() - start).count();
+}
+
 // What the frame's live pictures do to a cell, to `pictures`. Returns whether they do anything.
 bool TileWorkspace::Impl::look(
     const FrameContext& frame, const CellTransport& cell, const TileView& tile, int x0, int y0) {
-  using Clock = std::chrono::steady_clock;
-  const bool tells = frame.inputs.kept && !frame.pictures.empty();
-  const Clock::time_point start = tells ? Clock::now() : Clock::time_point{};
-  const bool sees = looker.look(frame, cell, x0, y0, pictures, *tile.statistics);
-  if (tells) {
-    const std::chrono::duration<float, std::milli> taken = Clock::now() - start;
-    frame.inputs.kept->looked(x0 / cell_size, y0 / cell_size, taken.count());
-  }
+  bool sees = false;
+  const auto see = [&] { sees = looker.look(frame, cell, x0, y0, pictures, *tile.statistics); };
+  frame.pictures.empty() ? see() : timed(times.look_ms, see);
   return sees;
 }
 
@@ -265,13 +269,14 @@ void TileWorkspace::Impl::render_cell(const FrameContext& frame,
   const int stage = frame.stage_of(column, row);
   const CellTransport* kept = memory ? memory->find(column, row, stage) : nullptr;
   const bool counts = frame.inputs.count_rays;
+  times = {};
   if (kept && (!counts || !kept->counts.empty())) {
     write_kept(frame, *kept, tile, x0, y0);
     tile.statistics->kept_rays += kept->rays;
     if (counts) write_counts(*kept, tile, x0, y0);
   } else {
     load_plate(tile, x0, y0);
-    baker.bake(frame, stage, x0, y0, transport, *tile.statistics);
+    timed(times.find_ms, [&] { baker.bake(frame, stage, x0, y0, transport, *tile.statistics); });
     light(frame, transport, look(frame, transport, tile, x0, y0), *tile.statistics);
     if (counts) write_counts(transport, tile, x0, y0);
     // Found in a room of its own, which is as large as the largest needs: what is kept is not.
@@ -282,6 +287,7 @@ void TileWorkspace::Impl::render_cell(const FrameContext& frame,
     }
     write(frame, tile, x0, y0);
   }
+  if (memory) memory->took(column, row, times);
 }
 
 bool find_cell(const FrameContext& context,

@@ -18,9 +18,11 @@ constexpr double share_at_rest = 0.88;  // ... where nothing is found anew, and 
 // they should take less; not where looking takes less than a part of their time, nor any more once
 // that twice in a row brought hardly a part of what was foreseen, until looking takes otherwise.
 constexpr double share_when_late = 1, share_when_shed = 0.85, looks_that_matter = 0.05;
-constexpr double part_that_helps = 0.25, looks_that_differ = 0.25;
+constexpr double part_that_helps = 0.1, looks_that_differ = 0.25;
 constexpr int frames_to_tell = 8, most_in_vain = 2;
-constexpr double small_finding = 0.3;   // of a frame's time: what else it takes is told from it
+constexpr double least_gain = 0.25;  // of what is wanted: looks that are less are not worth it
+// Cells that show persons go on no more from that share of a frame's time on, others do.
+constexpr double share_for_persons = 0.75;
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
 constexpr double followed = 0.3;        // of what was measured last, in running means
 // What a cell takes at each stage, of the coarsest one's, as long as nothing better is known: as in
@@ -46,7 +48,8 @@ std::size_t stride_of(std::size_t cells) {
 
 // Where a cell goes back to that takes too long.
 std::uint8_t coarser(std::uint8_t stage) {
-  return static_cast<std::uint8_t>(stage > one_ray_stage ? one_ray_stage : stage - 1);
+  if (stage > anti_aliased) return one_ray_stage;
+  return static_cast<std::uint8_t>(std::min<int>(stage, one_ray_stage) - 1);
 }
 
 }  // namespace
@@ -98,7 +101,8 @@ std::size_t Sharpening::after(std::size_t stage, std::size_t coarse) const {
 
 // Lists the cells that go on, the coarsest first: in a live show all of them, for it is seen how
 // far the time goes; otherwise as many as `left` is the cost of.
-void Sharpening::go_on(double left) {
+void Sharpening::go_on(double left, std::span<const float> looks_ms) {
+  const bool persons_wait = live_ && looks_matter() && relight_ms_ > share_for_persons * frame_ms_;
   const std::vector<std::uint8_t>& stages = plan_.stages;
   const auto coarse = static_cast<std::size_t>(
       std::ranges::count_if(stages, [](std::uint8_t stage) { return stage < anti_aliased; }));
@@ -107,30 +111,38 @@ void Sharpening::go_on(double left) {
     const std::size_t to = after(stage, coarse);
     for (std::size_t turn = 0; turn < stages.size() && left > 0; ++turn) {
       const std::size_t i = turn * stride % stages.size();
-      if (stages[i] != stage) continue;
+      if (stages[i] != stage || (persons_wait && looks_much(looks_ms[i]))) continue;
       plan_.ahead.push_back({i, static_cast<std::uint8_t>(to)});
       if (!live_) left -= cost_[to];
     }
   }
 }
 
-bool Sharpening::looks_matter() const { return looks_ms_ > looks_that_matter * frame_ms_; }
+// Also where they did before cells became coarser for them.
+bool Sharpening::looks_matter() const {
+  return std::max(looks_ms_, shed_.before_ms) > looks_that_matter * frame_ms_;
+}
+// More than its part: all cells look a little.
+bool Sharpening::looks_much(float look_ms) const {
+  return look_ms * static_cast<double>(plan_.stages.size()) > looks_ms_;
+}
 
 // Cells that are to be coarser, for looking at persons in them makes frames late: those in which
 // that takes most.
 std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms) {
   if (!live_ || !looks_matter() || shed_.frames < frames_to_tell ||
-      relight_ms_ <= share_when_late * frame_ms_) {
+      mean_ms_ <= share_when_late * frame_ms_) {
     return {};
   }
   const bool same_looks = std::abs(looks_ms_ - shed_.looks_ms) < looks_that_differ * shed_.looks_ms;
   if (shed_.in_vain >= most_in_vain && same_looks) return {};
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < looks_ms.size(); ++i) {
-    if (looks_ms[i] > 0 && plan_.stages[i] > 0) order.push_back(i);
+    if (looks_much(looks_ms[i]) && plan_.stages[i] > 0) order.push_back(i);
   }
   std::ranges::stable_sort(order, std::greater(), [&](std::size_t i) { return looks_ms[i]; });
-  const double wanted_ms = relight_ms_ - share_when_shed * frame_ms_;
+  const double wanted_ms = mean_ms_ - share_when_shed * frame_ms_;
+  if (looks_ms_ < least_gain * wanted_ms) return {};
   double finding_ms = 0;
   std::size_t count = 0;
   shed_.before_ms = looks_ms_;
@@ -146,6 +158,7 @@ std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms)
 
 const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const float> looks_ms) {
   looks_ms_ = std::accumulate(looks_ms.begin(), looks_ms.end(), 0.0);
+  if (!(looks_ms_ > 0)) shed_ = {.frames = shed_.frames};
   constexpr int none = render::KeptTransport::none;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
@@ -179,7 +192,7 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<cons
   shed_.now = !shed.empty();
   for (const std::size_t i : shed) plan_.stages[i] = coarser(plan_.stages[i]);
   if (!full_) stopped_ = false;
-  if (!stopped_ && !shed_.now) go_on(left);
+  if (!stopped_ && !shed_.now) go_on(left, looks_ms);
   for (std::size_t i = 0; i < kept.size(); ++i) {
     if (kept[i] == none) plan_.stages[i] = static_cast<std::uint8_t>(first);
   }
@@ -207,27 +220,21 @@ void Sharpening::found_ahead(std::span<const std::uint8_t> stages, double ms) {
   learn(found, ms);
 }
 
-void Sharpening::took(double render_ms, bool full) {
+void Sharpening::took(double render_ms, double finding_ms, bool full) {
   full_ = full;
   stopped_ = stopped_ || (full && went_on_);
   if (!live_) return;
   if (shed_.now) {
-    // What that took, and what it brought, cannot be told apart.
     shed_.frames = 0;
-    return;
+    return;  // what that took is no cost of lost cells
   }
-  const double finding_ms = std::transform_reduce(
-      lost_.begin(), lost_.end(), cost_.begin(), 0.0, std::plus(),
-      [](std::size_t count, double cost) { return static_cast<double>(count) * cost; });
-  const bool known = std::ranges::any_of(timed_, std::identity());
-  // Where finding takes a small part, it is the rest that has changed.
-  if (finding_ms > 0 && (!known || finding_ms > small_finding * render_ms)) {
-    learn(lost_, std::max(render_ms - relight_ms_, 0.05 * render_ms));
-    return;
-  }
-  const double ms = render_ms - finding_ms;
+  const auto follow = [](double& mean, double ms) {
+    mean = mean > 0 ? mean + (ms - mean) * followed : ms;
+  };
+  learn(lost_, finding_ms);
   ++shed_.frames;
-  relight_ms_ = relight_ms_ > 0 ? relight_ms_ + (ms - relight_ms_) * followed : ms;
+  follow(relight_ms_, std::max(render_ms - finding_ms, 0.0));
+  follow(mean_ms_, render_ms);
 }
 
 double Sharpening::share() const {
@@ -285,7 +292,7 @@ void render_sharpening(Sharpening& sharpening,
   render::render_frame(*frame, plate, result);
   result.statistics += ahead;
   const Milliseconds all_ms = Clock::now() - start;
-  sharpening.took((all_ms - ahead_ms).count(), inputs.kept->is_full());
+  sharpening.took((all_ms - ahead_ms).count(), inputs.kept->finding_ms(), inputs.kept->is_full());
 }
 
 }  // namespace studio

@@ -41,8 +41,9 @@ class Sharpening {
   const SharpeningPlan& next(std::span<const int> kept, std::span<const float> looks_ms = {});
   // The frame's stages with what was found ahead, and what that took.
   void found_ahead(std::span<const std::uint8_t> stages, double ms);
-  // What rendering the frame took then, and whether what it found could not all be kept.
-  void took(double render_ms, bool full);
+  // What rendering the frame took then, what of that finding cells did, and whether what it found
+  // could not all be kept.
+  void took(double render_ms, double finding_ms, bool full);
   // Of the last frame: 0 = coarse, 1 = as the effort asks.
   double share() const;
   // Whether the last frame is not as sharp as the effort asks, and stays so until something moves,
@@ -59,8 +60,9 @@ class Sharpening {
   double time_to_go_on(bool at_rest) const;
   std::size_t after(std::size_t stage, std::size_t coarse) const;
   std::size_t stage_of_lost(std::size_t lost) const;
-  void go_on(double left);
+  void go_on(double left, std::span<const float> looks_ms);
   bool looks_matter() const;
+  bool looks_much(float look_ms) const;
   std::vector<std::size_t> too_costly(std::span<const float> looks_ms);
   void learn(const ByStage<std::size_t>& found, double ms);
 
@@ -77,7 +79,8 @@ class Sharpening {
   };
   Shed shed_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
-  double relight_ms_ = 0;                // a frame that finds no cell anew
+  double relight_ms_ = 0;                // a frame but for the cells that it finds anew
+  double mean_ms_ = 0;                   // all of it
   ByStage<double> cost_;                 // of a cell: live in ms, once one was timed
   ByStage<bool> timed_{};                // whether that is more than a guess
   SharpeningPlan plan_;

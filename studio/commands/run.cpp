@@ -266,6 +266,7 @@ void run(const RunOptions& options, Console& console) {
       last = shown;
     });
   } catch (const std::exception&) {
+    warnings.tell_rest(*show.status());
     write_figures_so_far(set, *show.status(), console);
     throw;
   }
