@@ -65,11 +65,11 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
 double Sharpening::rest_ms(bool at_rest) const {
   if (std::ranges::none_of(timed_, std::identity())) return 0;
   const double share = at_rest ? share_at_rest : share_of_frame;
-  return std::max(share * frame_ms_ - relight_ms_, share_at_least * frame_ms_);
+  return std::max(share * frame_ms_ - relight_ms(), share_at_least * frame_ms_);
 }
 double Sharpening::time_to_go_on(bool at_rest) const {
   if (!looks_matter()) return rest_ms(at_rest);
-  return std::clamp(share_at_rest * frame_ms_ - relight_ms_, 0.0, rest_ms(at_rest));
+  return std::clamp(share_at_rest * frame_ms_ - relight_ms(), 0.0, rest_ms(at_rest));
 }
 
 // What is found anew is as fine at once as there is time for.
@@ -102,7 +102,7 @@ std::size_t Sharpening::after(std::size_t stage, std::size_t coarse) const {
 // Lists the cells that go on, the coarsest first: in a live show all of them, for it is seen how
 // far the time goes; otherwise as many as `left` is the cost of.
 void Sharpening::go_on(double left, std::span<const float> looks_ms) {
-  const bool persons_wait = live_ && looks_matter() && relight_ms_ > share_for_persons * frame_ms_;
+  const bool persons_wait = live_ && looks_matter() && relight_ms() > share_for_persons * frame_ms_;
   const std::vector<std::uint8_t>& stages = plan_.stages;
   const auto coarse = static_cast<std::size_t>(
       std::ranges::count_if(stages, [](std::uint8_t stage) { return stage < anti_aliased; }));
@@ -131,7 +131,7 @@ bool Sharpening::looks_much(float look_ms) const {
 // that takes most.
 std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms) {
   if (!live_ || !looks_matter() || shed_.frames < frames_to_tell ||
-      mean_ms_ <= share_when_late * frame_ms_) {
+      mean_ms() <= share_when_late * frame_ms_) {
     return {};
   }
   const bool same_looks = std::abs(looks_ms_ - shed_.looks_ms) < looks_that_differ * shed_.looks_ms;
@@ -141,7 +141,7 @@ std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms)
     if (looks_much(looks_ms[i]) && plan_.stages[i] > 0) order.push_back(i);
   }
   std::ranges::stable_sort(order, std::greater(), [&](std::size_t i) { return looks_ms[i]; });
-  const double wanted_ms = mean_ms_ - share_when_shed * frame_ms_;
+  const double wanted_ms = mean_ms() - share_when_shed * frame_ms_;
   if (looks_ms_ < least_gain * wanted_ms) return {};
   double finding_ms = 0;
   std::size_t count = 0;
@@ -159,6 +159,7 @@ std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms)
 const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const float> looks_ms) {
   looks_ms_ = std::accumulate(looks_ms.begin(), looks_ms.end(), 0.0);
   if (!(looks_ms_ > 0)) shed_ = {.frames = shed_.frames};
+  follow_last_frame();
   constexpr int none = render::KeptTransport::none;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
@@ -228,13 +229,22 @@ void Sharpening::took(double render_ms, double finding_ms, bool full) {
     shed_.frames = 0;
     return;  // what that took is no cost of lost cells
   }
-  const auto follow = [](double& mean, double ms) {
-    mean = mean > 0 ? mean + (ms - mean) * followed : ms;
-  };
   learn(lost_, finding_ms);
+  told_ = {render_ms - finding_ms, render_ms};
+}
+
+// Means of what a frame takes but for looks, of which the last ones count: when a person comes, it
+// is known at once what that takes.
+void Sharpening::follow_last_frame() {
+  if (!told_) return;
+  const auto follow = [&](double& mean, double ms) {
+    const double rest = std::max(ms - looks_ms_, 0.0);
+    mean = mean > 0 ? mean + (rest - mean) * followed : rest;
+  };
+  follow(relight_but_looks_ms_, told_->relight_ms);
+  follow(all_but_looks_ms_, told_->render_ms);
   ++shed_.frames;
-  follow(relight_ms_, std::max(render_ms - finding_ms, 0.0));
-  follow(mean_ms_, render_ms);
+  told_.reset();
 }
 
 double Sharpening::share() const {

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -58,6 +59,10 @@ class Sharpening {
 
   double rest_ms(bool at_rest) const;
   double time_to_go_on(bool at_rest) const;
+  void follow_last_frame();
+  // What a frame takes that finds no cell anew; and what frames do.
+  double relight_ms() const { return relight_but_looks_ms_ + looks_ms_; }
+  double mean_ms() const { return all_but_looks_ms_ + looks_ms_; }
   std::size_t after(std::size_t stage, std::size_t coarse) const;
   std::size_t stage_of_lost(std::size_t lost) const;
   void go_on(double left, std::span<const float> looks_ms);
@@ -72,17 +77,21 @@ class Sharpening {
   // Cells that became coarser for these.
   struct Shed {
     bool now = false;                       // in this frame
-    int frames = 0;                         // since, that told `relight_ms_`
+    int frames = 0;                         // so many frames ago
     double before_ms = 0, foreseen_ms = 0;  // that looks took, and by how much it should be less
     int in_vain = 0;                        // so often in a row it was not
     double looks_ms = 0;                    // then
   };
   Shed shed_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
-  double relight_ms_ = 0;                // a frame but for the cells that it finds anew
-  double mean_ms_ = 0;                   // all of it
-  ByStage<double> cost_;                 // of a cell: live in ms, once one was timed
-  ByStage<bool> timed_{};                // whether that is more than a guess
+  // Of the last frame, where none of its cells was shed.
+  struct Told {
+    double relight_ms, render_ms;
+  };
+  std::optional<Told> told_;
+  double relight_but_looks_ms_ = 0, all_but_looks_ms_ = 0;
+  ByStage<double> cost_;   // of a cell: live in ms, once one was timed
+  ByStage<bool> timed_{};  // whether that is more than a guess
   SharpeningPlan plan_;
   ByStage<std::size_t> lost_{};  // cells of the last frame that were lost, by where they began
   bool went_on_ = false;         // whether any other was found anew
