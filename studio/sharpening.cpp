@@ -14,8 +14,8 @@ using render::finished_stage, render::one_ray_stage;
 
 constexpr double share_of_frame = 0.7;  // of its time, for rendering
 constexpr double share_at_rest = 0.88;  // ... where nothing is found anew, and cells can wait
-// Frames that took more than all of their time in the mean of so many make cells coarser, until
-// they should take less; not where looking takes less than a part of their time, nor any more once
+// So many frames that are late, more than others, make cells coarser, until they should take less
+// in the mean; not where looking takes less than a part of their time, nor any more once
 // that twice in a row brought hardly a part of what was foreseen, until looking takes otherwise.
 constexpr double share_when_late = 1, share_when_shed = 0.85, looks_that_matter = 0.05;
 constexpr double part_that_helps = 0.1, looks_that_differ = 0.25;
@@ -130,7 +130,7 @@ bool Sharpening::looks_much(float look_ms) const {
 // Cells that are to be coarser, for looking at persons in them makes frames late: those in which
 // that takes most.
 std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms) {
-  if (!live_ || !looks_matter() || shed_.frames < frames_to_tell ||
+  if (!live_ || !looks_matter() || shed_.late < frames_to_tell ||
       mean_ms() <= share_when_late * frame_ms_) {
     return {};
   }
@@ -158,7 +158,8 @@ std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms)
 
 const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const float> looks_ms) {
   looks_ms_ = std::accumulate(looks_ms.begin(), looks_ms.end(), 0.0);
-  if (!(looks_ms_ > 0)) shed_ = {.frames = shed_.frames};
+  if (!(looks_ms_ > 0)) shed_ = {};
+  const bool told = told_.has_value();
   follow_last_frame();
   constexpr int none = render::KeptTransport::none;
   plan_.stages.resize(kept.size());
@@ -183,7 +184,7 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<cons
   std::ranges::transform(kept, plan_.stages.begin(), [](int stage) {
     return static_cast<std::uint8_t>(stage == none ? finished_stage : stage);
   });
-  if (shed_.foreseen_ms > 0 && shed_.frames > 0) {
+  if (shed_.foreseen_ms > 0 && told) {
     const bool helped = shed_.before_ms - looks_ms_ > part_that_helps * shed_.foreseen_ms;
     shed_.in_vain = helped ? 0 : shed_.in_vain + 1;
     shed_.looks_ms = looks_ms_;
@@ -226,7 +227,7 @@ void Sharpening::took(double render_ms, double finding_ms, bool full) {
   stopped_ = stopped_ || (full && went_on_);
   if (!live_) return;
   if (shed_.now) {
-    shed_.frames = 0;
+    shed_.late = 0;
     return;  // what that took is no cost of lost cells
   }
   learn(lost_, finding_ms);
@@ -243,7 +244,8 @@ void Sharpening::follow_last_frame() {
   };
   follow(relight_but_looks_ms_, told_->relight_ms);
   follow(all_but_looks_ms_, told_->render_ms);
-  ++shed_.frames;
+  const bool late = told_->render_ms > share_when_late * frame_ms_;
+  shed_.late = std::clamp(shed_.late + (late ? 1 : -1), 0, frames_to_tell);
   told_.reset();
 }
 

@@ -77,7 +77,7 @@ class Sharpening {
   // Cells that became coarser for these.
   struct Shed {
     bool now = false;                       // in this frame
-    int frames = 0;                         // so many frames ago
+    int late = 0;                           // frames since, less those that were not
     double before_ms = 0, foreseen_ms = 0;  // that looks took, and by how much it should be less
     int in_vain = 0;                        // so often in a row it was not
     double looks_ms = 0;                    // then

@@ -86,6 +86,14 @@ struct MadeMachine {
   }
 };
 
+// All cells are finished, and a person may come before some.
+MadeMachine sharp_before_a_person(Sharpening& sharpening) {
+  MadeMachine machine{0.1};
+  machine.late_of(200, sharpening);
+  machine.person_begin = 300, machine.person_end = 500;
+  return machine;
+}
+
 TEST(Sharpening, IsDoneWithinASecondOfFrames) {
   Sharpening sharpening({25, 1}, false);
   std::vector<int> kept(cells, none);
@@ -225,9 +233,7 @@ TEST(Sharpening, GoesOnWherePersonsAreNot) {
 // it.
 TEST(Sharpening, KnowsWhatFindingTakesWhilePersonsMakeFramesLate) {
   Sharpening sharpening({25, 1}, true);
-  MadeMachine machine{0.1};
-  machine.late_of(200, sharpening);
-  machine.person_begin = 300, machine.person_end = 500;
+  MadeMachine machine = sharp_before_a_person(sharpening);
   machine.look_ms = 0.15;
   machine.late_of(50, sharpening);
   machine.look_ms = 0;
@@ -241,9 +247,7 @@ TEST(Sharpening, KnowsWhatFindingTakesWhilePersonsMakeFramesLate) {
 // Not where that helps nothing: looking takes next to nothing, or the same in coarse cells.
 TEST(Sharpening, StaysWhereGoingBackWouldNotHelp) {
   Sharpening sharpening({25, 1}, true);
-  MadeMachine machine{0.1};
-  machine.late_of(200, sharpening);
-  machine.person_begin = 300, machine.person_end = 500;
+  MadeMachine machine = sharp_before_a_person(sharpening);
   machine.look_ms = 1e-3;
   machine.rest_ms = 42;
   machine.late_of(300, sharpening);
@@ -255,12 +259,23 @@ TEST(Sharpening, StaysWhereGoingBackWouldNotHelp) {
   EXPECT_GT(machine.share_of_person(), 0.3);
 }
 
+// One frame that takes long is no reason.
+TEST(Sharpening, StaysWhereOneFrameIsLate) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine = sharp_before_a_person(sharpening);
+  machine.look_ms = 0.05;
+  machine.late_of(50, sharpening);
+  for (const double rest_ms : {1000.0, 3.0}) {
+    machine.rest_ms = rest_ms;
+    machine.late_of(rest_ms > 3 ? 1 : 20, sharpening);
+    EXPECT_EQ(machine.share_of_person(), 1);
+  }
+}
+
 // Frames are late for looks and for other things: what can be had is, and it ends.
 TEST(Sharpening, GoesBackNoFurtherThanHelps) {
   Sharpening sharpening({25, 1}, true);
-  MadeMachine machine{0.1};
-  machine.late_of(200, sharpening);
-  machine.person_begin = 300, machine.person_end = 500;
+  MadeMachine machine = sharp_before_a_person(sharpening);
   machine.look_ms = 0.1;
   machine.rest_ms = 60;
   machine.late_of(600, sharpening);
