@@ -44,18 +44,6 @@ struct CleanPlate {
 // there are no frames, sizes differ, or a frame is not (height, width, 3).
 CleanPlate average_plate(std::span<const capture::Image> frames);
 
-// The same from footage in which the person never leaves: for each pixel the upper quartile of
-// those frames that show the screen there, and where none does, what surrounds it. `known` tells
-// the share that was seen. `colour` as the footage's most saturated large colour if not given.
-// Frames as above; of more than 96, some that are spread over all.
-CleanPlate plate_from_footage(std::span<const capture::Image> frames);
-CleanPlate plate_from_footage(std::span<const capture::Image> frames, ScreenColour colour);
-
-// The same of any still background, from footage in which the person moves: of each pixel the
-// median over the frames. `known` tells the share of pixels in which most frames are near it.
-// Frames as above.
-CleanPlate background_from_footage(std::span<const capture::Image> frames);
-
 // Takes the noise out of a screen's light, which is smooth, in place: mean over a box of 5x5
 // pixels, cut at the borders. (height, width, 3).
 void blur_screen(capture::Image& light);

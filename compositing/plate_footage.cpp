@@ -225,22 +225,4 @@ CleanPlate average_plate(std::span<const Image> frames) {
   return shots.average();
 }
 
-CleanPlate plate_from_footage(std::span<const Image> frames) {
-  PlateFootage footage;
-  for (const Image& frame : frames) footage.add(frame);
-  return footage.screen();
-}
-
-CleanPlate plate_from_footage(std::span<const Image> frames, ScreenColour colour) {
-  PlateFootage footage;
-  for (const Image& frame : frames) footage.add(frame);
-  return footage.screen(colour);
-}
-
-CleanPlate background_from_footage(std::span<const Image> frames) {
-  PlateFootage footage;
-  for (const Image& frame : frames) footage.add(frame);
-  return footage.background();
-}
-
 }  // namespace compositing

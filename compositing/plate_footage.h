@@ -41,10 +41,13 @@ class PlateFootage {
   // How many there were.
   std::size_t count() const { return count_; }
 
-  // As plate_from_footage() and background_from_footage(). Throw std::invalid_argument if there was
-  // no frame.
+  // For each pixel the upper quartile of those frames that show the screen there, and where none
+  // does, what surrounds it. `known` tells the share that was seen. The colour is the footage's
+  // most saturated large one if not given. Throws std::invalid_argument if there was no frame.
   CleanPlate screen() const;
   CleanPlate screen(ScreenColour colour) const;
+  // The same of any still background: of each pixel the median. `known` tells the share of pixels
+  // in which most frames are near it.
   CleanPlate background() const;
 
  private:

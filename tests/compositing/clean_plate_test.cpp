@@ -102,13 +102,13 @@ TEST(AveragePlate, RefusesShotsOfTwoSizesAndNone) {
   EXPECT_THROW(average_plate({}), std::invalid_argument);
 }
 
-TEST(PlateFromFootage, FindsTheScreenBehindAPersonWhoNeverLeaves) {
+TEST(PlateFootage, FindsTheScreenBehindAPersonWhoNeverLeaves) {
   MadeScene scene = made_scene("uneven");
   scene.walk = 3;
   const MadeClip clip(scene, 4, 135, 240);
-  std::vector<Image> frames;
-  for (int i = 0; i < 36; i += 3) frames.push_back(light_of(clip.frame(i).seen));
-  const CleanPlate plate = plate_from_footage(frames);
+  PlateFootage frames;
+  for (int i = 0; i < 36; i += 3) frames.add(light_of(clip.frame(i).seen));
+  const CleanPlate plate = frames.screen();
   EXPECT_EQ(plate.colour, ScreenColour::green);
   EXPECT_LT(plate.known, 0.95F);  // the middle of the person was never left
   const Image bare = average_plate(shots_of(clip, 6)).light;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,10 +14,17 @@
 #include "compositing/keyer.h"
 #include "compositing/made_clip.h"
 #include "compositing/made_video_camera.h"
+#include "compositing/plate_footage.h"
 #include "tests/made_files.h"
 
 namespace compositing::real_screens_test {
 namespace {
+
+PlateFootage footage_of(std::span<const capture::Image> frames) {
+  PlateFootage footage;
+  for (const capture::Image& frame : frames) footage.add(frame);
+  return footage;
+}
 
 using capture::Image;
 
@@ -143,7 +151,7 @@ TEST(RealScreens, TheDancersEdgesAreCleanAndHisBodyWhole) {
   KeySettings settings;
   settings.core = 0.7F;  // his flag is a pale yellow
   settings.despill = 2;
-  const EdgeAndCore found = measure_clip(frames, plate_from_footage(frames), settings);
+  const EdgeAndCore found = measure_clip(frames, footage_of(frames).screen(), settings);
   RecordProperty("excess", std::to_string(found.excess));
   RecordProperty("holes", std::to_string(found.holes));
   EXPECT_LE(found.excess, 0.01) << found.holes;
@@ -160,7 +168,7 @@ TEST(RealScreens, AYellowWallsEdgesAreCleanAndThePersonWhole) {
     if (number <= 1206 || (number >= 1296 && number <= 1310)) bare.push_back(all[i]);
     if (number >= 1350) frames.push_back(all[i]);
   }
-  const CleanPlate plate = plate_from_footage(bare, ScreenColour::yellow);
+  const CleanPlate plate = footage_of(bare).screen(ScreenColour::yellow);
   KeySettings settings;
   settings.core = 0.64F;
   settings.screen = 0.1F;  // the wall shows the blocks of a low rate
