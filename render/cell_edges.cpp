@@ -19,9 +19,8 @@ constexpr Scene::Surface no_hit{~0U, ~0U};
 // Where each sample sends on so many rays, as behind ribbed glass, a pixel takes no more samples.
 constexpr int many_rays = 10, most_samples_of_many_rays = 256;
 constexpr float alike_mirrors = 0.99F;  // cosine between normals: what they mirror is alike
-// Of so few further samples, the one in the middle of the pattern would be the centre's once more.
+// Of so few further samples, the one nearest to the middle would be all but the centre's once more.
 constexpr int few_samples = 4;
-constexpr int pattern_middle = 1;
 constexpr std::size_t own_centre = 4;  // of a pixel's neighbours, row by row
 constexpr float blend_parts = 1024;    // of a blend of neighbours, in whole numbers
 // Steps of light across the corner of a pixel from one surface to another matter, in terms of those
@@ -282,7 +281,7 @@ bool CellBaker::bent_mirror(std::size_t k, const Met& here, const Met& there) co
 int CellBaker::neighbour_of(int index, const Further& f) const {
   const Met here = met_at(index);
   const int px = f.pixel % cell_size, py = f.pixel / cell_size;
-  const auto& offset = frame_->pattern[f.index];
+  const auto& offset = frame_->pattern->places[f.index];
   const bool shares_all = edge_[f.pixel] == Edge::surface && !smooths_;
   float best = 1e9F;
   int found = -1;
@@ -418,6 +417,8 @@ void CellBaker::end_batch() {
 // middle. Pixels that are still uncertain take more, three times as many as they have, and again.
 void CellBaker::sample_edges() {
   const bool takes_centre = effort_.aa_samples <= few_samples;
+  const SamplePattern& pattern = *frame_->pattern;
+  const int left_out = takes_centre ? std::min(pattern.middle, effort_.aa_samples - 1) : -1;
   mirrors_ = {};
   if (past_pictures_) keep_distances();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
@@ -442,11 +443,11 @@ void CellBaker::sample_edges() {
       if (!(chosen[k / 64] >> (k % 64) & 1)) continue;
       const int x = static_cast<int>(k % cell_size), y = static_cast<int>(k / cell_size);
       for (int i = first; i < end; ++i) {
-        if (takes_centre && i == pattern_middle) continue;
+        if (i == left_out) continue;
         further_[static_cast<std::size_t>(count)] = {static_cast<std::uint16_t>(k),
                                                      static_cast<std::uint16_t>(i)};
-        set_camera_ray(
-            count, direction_in(x0_ + x, y0_ + y, frame_->pattern[static_cast<std::size_t>(i)]));
+        set_camera_ray(count,
+                       direction_in(x0_ + x, y0_ + y, pattern.places[static_cast<std::size_t>(i)]));
         if (++count == stream_rays) {
           finish_further(count);
           count = 0;

@@ -201,24 +201,6 @@ void add_caustics(FrameContext& context, LightTable& planned) {
   }
 }
 
-// Places in a pixel, -.5..+.5: every first 4^n of them are spread well (Sobol's sequence).
-std::array<std::array<float, 2>, samples_max> sample_pattern() {
-  std::array<std::array<float, 2>, samples_max> pattern;
-  for (std::uint32_t i = 0; i < samples_max; ++i) {
-    std::uint32_t x = 0, y = 0;
-    std::uint32_t column = 1U << 31;
-    for (std::uint32_t bits = i, place = 1U << 31; bits != 0; bits >>= 1, place >>= 1) {
-      if (bits & 1) x |= place, y ^= column;
-      column ^= column >> 1;
-    }
-    const auto middle = [](std::uint32_t v) {
-      return (static_cast<float>(v >> 22) + 0.5F) / samples_max - 0.5F;
-    };
-    pattern[i] = {middle(x), middle(y)};
-  }
-  return pattern;
-}
-
 // The plate, and its halves until the shorter side is 1 pixel. Of odd sides the last row, or
 // column, is left out.
 std::vector<capture::Image> plate_levels_of(const capture::HalfImage& plate) {
@@ -408,7 +390,7 @@ FrameContext make_frame_context(const FrameInputs& inputs, const FrameJob& job) 
       context.compact.push_back(static_cast<std::uint32_t>(i));
     }
   }
-  context.pattern = sample_pattern();
+  context.pattern = &sample_pattern();
   add_camera(context);
   auto planned_table = std::make_shared<LightTable>(as_planned(job.lights));
   add_caustics(context, *planned_table);

@@ -13,12 +13,11 @@
 #include "render/ray_log.h"
 #include "render/refinement.h"
 #include "render/renderer.h"
+#include "render/sample_pattern.h"
 #include "render/shader.h"
 #include "render/soft_lights.h"
 
 namespace render {
-
-inline constexpr int samples_max = 1024;  // camera rays in one pixel
 
 // What all tiles of one frame share, made once per frame.
 struct FrameContext {
@@ -52,8 +51,7 @@ struct FrameContext {
   std::optional<calibrate::Lens> lens;
   std::vector<std::size_t> first_video_levels;  // of each live texture, in `levels`
   float brightest_video = 0;  // radiance of a live texture's white, where it is brightest
-  // Places of further camera rays in a pixel, -0.5 to 0.5.
-  std::array<std::array<float, 2>, samples_max> pattern;
+  const SamplePattern* pattern = nullptr;
   CameraTurn turn;
   Vec3f camera;           // its position in the set
   float pixel_angle = 0;  // radians across a pixel at the picture's centre
