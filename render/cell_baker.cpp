@@ -207,7 +207,6 @@ void CellBaker::turn_camera_rays(int count) {
 }
 
 void CellBaker::trace_centres() {
-  const auto& table = *frame_->inputs.directions;
   const bool has_foreground = !transport_->foreground.empty();
   inside_ = {};
   // 4x4 blocks one after the other: coherent for Embree, and each stream is exactly one cell.
@@ -216,8 +215,9 @@ void CellBaker::trace_centres() {
     const bool in = transport_->blocks.has_ray(x, y);
     const bool sees = in && !(has_foreground && is_behind_foreground(x, y));
     if (sees) {
-      const std::size_t t = table.index(y0_ + y, x0_ + x);
-      set_camera_ray(i, {table.x[t], table.y[t], table.z[t]});
+      const CellTransport::Blocks& blocks = transport_->blocks;
+      set_camera_ray(i, direction_in(x0_ + x, y0_ + y,
+                                     {blocks.off(x, blocks.columns), blocks.off(y, blocks.rows)}));
     } else {
       set_camera_ray(i, {});
     }

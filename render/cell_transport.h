@@ -170,8 +170,13 @@ struct CellTransport {
     int size = 1;                               // pixels a side
     int columns = cell_size, rows = cell_size;  // of the cell's pixels that are in the picture
 
-    // The pixel that stands for its block: one next to the middle.
+    // The pixel that has the ray of its block: one next to the middle, through which it goes.
     int middle(int i, int end) const { return std::min(i - i % size + (size - 1) / 2, end - 1); }
+    // How far the block's middle is from that pixel's.
+    float off(int i, int end) const {
+      const int first = i - i % size, last = std::min(first + size, end) - 1;
+      return 0.5F * static_cast<float>(first + last) - static_cast<float>(middle(i, end));
+    }
     bool has_ray(int x, int y) const {
       return x < columns && y < rows && middle(x, columns) == x && middle(y, rows) == y;
     }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <vector>
@@ -118,26 +119,44 @@ TEST(Refinement, BringsThePictureNearerToTheFinishedOneInEveryStage) {
   }
 }
 
+// The middle of what is covered, in pixels, and how much that is.
+std::array<double, 3> middle_of_cover(const FrameResult& result) {
+  std::array<double, 3> sums{};
+  for (int y = 0; y < result.rgba.height; ++y) {
+    for (int x = 0; x < result.rgba.width; ++x) {
+      const double cover = capture::float_from_half(result.rgba.pixels[result.rgba.index(y, x, 3)]);
+      sums[0] += x * cover, sums[1] += y * cover, sums[2] += cover;
+    }
+  }
+  return {sums[0] / sums[2], sums[1] / sums[2], sums[2]};
+}
+
 // Where pixels share a camera ray, also in cells that the picture's border cuts, each shows its own
-// plate and what its block's ray met.
+// plate and what its block's ray met, which goes through the block's middle: nothing is moved.
 TEST(Refinement, SharesARayInBlocks) {
   const MadeShot shot = made_shot(90, 61, shot_scene());
   const FrameResult fine = render_at(shot, all_at(render::one_ray_stage));
+  const auto where = middle_of_cover(fine);
   for (int stage = 0; stage < render::one_ray_stage; ++stage) {
     const int size = render::block_of_stage(stage);
     const FrameResult coarse = render_at(shot, all_at(stage));
     int covered = 0;
     for (int y = 0; y < 61; ++y) {
       for (int x = 0; x < 90; ++x) {
-        const int from_x = std::min(x - x % size + (size - 1) / 2, 89);
-        const int from_y = std::min(y - y % size + (size - 1) / 2, 60);
-        const auto at = coarse.rgba.index(y, x, 3), from = fine.rgba.index(from_y, from_x, 3);
-        ASSERT_EQ(coarse.rgba.pixels[at], fine.rgba.pixels[from]) << x << ' ' << y;
+        const auto at = coarse.rgba.index(y, x, 3);
+        const auto first = coarse.rgba.index(y - y % size, x - x % size, 3);
+        ASSERT_EQ(coarse.rgba.pixels[at], coarse.rgba.pixels[first]) << x << ' ' << y;
         covered += coarse.rgba.pixels[at] != 0;
       }
     }
     EXPECT_GT(covered, 200);
     EXPECT_LT(covered, 90 * 61 - 200);
+    if (size > 4) continue;  // which miss whole things
+    const auto [x, y, cover] = middle_of_cover(coarse);
+    const double near = 0.1 * size;
+    EXPECT_NEAR(x, where[0], near) << size;
+    EXPECT_NEAR(y, where[1], near) << size;
+    EXPECT_NEAR(cover / where[2], 1, 0.02 * size) << size;
   }
   EXPECT_EQ(render::block_of_stage(render::one_ray_stage), 1);
 }
