@@ -413,7 +413,7 @@ void CellBaker::end_batch() {
 
 // More camera rays in pixels that an edge crosses. While edges are only smoothed, these are edges
 // of things alone, and nearly all of the rays show what a centre beside them does. The centre's own
-// sample makes room for them; at a stage of few rays it is the one of them that goes through the
+// sample makes room for them; at a stage of few rays it takes the place of the one nearest to the
 // middle. Pixels that are still uncertain take more, three times as many as they have, and again.
 void CellBaker::sample_edges() {
   const bool takes_centre = effort_.aa_samples <= few_samples;

@@ -140,18 +140,32 @@ TEST(Refinement, SharesARayInBlocks) {
   for (int stage = 0; stage < render::one_ray_stage; ++stage) {
     const int size = render::block_of_stage(stage);
     const FrameResult coarse = render_at(shot, all_at(stage));
-    int covered = 0;
+    int covered = 0, alike = 0, differ = 0;
     for (int y = 0; y < 61; ++y) {
       for (int x = 0; x < 90; ++x) {
         const auto at = coarse.rgba.index(y, x, 3);
         const auto first = coarse.rgba.index(y - y % size, x - x % size, 3);
         ASSERT_EQ(coarse.rgba.pixels[at], coarse.rgba.pixels[first]) << x << ' ' << y;
         covered += coarse.rgba.pixels[at] != 0;
+        // The block's ray goes between this pixel and those beside and below it.
+        const bool has_ray = x % size == (size - 1) / 2 && y % size == (size - 1) / 2;
+        if (!has_ray || x + 1 == 90 || y + 1 == 61) continue;
+        const auto cover = [&](int row, int column) {
+          return fine.rgba.pixels[fine.rgba.index(row, column, 3)];
+        };
+        if (cover(y, x) != cover(y, x + 1) || cover(y, x) != cover(y + 1, x) ||
+            cover(y, x) != cover(y + 1, x + 1)) {
+          continue;
+        }
+        ++alike;
+        differ += coarse.rgba.pixels[at] != cover(y, x);
       }
     }
     EXPECT_GT(covered, 200);
     EXPECT_LT(covered, 90 * 61 - 200);
-    if (size > 4) continue;  // which miss whole things
+    EXPECT_GT(alike, 90 * 61 / (2 * size * size)) << size;
+    EXPECT_LE(differ, 2) << size;  // where things part between pixels
+    if (size > 4) continue;        // which miss whole things
     const auto [x, y, cover] = middle_of_cover(coarse);
     const double near = 0.1 * size;
     EXPECT_NEAR(x, where[0], near) << size;
