@@ -98,6 +98,9 @@ bool CellBaker::find(int stage, bool past_pictures) {
   counts_.fill(0);
   lender_.fill(-1);
   queue_.clear();
+  cut_rays_.clear();
+  rough_lobes_.fill({});
+  open_lobes_.fill({});
   lamp_terms_.clear();
   places_.clear();
   most_lights_ = most_places_ = enough_terms;
@@ -285,6 +288,8 @@ void CellBaker::shade_points(int count, bool grid) {
     }
   });
   receive(count, grid);
+  if (grid) find_open_lobes();
+  take_from_environment();
   const auto& instances = frame_->inputs.scene->description().instances;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     ShadePoint& p = points_[i];

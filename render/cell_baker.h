@@ -71,11 +71,32 @@ class CellBaker final : public RaySink {
     bool lamps_apart;  // and so are the lamps that it mirrors: it does not see what glows by them
     bool beyond_cut;   // followed by chance: what is straight on is counted, for all that are not
     bool first;        // that a centre sent on, or the brightest of several
+    bool asks;         // it is cut, and only asks whether anything is in its way
+    bool rough;        // in a lobe of whose light `open_lobes_` tells
     std::uint32_t path;
     Media media;
-    // Of a ray that is cut, and only asks whether anything is in its way: what that is taken for,
-    // as radiance per irradiance. Of others zero.
-    Vec3f surroundings;
+  };
+
+  // What a ray that is not followed takes of the environment, once it is known how much of its
+  // light its point gets.
+  struct CutRay {
+    Vec3f sees, throughput;
+    Spread cone;
+    float roughness;
+    std::uint16_t point;
+    bool one_of_many, rough;  // as QueuedRay's
+  };
+
+  // What a centre sees of the light in its rough lobe, as the table's lights tell: the share that
+  // nothing hides, and from how many lights that is known; 0: not at all.
+  struct OpenLobe {
+    float share = 1, lights = 0;
+
+    // One ray in the middle of the lobe tells as much as `lights_of_ray`.
+    float share_with(float of_ray) const {
+      constexpr float lights_of_ray = 4;
+      return (share * lights + of_ray * lights_of_ray) / (lights + lights_of_ray);
+    }
   };
 
   // A lobe, whose compact light waits until it is known who sees which.
@@ -259,6 +280,13 @@ class CellBaker final : public RaySink {
   void bounce();
   void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
 
+  // cell_open_lobes.cpp
+  void note_rough_lobe(const ShadePoint& from, const NewRay& ray);
+  OpenLobe open_lobe(std::size_t rough, std::size_t word, std::uint64_t members) const;
+  void find_open_lobes();
+  void take_from_environment();
+  void add_surroundings(std::size_t slot, std::size_t target, std::size_t pixel, Vec3f weight);
+
   // cell_mirrored.cpp
   void choose_first();
   CellMask find_mirrored(int count, std::span<const std::uint8_t> glossy);
@@ -434,8 +462,17 @@ class CellBaker final : public RaySink {
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;
-  std::vector<Vec3f> compact_shares_;    // (compact light, centre): what glass lets by; none = all
-  std::vector<QueuedRay> queue_;         // capacity reserved
+  std::vector<Vec3f> compact_shares_;  // (compact light, centre): what glass lets by; none = all
+  std::vector<QueuedRay> queue_;       // capacity reserved
+  std::vector<CutRay> cut_rays_;
+  // Of centres, the roughest of their lobes: its place among the points, or nowhere.
+  struct RoughLobe {
+    std::uint16_t point = nowhere;
+    float roughness = 0;
+    Vec3f normal{};
+  };
+  std::array<RoughLobe, cell_pixels> rough_lobes_;
+  std::array<OpenLobe, cell_pixels> open_lobes_;
   LookUp looked_up_{};                   // last, in this cell
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
   std::uint32_t pushed_ = 0;

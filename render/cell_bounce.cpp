@@ -26,26 +26,20 @@ void CellBaker::mark_passed(std::size_t count) {
   }
 }
 
-// What a cut ray meets is not shaded: it is taken for a surface like that which mirrors it, in the
-// light of what the pixel shows. What lets light through does not count.
+// What a ray that asks meets is not shaded, but taken for grey in the light of what the pixel
+// shows. What lets light through does not count.
 void CellBaker::meet_surroundings(const QueuedRay& ray, std::size_t i) {
   const Scene& scene = *frame_->inputs.scene;
   const std::uint32_t material =
       scene.surface_of(stream_.geom[i], stream_.prim[i], stream_.inst[i]).material;
   const bool open =
       scene.shader_of(material).lets_light_through(scene.description().materials[material]);
-  const std::size_t target = target_of(ray);
-  if (open || !(transport_->receiving[ray.pixel / 64] >> (ray.pixel % 64) & 1)) {
-    add_environment(ray.slot, target, ray.sees, ray.roughness, ray.spread, ray.one_of_many,
+  if (open || !in(transport_->receiving, ray.pixel)) {
+    add_environment(ray.slot, target_of(ray), ray.sees, ray.roughness, ray.spread, ray.one_of_many,
                     ray.throughput);
-    return;
+  } else {
+    add_surroundings(ray.slot, target_of(ray), ray.pixel, ray.throughput);
   }
-  const Vec3f weight = ray.throughput * ray.surroundings;
-  transport_->shared.push_back({static_cast<std::uint16_t>(target),
-                                static_cast<std::uint16_t>(ray.pixel),
-                                CellTransport::SharedTerm::Of::light, weight});
-  const Light& light = light_[ray.pixel];
-  samples_[ray.slot].added += weight * (light.arriving + light.lamps);
 }
 
 void CellBaker::bounce() {
@@ -70,19 +64,18 @@ void CellBaker::bounce() {
     int count = 0;
     std::size_t leaving = 0;
     for (std::size_t i = 0; i < n; ++i) {
-      const QueuedRay& q = queue_[from + i];
+      QueuedRay& q = queue_[from + i];
       const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
       const std::size_t target = target_of(q);
-      if (hit && q.surroundings != Vec3f{}) {
+      if (hit && q.asks) {
         meet_surroundings(q, i);
         continue;
       }
       const float end_m = past_pictures_ ? picture_end(static_cast<int>(i), q.origin, q.direction)
                                          : stream_.far_m[i];
-      const std::uint16_t behind =
-          q.surroundings == Vec3f{} && may_be_passed(q.origin, q.direction, end_m)
-              ? add_picture_ray(q, end_m)
-              : q.behind;
+      const std::uint16_t behind = !q.asks && may_be_passed(q.origin, q.direction, end_m)
+                                       ? add_picture_ray(q, end_m)
+                                       : q.behind;
       const bool before_pictures = behind != q.behind;
       // What it counts as is not what it meets, but by how much that differs from what is straight
       // on.
@@ -94,6 +87,13 @@ void CellBaker::bounce() {
           add_environment(q.slot, to, q.sees, q.roughness, q.spread, q.one_of_many, weight);
         }
       };
+      if (q.rough && open_lobes_[q.pixel].lights > 0) {
+        const float open = open_lobes_[q.pixel].share_with(hit ? 0 : 1);
+        const std::size_t to = before_pictures ? slots + behind : target;
+        if (hit) see_straight_on(to, q.throughput * open);
+        if (!hit && open < 1) add_surroundings(q.slot, target, q.pixel, q.throughput * (1 - open));
+        q.throughput = q.throughput * (hit ? 1 - open : open);
+      }
       if (!hit && !before_pictures && as_difference) continue;
       if (as_difference) see_straight_on(target, -q.throughput);
       if (!hit && q.kind != RayKind::camera) {

@@ -28,8 +28,12 @@ constexpr float inside_glass = 0.125F;
 // chance.
 constexpr float surely_followed = 2.0F / 3;
 // A ray that is cut still asks whether anything is in its way, down to so much of what is followed:
-// indoors nearly everything is, and light from outside would lie on it like a haze.
+// indoors nearly everything is, and light from outside would lie on it like a haze. Of fainter
+// ones, and of rough lobes, the light that their point gets tells.
 constexpr float least_asked = 0.25F;
+// Lobes this rough are wider than the regions of the sky that lights stand for: these tell what
+// such a lobe sees.
+constexpr float rough_lobe = 0.4F;
 // What compact lights may add in a lobe at most, of what a ray that is not followed may show, for
 // nobody to ask whether they are in sight.
 constexpr float unseen_compact = 1.0F / 64;
@@ -178,8 +182,13 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     return std::min(weight * std::max(brightest, 1.0F) / (surely_followed * least), 1.0F);
   };
   const float followed = chance();
-  const bool asks = !(followed > 0) && !deep && !many && ray.kind == RayKind::reflection &&
-                    from.diffuse != Vec3f{} && weight >= least_asked * least;
+  const bool dull = ray.kind == RayKind::reflection && from.diffuse != Vec3f{};
+  const bool rough = dull && from.depth == 0 && asked.normal != Vec3f{} &&
+                     asked.roughness >= rough_lobe && !effort_.chance_cuts;
+  if (rough && from.slot < cell_pixels) note_rough_lobe(from, asked);
+  const bool known = rough && !is_further(from.slot);
+  const bool asks =
+      !(followed > 0) && !deep && !many && dull && !known && weight >= least_asked * least;
   if (followed < 1 && effort_.dark_cuts) return;
   if (followed < 1 && !asks) {
     if (straight) {
@@ -190,6 +199,9 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
       base.seen += mean(ray.throughput);
     } else if (ray.kind == RayKind::bent) {
       leave_bent(from.slot, target_of(from), ray.direction, cone, ray.throughput);
+    } else if (dull && !(followed > 0)) {
+      cut_rays_.push_back({sees, ray.throughput, cone, ray.roughness,
+                           static_cast<std::uint16_t>(&from - points_.data()), one_of_many, rough});
     } else if (ray.kind == RayKind::reflection) {
       add_environment(from.slot, target_of(from), sees, ray.roughness, cone, one_of_many,
                       ray.throughput);
@@ -200,11 +212,26 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     ray.spread = cone;
   }
   ++sent_[from.pixel];
-  queue_.push_back({ray.origin, ray.direction, ray.throughput, sees, ray.spread, from.steps,
-                    ray.roughness, from.pixel, from.slot, ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1), from.behind, one_of_many, lamps,
-                    followed > 0 && followed < 1, false, next_path(from.path, pushed_), media,
-                    asks ? from.diffuse : Vec3f{}});
+  queue_.push_back({ray.origin,
+                    ray.direction,
+                    ray.throughput,
+                    sees,
+                    ray.spread,
+                    from.steps,
+                    ray.roughness,
+                    from.pixel,
+                    from.slot,
+                    ray.kind,
+                    static_cast<std::uint8_t>(from.depth + 1),
+                    from.behind,
+                    one_of_many,
+                    lamps,
+                    followed > 0 && followed < 1,
+                    false,
+                    asks,
+                    known,
+                    next_path(from.path, pushed_),
+                    media});
 }
 
 // A number in 0..1: well spread over the samples of a pixel, those of centres over the picture.

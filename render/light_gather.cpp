@@ -213,8 +213,11 @@ LightRows::LightRows(std::span<const DirectionalLight> lights) : number(order_by
     y.push_back(light.direction.y);
     z.push_back(light.direction.z);
     sum.push_back(light.irradiance.x + light.irradiance.y + light.irradiance.z);
+    spread.push_back(light.spread);
   }
-  for (std::vector<float>* row : {&x, &y, &z, &sum}) row->resize((number.size() + 7) / 8 * 8);
+  for (std::vector<float>* row : {&x, &y, &z, &sum, &spread}) {
+    row->resize((number.size() + 7) / 8 * 8);
+  }
 }
 
 unsigned LightContext::mask_to(std::uint32_t light) const {

@@ -125,6 +125,7 @@ struct LightRows {
   std::vector<std::uint16_t> number;  // in the table
   std::vector<float> x, y, z;         // of directions
   std::vector<float> sum;             // of the irradiance's colours
+  std::vector<float> spread;          // DirectionalLight::spread
   std::size_t wide = 0;               // so many are not compact
 };
 

@@ -238,34 +238,64 @@ SeenLobe::SeenLobe(Vec3f normal, Vec3f geometric_normal, Vec3f view)
   slope_squared_ = (view_.x * view_.x + view_.y * view_.y) / (view_.z * view_.z);
 }
 
-float SeenLobe::density(float alpha, Vec3f direction) const {
-  const Vec3f l{dot(x_, direction), dot(y_, direction), dot(normal_, direction)};
-  if (l.z <= 0) return 0;
-  const float a2 = alpha * alpha;
+namespace {
+
+// Of a lobe that `view`, in the lobe's frame, sees: its density towards a direction in that frame,
+// or eight; a2 is alpha squared.
+template <class F>
+F density_in_frame(Vec3f view, float slope_squared, F a2, F x, F y, F z) {
   // Of the visible normals' reflections, before directions below are folded up. 1 - h_z^2 (1 - a2)
   // without cancellation near the peak; the factors that all directions share come last.
-  const auto unfolded = [&](float across_x, float across_y, float up) {
-    if (up <= 0) return 0.0F;
-    const float squared = across_x * across_x + across_y * across_y + up * up;
-    const float width = across_x * across_x + across_y * across_y + a2 * up * up;
-    const float relative = squared / width;
-    return relative * relative;
+  const F across_x = view.x + x, across_y = view.y + y;
+  const auto unfolded = [&](F up) -> F {
+    const F squared = across_x * across_x + across_y * across_y + up * up;
+    const F width = across_x * across_x + across_y * across_y + a2 * up * up;
+    const F relative = squared / width;
+    return up > 0 ? relative * relative : F{};
   };
-  const float across_x = view_.x + l.x, across_y = view_.y + l.y;
-  const float densities =
-      unfolded(across_x, across_y, view_.z + l.z) + unfolded(across_x, across_y, view_.z - l.z);
-  const float masking = 2 / (1 + std::sqrt(1 + a2 * slope_squared_));
-  return densities * masking * a2 / (4 * std::numbers::pi_v<float> * view_.z);
+  const F densities = unfolded(view.z + z) + unfolded(view.z - z);
+  const F masking = 2 / (1 + root(1 + a2 * slope_squared));
+  return z > 0 ? densities * masking * a2 / (4 * std::numbers::pi_v<float> * view.z) : F{};
+}
+
+// Alpha squared of a lobe that is blurred as by a disc: half of a lobe lies within 2 alpha of the
+// mirrored direction, as half of a disc of radius r does within .7 r.
+template <class F>
+F blurred_alpha_squared(float roughness, F blur_rad) {
+  constexpr float alpha_of_radius = 0.35F;
+  const float own = roughness * roughness;
+  const F blur = alpha_of_radius * blur_rad, squared = own * own + blur * blur;
+  return squared < 1 ? squared : F{} + 1;
+}
+
+}  // namespace
+
+float SeenLobe::density(float alpha, Vec3f direction) const {
+  return density_in_frame(view_, slope_squared_, alpha * alpha, dot(x_, direction),
+                          dot(y_, direction), dot(normal_, direction));
 }
 
 float SeenLobe::blurred(float roughness, float blur_rad, Vec3f direction) const {
-  // Half of a lobe lies within 2 alpha of the mirrored direction, as half of a disc of radius r
-  // does within .7 r.
-  constexpr float alpha_of_radius = 0.35F;
-  const float own = roughness * roughness, blur = alpha_of_radius * blur_rad;
-  const float alpha = std::min(std::sqrt(own * own + blur * blur), 1.0F);
+  const float alpha = std::sqrt(blurred_alpha_squared(roughness, blur_rad));
   const Vec3f below = direction - geometric_normal_ * (2 * dot(direction, geometric_normal_));
   return density(alpha, direction) + density(alpha, below);
+}
+
+Eight SeenLobe::blurred(float roughness,
+                        Eight blur_rad,
+                        const calibrate::Vec3T<Eight>& direction) const {
+  const auto along = [](Vec3f axis, const calibrate::Vec3T<Eight>& d) {
+    return axis.x * d.x + axis.y * d.y + axis.z * d.z;
+  };
+  const Eight a2 = blurred_alpha_squared(roughness, blur_rad);
+  const auto density_of = [&](const calibrate::Vec3T<Eight>& d) {
+    return density_in_frame(view_, slope_squared_, a2, along(x_, d), along(y_, d),
+                            along(normal_, d));
+  };
+  const Vec3f n = geometric_normal_;
+  const Eight twice = 2 * along(n, direction);
+  return density_of(direction) + density_of({direction.x - twice * n.x, direction.y - twice * n.y,
+                                             direction.z - twice * n.z});
 }
 
 }  // namespace render

@@ -21,6 +21,7 @@
 #include <string>
 
 #include "render/environment.h"
+#include "render/lanes.h"
 #include "render/light_table.h"
 #include "render/mesh.h"
 #include "render/texture.h"
@@ -158,6 +159,8 @@ class SeenLobe {
   // blurred as by a disc of radius blur_rad. What an interpolated or mapped normal would send below
   // the triangle, of unit normal `geometric_normal`, is mirrored up again.
   float blurred(float roughness, float blur_rad, Vec3f direction) const;
+  // The same of eight at once.
+  Eight blurred(float roughness, Eight blur_rad, const calibrate::Vec3T<Eight>& direction) const;
   // The view mirrored at the normal: where narrow lobes have their middle.
   Vec3f middle() const { return middle_; }
 

@@ -97,7 +97,7 @@ struct LitFloor {
 };
 
 // A rough floor before the screen. Seen as rays alone would see it, where the middles of lobes
-// meet the screen, it errs by a half and more.
+// meet the screen, it errs by a quarter and more.
 TEST(VideoLight, IsMirroredByRoughSurfacesAsTheReferenceSays) {
   constexpr int width = 48, height = 36, first_row = 26;
   for (const auto& [roughness, metallic] : {std::pair{0.5F, 1.0F}, {0.7F, 0.0F}}) {
@@ -126,7 +126,7 @@ TEST(VideoLight, IsMirroredByRoughSurfacesAsTheReferenceSays) {
     };
     EXPECT_LT(error(), 0.04) << roughness << " " << metallic;
     for (render::LocalLight& lamp : room.job.lights.lamps) lamp.instance = render::no_instance;
-    EXPECT_GT(error(), 0.5) << roughness << " " << metallic;
+    EXPECT_GT(error(), 0.25) << roughness << " " << metallic;
   }
 }
 

@@ -181,6 +181,27 @@ TEST(SeenLobe, KeepsAllItsEnergyAboveTheTriangle) {
   }
 }
 
+TEST(SeenLobe, IsTheSameForEightDirectionsAtOnce) {
+  const render::SeenLobe lobe(normalize(Vec3f{0.3F, 0, 1}), {0, 0, 1},
+                              normalize(Vec3f{-0.5F, 0.6F, 0.4F}));
+  calibrate::Vec3T<render::Eight> directions;
+  render::Eight blur_rad{};
+  for (int i = 0; i < 8; ++i) {
+    const auto turn = static_cast<float>(i);
+    const Vec3f to = normalize(Vec3f{std::cos(turn), std::sin(turn), 0.4F * turn - 1});
+    directions.x[i] = to.x, directions.y[i] = to.y, directions.z[i] = to.z;
+    blur_rad[i] = 0.1F * turn;
+  }
+  directions.x[7] = directions.y[7] = directions.z[7] = 0;  // as where rows are filled up
+  const render::Eight densities = lobe.blurred(0.5F, blur_rad, directions);
+  for (int i = 0; i < 8; ++i) {
+    const Vec3f to{directions.x[i], directions.y[i], directions.z[i]};
+    const float alone = lobe.blurred(0.5F, blur_rad[i], to);
+    EXPECT_NEAR(densities[i], alone, 1e-4F * alone) << i;
+  }
+  EXPECT_EQ(densities[7], 0);
+}
+
 TEST(StandardParameters, ComeBackFromTheirMaterial) {
   render::StandardParameters p;
   p.roughness = 0.125F;

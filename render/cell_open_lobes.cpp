@@ -1,0 +1,178 @@
+// What rough lobes see of the sky: by the lights of the table, where one ray would not do.
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "render/cell_baker.h"
+#include "render/lanes.h"
+
+namespace render {
+namespace {
+
+// Of blocks of pixels that share what they see, and how many of them lie beside each other.
+constexpr std::size_t side = 4, in_row = cell_size / side;
+
+// What is hidden from a lobe, or would be met by a ray that nobody follows: the albedo that it is
+// taken for.
+constexpr float surroundings_albedo = 0.3F;
+
+}  // namespace
+
+// Of a centre's lobes the roughest stands for all.
+void CellBaker::note_rough_lobe(const ShadePoint& from, const NewRay& ray) {
+  RoughLobe& lobe = rough_lobes_[from.slot];
+  if (lobe.point != nowhere && lobe.roughness >= ray.roughness) return;
+  lobe = {static_cast<std::uint16_t>(&from - points_.data()), ray.roughness, ray.normal};
+}
+
+// Of the lobe at a centre: the share of the table's light in it that those pixels of a word of the
+// cell's see. Compact lights are looked for by themselves.
+//
+// As a ratio, by which what the lobe sees of the environment is multiplied: after Heitz, Hill and
+// McGuire, "Combining Analytic Direct Illumination and Stochastic Shadows", I3D 2018.
+CellBaker::OpenLobe CellBaker::open_lobe(std::size_t rough,
+                                         std::size_t word,
+                                         std::uint64_t members) const {
+  const RoughLobe& lobe = rough_lobes_[rough];
+  const ShadePoint& p = points_[lobe.point];
+  const SeenLobe seen_lobe(lobe.normal, p.hit.geometric_normal, -p.incoming);
+  const CellVisibility& visibility = transport_->visibility;
+  const LightRows& rows = frame_->light_rows;
+  Eight all{}, open{}, squares{};
+  for (std::size_t row = 0; row < rows.wide; row += 8) {
+    Eight lit{}, seen{};
+    for (std::size_t i = 0; i < std::min<std::size_t>(8, rows.wide - row); ++i) {
+      const std::size_t light = rows.number[row + i];
+      lit[i] = static_cast<float>(std::popcount(visibility.lit[light][word] & members));
+      seen[i] = static_cast<float>(std::popcount(visibility.seen[light][word] & members));
+    }
+    const calibrate::Vec3T<Eight> to{load_eight(&rows.x[row]), load_eight(&rows.y[row]),
+                                     load_eight(&rows.z[row])};
+    const Eight light = load_eight(&rows.sum[row]) *
+                        seen_lobe.blurred(lobe.roughness, load_eight(&rows.spread[row]), to);
+    all += light * lit, open += light * seen, squares += light * lit * (light * lit);
+  }
+  const auto sum = [](const Eight& v) {
+    return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+  };
+  const float total = sum(all), of_squares = sum(squares);
+  if (!(total > 0) || !(of_squares > 0)) return {};
+  float tinted = 0;
+  const auto& lights = frame_->planned_table->lights;
+  for (const TintedLight& tint : visibility.tints) {
+    const DirectionalLight& l = lights[tint.light];
+    if (tint.centre / 64 != word || !(members >> (tint.centre % 64) & 1) || l.compact) continue;
+    tinted += 3 * mean(l.irradiance * tint.lost_share) *
+              seen_lobe.blurred(lobe.roughness, l.spread, l.direction);
+  }
+  const float share = (sum(open) - tinted) / total;
+  return {std::clamp(share, 0.0F, 1.0F), total * total / of_squares};
+}
+
+// Of centres with rough lobes, by blocks of 4x4 pixels that show one surface, and between these.
+void CellBaker::find_open_lobes() {
+  struct OfBlock {
+    std::uint32_t surface;
+    OpenLobe lobe;
+  };
+  struct Block {
+    std::array<OfBlock, side * side> surfaces;
+    std::size_t count = 0;
+  };
+  std::array<Block, in_row * in_row> found;
+  CellMask rough{};
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    const bool has = rough_lobes_[k].point != nowhere && in(transport_->receiving, k);
+    rough[k / 64] |= std::uint64_t{has} << (k % 64);
+  }
+  if (none(rough)) return;
+  for (std::size_t b = 0; b < found.size(); ++b) {
+    const std::size_t word = b / in_row, column = b % in_row * side;
+    std::uint64_t left = rough[word] & block4 << column;
+    while (left != 0) {
+      std::uint64_t members = 0;
+      const auto number_of = [&](std::uint64_t pixels) {
+        return word * 64 + static_cast<std::size_t>(std::countr_zero(pixels));
+      };
+      const std::uint32_t surface = receivers_.surface[number_of(left)];
+      for (std::uint64_t rest = left; rest != 0; rest &= rest - 1) {
+        if (receivers_.surface[number_of(rest)] == surface) members |= rest & -rest;
+      }
+      // In the middle of the block, if one of them is.
+      const std::uint64_t middle = members & (std::uint64_t{0x0000'0006'0006'0000} << column);
+      const OpenLobe lobe = open_lobe(number_of(middle != 0 ? middle : members), word, members);
+      found[b].surfaces[found[b].count++] = {surface, lobe};
+      left &= ~members;
+    }
+  }
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    if (!in(rough, k)) continue;
+    const std::uint32_t surface = receivers_.surface[k];
+    // Between the middles of four blocks, or as the outermost ones.
+    const auto place = [](std::size_t pixel) {
+      const float at = (static_cast<float>(pixel) - (side - 1) / 2.0F) / side;
+      return std::clamp(at, 0.0F, in_row - 1.0F);
+    };
+    const float x = place(k % cell_size), y = place(k / cell_size);
+    const auto left = static_cast<std::size_t>(x), top = static_cast<std::size_t>(y);
+    OpenLobe sum{0, 0};
+    float weights = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t column = left + i % 2, row = top + i / 2;
+      const float weight = (1 - std::abs(x - static_cast<float>(column))) *
+                           (1 - std::abs(y - static_cast<float>(row)));
+      if (!(weight > 0)) continue;
+      const Block& block = found[row * in_row + column];
+      for (const OfBlock& of : std::span(block.surfaces).first(block.count)) {
+        if (of.surface != surface || !(of.lobe.lights > 0)) continue;
+        sum.share += weight * of.lobe.share, sum.lights += weight * of.lobe.lights;
+        weights += weight;
+      }
+    }
+    if (weights > 0) open_lobes_[k] = {sum.share / weights, sum.lights / weights};
+  }
+}
+
+// What is in the way of a lobe, in the light of what a pixel's centre shows.
+void CellBaker::add_surroundings(std::size_t slot,
+                                 std::size_t target,
+                                 std::size_t pixel,
+                                 Vec3f weight) {
+  if (!in(transport_->receiving, pixel)) return;
+  weight = weight * (surroundings_albedo * std::numbers::inv_pi_v<float>);
+  if (target == pixel) {
+    CellTransport::Centres& c = transport_->centres.front();
+    c.diffuse.put(pixel, c.diffuse.at(pixel) + weight);
+    c.any_diffuse = true;
+  } else {
+    transport_->shared.push_back({static_cast<std::uint16_t>(target),
+                                  static_cast<std::uint16_t>(pixel),
+                                  CellTransport::SharedTerm::Of::light, weight});
+  }
+  const Light& light = light_[pixel];
+  samples_[slot].added += weight * (light.arriving + light.lamps);
+}
+
+// Rays that are not followed, of the points that have just got their light: each sees as much of
+// the environment as its point does of its light, and something grey for the rest.
+void CellBaker::take_from_environment() {
+  for (const CutRay& ray : cut_rays_) {
+    const ShadePoint& p = points_[ray.point];
+    const Light& light = light_of_point_[ray.point];
+    const float all = mean(light.open);
+    float open = all > 0 ? std::min(mean(light.arriving) / all, 1.0F) : 1.0F;
+    const int lender = lender_[ray.point];
+    const std::size_t pixel = lender >= 0 ? static_cast<std::size_t>(lender) : p.pixel;
+    if (ray.rough) open = open_lobes_[pixel].share_with(open);
+    if (!in(transport_->receiving, pixel)) open = 1;
+    if (open > 0) {
+      add_environment(p.slot, target_of(p), ray.sees, ray.roughness, ray.cone, ray.one_of_many,
+                      ray.throughput * open);
+    }
+    if (open < 1) add_surroundings(p.slot, target_of(p), pixel, ray.throughput * (1 - open));
+  }
+  cut_rays_.clear();
+}
+
+}  // namespace render
