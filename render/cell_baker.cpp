@@ -101,6 +101,9 @@ bool CellBaker::find(int stage, bool past_pictures) {
   cut_rays_.clear();
   rough_lobes_.fill({});
   open_lobes_.fill({});
+  open_sky_of_centre_.fill(1);
+  grey_.fill({});
+  grey_of_further_.fill({});
   lamp_terms_.clear();
   places_.clear();
   most_lights_ = most_places_ = enough_terms;
@@ -288,6 +291,7 @@ void CellBaker::shade_points(int count, bool grid) {
     }
   });
   receive(count, grid);
+  find_open_sky(count, grid);
   if (grid) find_open_lobes();
   take_from_environment();
   const auto& instances = frame_->inputs.scene->description().instances;
@@ -427,8 +431,8 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
 // Finds who sees which light, and notes it.
 void CellBaker::receive(int count, bool grid) {
   Receivers& r = receivers_;
-  std::array<std::uint16_t, stream_rays> place;     // of points among receivers
-  std::array<std::uint16_t, stream_rays> point_at;  // and back
+  auto& place = receiver_of_point_;
+  std::array<std::uint16_t, stream_rays> point_at;  // of receivers among points
   std::fill_n(place.begin(), count, nowhere);
   std::fill_n(light_of_point_.begin(), count, Light{});
   std::array<std::uint8_t, stream_rays> glossy{};

@@ -72,7 +72,7 @@ class CellBaker final : public RaySink {
     bool beyond_cut;   // followed by chance: what is straight on is counted, for all that are not
     bool first;        // that a centre sent on, or the brightest of several
     bool asks;         // it is cut, and only asks whether anything is in its way
-    bool rough;        // in a lobe of whose light `open_lobes_` tells
+    bool by_lights;    // in a lobe of whose light `open_lobes_` tells as well
     std::uint32_t path;
     Media media;
   };
@@ -84,19 +84,18 @@ class CellBaker final : public RaySink {
     Spread cone;
     float roughness;
     std::uint16_t point;
-    bool one_of_many, rough;  // as QueuedRay's
+    bool one_of_many;  // as QueuedRay's
+    bool rough;        // in a lobe as those that `open_lobes_` tells of
   };
 
-  // What a centre sees of the light in its rough lobe, as the table's lights tell: the share that
-  // nothing hides, and from how many lights that is known; 0: not at all.
+  // What a centre sees in its rough lobe, as the table's lights tell: the share of the lobe's light
+  // that nothing hides, and of how many lights that is known; 0: nothing is known. A ray in the
+  // middle of the lobe tells as much as a few lights.
   struct OpenLobe {
     float share = 1, lights = 0;
 
-    // One ray in the middle of the lobe tells as much as `lights_of_ray`.
-    float share_with(float of_ray) const {
-      constexpr float lights_of_ray = 4;
-      return (share * lights + of_ray * lights_of_ray) / (lights + lights_of_ray);
-    }
+    float by_ray() const { return 4 / (lights + 4); }
+    float by_lights() const { return share * (1 - by_ray()); }
   };
 
   // A lobe, whose compact light waits until it is known who sees which.
@@ -284,6 +283,8 @@ class CellBaker final : public RaySink {
   void note_rough_lobe(const ShadePoint& from, const NewRay& ray);
   OpenLobe open_lobe(std::size_t rough, std::size_t word, std::uint64_t members) const;
   void find_open_lobes();
+  void sum_tints();
+  void find_open_sky(int count, bool grid);
   void take_from_environment();
   void add_surroundings(std::size_t slot, std::size_t target, std::size_t pixel, Vec3f weight);
 
@@ -439,7 +440,8 @@ class CellBaker final : public RaySink {
   struct MirroredHit {
     std::uint32_t instance, material;
     float reach_m;  // about as far apart as neighbours'
-    Vec3f normal, position, light;
+    Vec3f normal, position;
+    Light light;
   };
   std::array<MirroredHit, cell_pixels> mirrored_hits_;
   std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
@@ -465,7 +467,8 @@ class CellBaker final : public RaySink {
   std::vector<Vec3f> compact_shares_;  // (compact light, centre): what glass lets by; none = all
   std::vector<QueuedRay> queue_;       // capacity reserved
   std::vector<CutRay> cut_rays_;
-  // Of centres, the roughest of their lobes: its place among the points, or nowhere.
+  // Of a centre, the roughest of its lobes, and which of the points it is while all are centres;
+  // nowhere: it has none.
   struct RoughLobe {
     std::uint16_t point = nowhere;
     float roughness = 0;
@@ -473,6 +476,14 @@ class CellBaker final : public RaySink {
   };
   std::array<RoughLobe, cell_pixels> rough_lobes_;
   std::array<OpenLobe, cell_pixels> open_lobes_;
+  std::vector<float> tinted_;  // (light, block of 4x4): what glass takes, in pixels
+  // The share of its light, but for compact lights, that nothing hides: of points, of centres.
+  std::array<float, stream_rays> open_sky_;
+  std::array<float, cell_pixels> open_sky_of_centre_;
+  std::array<std::uint16_t, stream_rays> receiver_of_point_;  // or nowhere
+  // Of centres' answers, what stands for surroundings; and that of a pixel's further samples, in
+  // the light of its own centre.
+  std::array<Vec3f, cell_pixels> grey_, grey_of_further_;
   LookUp looked_up_{};                   // last, in this cell
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
   std::uint32_t pushed_ = 0;

@@ -71,6 +71,17 @@ void CellBaker::bounce() {
         meet_surroundings(q, i);
         continue;
       }
+      const auto see_straight_on = [&](std::size_t to, Vec3f weight) {
+        if (q.kind == RayKind::bent) {
+          leave_bent(q.slot, to, q.direction, q.spread, weight);
+        } else {
+          add_environment(q.slot, to, q.sees, q.roughness, q.spread, q.one_of_many, weight);
+        }
+      };
+      const OpenLobe lobe = q.by_lights ? open_lobes_[q.pixel] : OpenLobe{};
+      const float left = 1 - lobe.by_lights();
+      if (left < 1) see_straight_on(target, q.throughput * (1 - left));
+      q.throughput = q.throughput * left;
       const float end_m = past_pictures_ ? picture_end(static_cast<int>(i), q.origin, q.direction)
                                          : stream_.far_m[i];
       const std::uint16_t behind = !q.asks && may_be_passed(q.origin, q.direction, end_m)
@@ -80,24 +91,14 @@ void CellBaker::bounce() {
       // What it counts as is not what it meets, but by how much that differs from what is straight
       // on.
       const bool as_difference = q.kind == RayKind::difference || q.beyond_cut;
-      const auto see_straight_on = [&](std::size_t to, Vec3f weight) {
-        if (q.kind == RayKind::bent) {
-          leave_bent(q.slot, to, q.direction, q.spread, weight);
-        } else {
-          add_environment(q.slot, to, q.sees, q.roughness, q.spread, q.one_of_many, weight);
-        }
-      };
-      if (q.rough && open_lobes_[q.pixel].lights > 0) {
-        const float open = open_lobes_[q.pixel].share_with(hit ? 0 : 1);
-        const std::size_t to = before_pictures ? slots + behind : target;
-        if (hit) see_straight_on(to, q.throughput * open);
-        if (!hit && open < 1) add_surroundings(q.slot, target, q.pixel, q.throughput * (1 - open));
-        q.throughput = q.throughput * (hit ? 1 - open : open);
-      }
       if (!hit && !before_pictures && as_difference) continue;
       if (as_difference) see_straight_on(target, -q.throughput);
       if (!hit && q.kind != RayKind::camera) {
-        see_straight_on(behind != no_picture_ray ? slots + behind : target, q.throughput);
+        // Of what the lights leave of a lobe, the ray tells that its own part is open.
+        const float seen = left < 1 ? lobe.by_ray() / left : 1;
+        const std::size_t to = behind != no_picture_ray ? slots + behind : target;
+        see_straight_on(to, q.throughput * seen);
+        if (seen < 1) add_surroundings(q.slot, to, q.pixel, q.throughput * (1 - seen));
         continue;
       }
       ShadePoint& p =

@@ -192,11 +192,11 @@ float CellBaker::light_step(std::size_t a, std::size_t b) const {
   const CellTransport& t = *transport_;
   const CellTransport::Centres& c = t.centres.front();
   const bool lit = in(t.receiving, a) && in(t.receiving, b);
+  const auto diffuse_of = [&](std::size_t k) { return c.diffuse.at(k) - grey_[k]; };
   const auto even = [&](std::size_t k, std::size_t other) {
     Vec3f change = (own_[other] - own_[k]) * 0.5F;
     if (lit)
-      change +=
-          (c.diffuse.at(other) - c.diffuse.at(k)) * (light_[k].arriving + light_[k].lamps) * 0.5F;
+      change += (diffuse_of(other) - diffuse_of(k)) * (light_[k].arriving + light_[k].lamps) * 0.5F;
     return samples_[k].added + change;
   };
   return step_between(even(a, b), even(b, a));

@@ -29,7 +29,7 @@ constexpr float inside_glass = 0.125F;
 constexpr float surely_followed = 2.0F / 3;
 // A ray that is cut still asks whether anything is in its way, down to so much of what is followed:
 // indoors nearly everything is, and light from outside would lie on it like a haze. Of fainter
-// ones, and of rough lobes, the light that their point gets tells.
+// ones, and of centres' rough lobes, the light that their point gets tells.
 constexpr float least_asked = 0.25F;
 // Lobes this rough are wider than the regions of the sky that lights stand for: these tell what
 // such a lobe sees.
@@ -186,9 +186,9 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const bool rough = dull && from.depth == 0 && asked.normal != Vec3f{} &&
                      asked.roughness >= rough_lobe && !effort_.chance_cuts;
   if (rough && from.slot < cell_pixels) note_rough_lobe(from, asked);
-  const bool known = rough && !is_further(from.slot);
+  const bool by_lights = rough && !is_further(from.slot);
   const bool asks =
-      !(followed > 0) && !deep && !many && dull && !known && weight >= least_asked * least;
+      !(followed > 0) && !deep && !many && dull && !by_lights && weight >= least_asked * least;
   if (followed < 1 && effort_.dark_cuts) return;
   if (followed < 1 && !asks) {
     if (straight) {
@@ -229,7 +229,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
                     followed > 0 && followed < 1,
                     false,
                     asks,
-                    known,
+                    by_lights,
                     next_path(from.path, pushed_),
                     media});
 }

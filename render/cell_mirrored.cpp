@@ -122,7 +122,7 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
     to.slot[k] = static_cast<std::uint16_t>(target_of(p));
     const float reach_m = reach_of_neighbours * (length(p.steps.a) + length(p.steps.b));
     mirrored_hits_[k] = {p.hit.instance, p.hit.material, reach_m,
-                         p.light_normal, p.hit.position, light_of_point_[mirrored_at_[k]].arriving};
+                         p.light_normal, p.hit.position, light_of_point_[mirrored_at_[k]]};
   }
 }
 
@@ -150,8 +150,8 @@ bool CellBaker::share_mirrored(std::size_t point) {
       }
       const float apart_m = length(p.hit.position - m.position);
       const bool any = nearest < cell_pixels;
-      lower = any ? lesser(lower, m.light) : m.light;
-      upper = any ? greater(upper, m.light) : m.light;
+      lower = any ? lesser(lower, m.light.arriving) : m.light.arriving;
+      upper = any ? greater(upper, m.light.arriving) : m.light.arriving;
       if (any && !(apart_m < least)) continue;
       nearest = k, least = apart_m;
     }
@@ -159,7 +159,7 @@ bool CellBaker::share_mirrored(std::size_t point) {
   if (nearest == cell_pixels || !(least < mirrored_hits_[nearest].reach_m)) return false;
   const Vec3f weight = p.throughput * p.diffuse;
   if (largest(weight * (upper - lower)) > effort_.glint_contrast) return false;
-  light_of_point_[point].arriving = light_of_point_[point].open = mirrored_hits_[nearest].light;
+  light_of_point_[point] = mirrored_hits_[nearest].light;
   transport_->shared.push_back({static_cast<std::uint16_t>(target_of(p)),
                                 static_cast<std::uint16_t>(nearest),
                                 CellTransport::SharedTerm::Of::mirrored_light, weight});

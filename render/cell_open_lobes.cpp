@@ -13,6 +13,8 @@ namespace {
 // Of blocks of pixels that share what they see, and how many of them lie beside each other.
 constexpr std::size_t side = 4, in_row = cell_size / side;
 
+std::size_t block_of(std::size_t k) { return k / cell_size / side * in_row + k % cell_size / side; }
+
 // What is hidden from a lobe, or would be met by a ray that nobody follows: the albedo that it is
 // taken for.
 constexpr float surroundings_albedo = 0.3F;
@@ -39,13 +41,20 @@ CellBaker::OpenLobe CellBaker::open_lobe(std::size_t rough,
   const SeenLobe seen_lobe(lobe.normal, p.hit.geometric_normal, -p.incoming);
   const CellVisibility& visibility = transport_->visibility;
   const LightRows& rows = frame_->light_rows;
+  const auto count = [](std::uint64_t pixels) { return static_cast<float>(std::popcount(pixels)); };
+  const std::size_t block =
+      block_of(word * 64 + static_cast<std::size_t>(std::countr_zero(members)));
+  const std::uint64_t of_block = transport_->receiving[word] & block4 << block % in_row * side;
   Eight all{}, open{}, squares{};
   for (std::size_t row = 0; row < rows.wide; row += 8) {
     Eight lit{}, seen{};
     for (std::size_t i = 0; i < std::min<std::size_t>(8, rows.wide - row); ++i) {
-      const std::size_t light = rows.number[row + i];
-      lit[i] = static_cast<float>(std::popcount(visibility.lit[light][word] & members));
-      seen[i] = static_cast<float>(std::popcount(visibility.seen[light][word] & members));
+      const std::size_t number = rows.number[row + i];
+      lit[i] = count(visibility.lit[number][word] & members);
+      seen[i] = count(visibility.seen[number][word] & members);
+      if (tinted_.empty()) continue;
+      const float taken = tinted_[number * in_row * in_row + block];
+      seen[i] = std::max(seen[i] - taken * count(members) / count(of_block), 0.0F);
     }
     const calibrate::Vec3T<Eight> to{load_eight(&rows.x[row]), load_eight(&rows.y[row]),
                                      load_eight(&rows.z[row])};
@@ -58,16 +67,18 @@ CellBaker::OpenLobe CellBaker::open_lobe(std::size_t rough,
   };
   const float total = sum(all), of_squares = sum(squares);
   if (!(total > 0) || !(of_squares > 0)) return {};
-  float tinted = 0;
-  const auto& lights = frame_->planned_table->lights;
+  return {std::min(sum(open) / total, 1.0F), total * total / of_squares};
+}
+
+// What glass takes of the lights, by blocks.
+void CellBaker::sum_tints() {
+  const CellVisibility& visibility = transport_->visibility;
+  tinted_.clear();
+  if (visibility.tints.empty()) return;
+  tinted_.resize(visibility.lit.size() * in_row * in_row);
   for (const TintedLight& tint : visibility.tints) {
-    const DirectionalLight& l = lights[tint.light];
-    if (tint.centre / 64 != word || !(members >> (tint.centre % 64) & 1) || l.compact) continue;
-    tinted += 3 * mean(l.irradiance * tint.lost_share) *
-              seen_lobe.blurred(lobe.roughness, l.spread, l.direction);
+    tinted_[tint.light * in_row * in_row + block_of(tint.centre)] += mean(tint.lost_share);
   }
-  const float share = (sum(open) - tinted) / total;
-  return {std::clamp(share, 0.0F, 1.0F), total * total / of_squares};
 }
 
 // Of centres with rough lobes, by blocks of 4x4 pixels that show one surface, and between these.
@@ -80,13 +91,13 @@ void CellBaker::find_open_lobes() {
     std::array<OfBlock, side * side> surfaces;
     std::size_t count = 0;
   };
-  std::array<Block, in_row * in_row> found;
   CellMask rough{};
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    const bool has = rough_lobes_[k].point != nowhere && in(transport_->receiving, k);
-    rough[k / 64] |= std::uint64_t{has} << (k % 64);
+    rough[k / 64] |= std::uint64_t{rough_lobes_[k].point != nowhere} << (k % 64);
   }
   if (none(rough)) return;
+  sum_tints();
+  std::array<Block, in_row * in_row> found;
   for (std::size_t b = 0; b < found.size(); ++b) {
     const std::size_t word = b / in_row, column = b % in_row * side;
     std::uint64_t left = rough[word] & block4 << column;
@@ -134,17 +145,20 @@ void CellBaker::find_open_lobes() {
   }
 }
 
-// What is in the way of a lobe, in the light of what a pixel's centre shows.
+// What is in the way of a lobe, in the light of what a pixel's centre shows, which receives light.
 void CellBaker::add_surroundings(std::size_t slot,
                                  std::size_t target,
                                  std::size_t pixel,
                                  Vec3f weight) {
-  if (!in(transport_->receiving, pixel)) return;
   weight = weight * (surroundings_albedo * std::numbers::inv_pi_v<float>);
-  if (target == pixel) {
+  if (shades_ring_) {  // of which nothing is kept
+  } else if (target == pixel) {
     CellTransport::Centres& c = transport_->centres.front();
     c.diffuse.put(pixel, c.diffuse.at(pixel) + weight);
     c.any_diffuse = true;
+    grey_[pixel] += weight;
+  } else if (target == cell_pixels + pixel) {
+    grey_of_further_[pixel] += weight;
   } else {
     transport_->shared.push_back({static_cast<std::uint16_t>(target),
                                   static_cast<std::uint16_t>(pixel),
@@ -154,23 +168,76 @@ void CellBaker::add_surroundings(std::size_t slot,
   samples_[slot].added += weight * (light.arriving + light.lamps);
 }
 
+// What the points that have just got their light see of it, but for compact lights: these are there
+// or not, whatever else of the sky is.
+void CellBaker::find_open_sky(int count, bool grid) {
+  if (!grid && cut_rays_.empty()) return;
+  const auto& lights = frame_->planned_table->lights;
+  std::array<float, stream_rays> compact_open{}, compact_arriving{};
+  if (grid) {
+    const CellVisibility& visibility = transport_->visibility;
+    for (const std::uint32_t c : frame_->compact) {
+      if (none(transport_->receiving) || none(visibility.lit[c])) continue;
+      const DirectionalLight& l = lights[c];
+      for (std::size_t k = 0; k < cell_pixels; ++k) {
+        if (!in(visibility.lit[c], k)) continue;
+        const Vec3f n{receivers_.nx[k], receivers_.ny[k], receivers_.nz[k]};
+        const float open = dot(n, l.direction) * mean(l.irradiance);
+        compact_open[k] += open;
+        if (in(visibility.seen[c], k)) compact_arriving[k] += open;
+      }
+    }
+  } else if (!frame_->compact.empty()) {
+    for (const PointLight& t : tested_) {
+      const DirectionalLight& l = lights[t.light];
+      if (!l.compact) continue;
+      compact_open[t.point] += mean(l.irradiance) * t.weight;
+      compact_arriving[t.point] += mean(l.irradiance * t.passed) * t.weight;
+    }
+  }
+  // Sums in other orders differ by rounding.
+  constexpr float least_sky = 1e-4F;
+  const auto share_of = [&](std::size_t i) {
+    const Light& light = light_of_point_[i];
+    float open = mean(light.open), arriving = mean(light.arriving);
+    const float least = least_sky * open;
+    if (const std::size_t k = receiver_of_point_[i]; k != nowhere) {
+      open -= compact_open[k], arriving -= compact_arriving[k];
+    }
+    return open > least ? std::clamp(arriving / open, 0.0F, 1.0F) : 1.0F;
+  };
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const ShadePoint& p = points_[i];
+    if (grid) {
+      open_sky_of_centre_[p.pixel] = open_sky_[i] = share_of(i);
+    } else if (shades_ring_ && p.depth == 0) {  // that gets no light itself
+      open_sky_[i] = open_sky_of_centre_[p.pixel];
+    } else if (lender_[i] >= 0) {
+      open_sky_[i] = open_sky_of_centre_[static_cast<std::size_t>(lender_[i])];
+    } else {
+      open_sky_[i] = share_of(i);
+    }
+  }
+}
+
 // Rays that are not followed, of the points that have just got their light: each sees as much of
-// the environment as its point does of its light, and something grey for the rest.
+// the environment as its point does of the sky, or of a rough lobe, and something grey for the
+// rest.
 void CellBaker::take_from_environment() {
   for (const CutRay& ray : cut_rays_) {
     const ShadePoint& p = points_[ray.point];
-    const Light& light = light_of_point_[ray.point];
-    const float all = mean(light.open);
-    float open = all > 0 ? std::min(mean(light.arriving) / all, 1.0F) : 1.0F;
     const int lender = lender_[ray.point];
     const std::size_t pixel = lender >= 0 ? static_cast<std::size_t>(lender) : p.pixel;
-    if (ray.rough) open = open_lobes_[pixel].share_with(open);
-    if (!in(transport_->receiving, pixel)) open = 1;
+    const bool is_known = ray.rough && (lender >= 0 || !is_further(p.slot));
+    const OpenLobe lobe = is_known ? open_lobes_[pixel] : OpenLobe{};
+    const float open = lobe.by_lights() + lobe.by_ray() * open_sky_[ray.point];
     if (open > 0) {
       add_environment(p.slot, target_of(p), ray.sees, ray.roughness, ray.cone, ray.one_of_many,
                       ray.throughput * open);
     }
-    if (open < 1) add_surroundings(p.slot, target_of(p), pixel, ray.throughput * (1 - open));
+    if (open < 1 && in(transport_->receiving, pixel)) {
+      add_surroundings(p.slot, target_of(p), pixel, ray.throughput * (1 - open));
+    }
   }
   cut_rays_.clear();
 }

@@ -93,6 +93,11 @@ void CellBaker::pack() {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;
     t.further.push_back({static_cast<std::uint16_t>(k), counts_[k], base_[cell_pixels + k]});
+    if (grey_of_further_[k] != Vec3f{}) {
+      t.shared.push_back({static_cast<std::uint16_t>(cell_pixels + k),
+                          static_cast<std::uint16_t>(k), CellTransport::SharedTerm::Of::light,
+                          grey_of_further_[k]});
+    }
     for (std::size_t i = 0; i < borrowed_[k].size(); ++i) {
       if (borrowed_[k][i] == 0) continue;
       const int centre = static_cast<int>(k) + (static_cast<int>(i) / 3 - 1) * cell_size +
