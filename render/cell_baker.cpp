@@ -99,6 +99,7 @@ bool CellBaker::find(int stage, bool past_pictures) {
   lender_.fill(-1);
   queue_.clear();
   cut_rays_.clear();
+  cut_places_.clear();
   rough_lobes_.fill({});
   open_lobes_.fill({});
   open_sky_of_centre_.fill(1);

@@ -80,12 +80,11 @@ class CellBaker final : public RaySink {
   // What a ray that is not followed takes of the environment, once it is known how much of its
   // light its point gets.
   struct CutRay {
-    Vec3f sees, throughput;
-    Spread cone;
-    float roughness;
+    Vec3f throughput;
+    Vec3f radiance;                   // there, of the planned light, if anybody asks
+    std::uint32_t first_place, last;  // of `cut_places_`
     std::uint16_t point;
-    bool one_of_many;  // as QueuedRay's
-    bool rough;        // in a lobe as those that `open_lobes_` tells of
+    bool rough;  // in a lobe as those that `open_lobes_` tells of
   };
 
   // What a centre sees in its rough lobe, as the table's lights tell: the share of the lobe's light
@@ -281,6 +280,7 @@ class CellBaker final : public RaySink {
 
   // cell_open_lobes.cpp
   void note_rough_lobe(const ShadePoint& from, const NewRay& ray);
+  void note_cut_ray(const ShadePoint& from, Vec3f throughput, LookUp& sees, bool rough);
   OpenLobe open_lobe(std::size_t rough, std::size_t word, std::uint64_t members) const;
   void find_open_lobes();
   void sum_tints();
@@ -381,6 +381,14 @@ class CellBaker final : public RaySink {
   Vec3f planned_radiance(LookUp& looked_up) const;
   bool compact_is_seen_in(const Lobe& lobe) const;
   float compact_density(const Lobe& lobe, std::size_t light) const;
+  bool decides(std::size_t slot) const {
+    return is_further(slot) ? compares_further_ : compares_centres_;
+  }
+  void add_places(std::size_t slot,
+                  std::size_t target,
+                  std::span<const MapSample> places,
+                  Vec3f planned_radiance,
+                  Vec3f weight);
   void add_environment(std::size_t slot,
                        std::size_t target,
                        Vec3f direction,
@@ -467,6 +475,7 @@ class CellBaker final : public RaySink {
   std::vector<Vec3f> compact_shares_;  // (compact light, centre): what glass lets by; none = all
   std::vector<QueuedRay> queue_;       // capacity reserved
   std::vector<CutRay> cut_rays_;
+  std::vector<MapSample> cut_places_;
   // Of a centre, the roughest of its lobes, and which of the points it is while all are centres;
   // nowhere: it has none.
   struct RoughLobe {

@@ -200,8 +200,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     } else if (ray.kind == RayKind::bent) {
       leave_bent(from.slot, target_of(from), ray.direction, cone, ray.throughput);
     } else if (dull && !(followed > 0)) {
-      cut_rays_.push_back({sees, ray.throughput, cone, ray.roughness,
-                           static_cast<std::uint16_t>(&from - points_.data()), one_of_many, rough});
+      note_cut_ray(from, ray.throughput, look_up(sees, ray.roughness, cone, one_of_many), rough);
     } else if (ray.kind == RayKind::reflection) {
       add_environment(from.slot, target_of(from), sees, ray.roughness, cone, one_of_many,
                       ray.throughput);
@@ -282,12 +281,20 @@ void CellBaker::add_environment(std::size_t slot,
                                 bool one_of_many,
                                 Vec3f weight) {
   LookUp& l = look_up(direction, roughness, spread, one_of_many);
-  for (const auto& [x, y, share, level] : std::span(l.places).first(l.count)) {
+  add_places(slot, target, std::span(l.places).first(l.count),
+             decides(slot) ? planned_radiance(l) : Vec3f{}, weight);
+}
+
+void CellBaker::add_places(std::size_t slot,
+                           std::size_t target,
+                           std::span<const MapSample> places,
+                           Vec3f planned_radiance,
+                           Vec3f weight) {
+  for (const auto& [x, y, share, level] : places) {
     add_place({weight * share, x, y, static_cast<std::uint16_t>(target),
                static_cast<std::uint16_t>(level)});
   }
-  const bool decides = is_further(slot) ? compares_further_ : compares_centres_;
-  if (decides) samples_[slot].added += weight * planned_radiance(l);
+  samples_[slot].added += weight * planned_radiance;
 }
 
 // What lobes mirror of compact lights that their points see; of a real surface's, less those that

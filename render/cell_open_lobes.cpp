@@ -28,6 +28,16 @@ void CellBaker::note_rough_lobe(const ShadePoint& from, const NewRay& ray) {
   lobe = {static_cast<std::uint16_t>(&from - points_.data()), ray.roughness, ray.normal};
 }
 
+// A ray that is not followed, and what it would see of the environment.
+void CellBaker::note_cut_ray(const ShadePoint& from, Vec3f throughput, LookUp& sees, bool rough) {
+  const auto first = static_cast<std::uint32_t>(cut_places_.size());
+  cut_places_.insert(cut_places_.end(), sees.places.begin(),
+                     sees.places.begin() + static_cast<std::ptrdiff_t>(sees.count));
+  cut_rays_.push_back({throughput, decides(from.slot) ? planned_radiance(sees) : Vec3f{}, first,
+                       static_cast<std::uint32_t>(cut_places_.size()),
+                       static_cast<std::uint16_t>(&from - points_.data()), rough});
+}
+
 // Of the lobe at a centre: the share of the table's light in it that those pixels of a word of the
 // cell's see. Compact lights are looked for by themselves.
 //
@@ -232,14 +242,16 @@ void CellBaker::take_from_environment() {
     const OpenLobe lobe = is_known ? open_lobes_[pixel] : OpenLobe{};
     const float open = lobe.by_lights() + lobe.by_ray() * open_sky_[ray.point];
     if (open > 0) {
-      add_environment(p.slot, target_of(p), ray.sees, ray.roughness, ray.cone, ray.one_of_many,
-                      ray.throughput * open);
+      const std::size_t count = ray.last - ray.first_place;
+      add_places(p.slot, target_of(p), std::span(cut_places_).subspan(ray.first_place, count),
+                 ray.radiance, ray.throughput * open);
     }
     if (open < 1 && in(transport_->receiving, pixel)) {
       add_surroundings(p.slot, target_of(p), pixel, ray.throughput * (1 - open));
     }
   }
   cut_rays_.clear();
+  cut_places_.clear();
 }
 
 }  // namespace render
