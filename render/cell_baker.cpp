@@ -27,9 +27,6 @@ bool receives_light(const ShadePoint& p) {
 
 CellBaker::CellBaker() {
   queue_.reserve(16384);
-  // More than come together in any scene yet: what is not used of it takes no memory, and growing
-  // would hold all of them twice.
-  places_.reserve(std::size_t{1} << 21);
   gather_.tints.reserve(static_cast<std::size_t>(GatherWorkspace::group) * cell_pixels);
 }
 
@@ -95,19 +92,18 @@ bool CellBaker::find(int stage, bool past_pictures) {
   std::fill_n(base_.begin(), slots, CellTransport::Base{});
   light_.fill({});
   edge_.fill(Edge::none);
-  counts_.fill(0);
+  further_samples_.clear();
   lender_.fill(-1);
   queue_.clear();
   cut_rays_.clear();
   cut_places_.clear();
-  rough_lobes_.fill({});
-  open_lobes_.fill({});
+  open_lobes_.clear();
   open_sky_of_centre_.fill(1);
   grey_.fill({});
   grey_of_further_.fill({});
-  lamp_terms_.clear();
-  places_.clear();
-  most_lights_ = most_places_ = enough_terms;
+  lights_.clear();
+  lamps_.clear();
+  places_.clear(*frame.planned, frame.planned_levels);
   compact_shares_.clear();
   lamps_apart_.fill(0);
   is_first_.fill(0);
@@ -285,15 +281,17 @@ void CellBaker::shade_points(int count, bool grid) {
       if (means && p->depth == 0) own_[p->slot] += p->throughput * p->radiance;
       // Around the cell, light is not asked for.
       if (!shades_ring_ || p->depth > 0) continue;
-      answers_light_[static_cast<std::size_t>(p - points_.data())] =
-          p->diffuse != Vec3f{} || p->catches_lamps;
+      answers_light_[index_of(*p)] = p->diffuse != Vec3f{} || p->catches_lamps;
       p->diffuse = {};
       p->catches_shadow = p->catches_lamps = false;
     }
   });
   receive(count, grid);
   find_open_sky(count, grid);
-  if (grid) find_open_lobes();
+  if (grid) {
+    open_lobes_.find(transport_->visibility, transport_->receiving, frame_->light_rows,
+                     receivers_.surface);
+  }
   take_from_environment();
   const auto& instances = frame_->inputs.scene->description().instances;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -323,7 +321,7 @@ void CellBaker::run_background(std::span<ShadePoint* const> leaving) {
       clear_answer(*p);
       p->plate_share = {1, 1, 1};
     }
-    light_of_point_[static_cast<std::size_t>(p - points_.data())] = {};
+    light_of_point_[index_of(*p)] = {};
     collect(*p);
     base_[target_of(*p)].seen += mean(p->throughput);
   }
@@ -332,8 +330,8 @@ void CellBaker::run_background(std::span<ShadePoint* const> leaving) {
 // What a point sends back whatever the light, and all of it under the planned light.
 void CellBaker::collect(const ShadePoint& p) {
   CellTransport::Base& base = base_[target_of(p)];
-  Sample& sample = samples_[p.slot];
-  const Light& light = light_of_point_[static_cast<std::size_t>(&p - points_.data())];
+  CameraSample& sample = samples_[p.slot];
+  const Light& light = light_of_point_[index_of(p)];
   const Vec3f own = p.throughput * p.radiance;
   const Vec3f sent_back = own + p.throughput * p.diffuse * (light.arriving + light.lamps);
   base.radiance += own;
@@ -438,7 +436,7 @@ void CellBaker::receive(int count, bool grid) {
   std::fill_n(light_of_point_.begin(), count, Light{});
   std::array<std::uint8_t, stream_rays> glossy{};
   for (const Lobe& lobe : lobes_) {
-    std::uint8_t& flags = glossy[static_cast<std::size_t>(lobe.point - points_.data())];
+    std::uint8_t& flags = glossy[index_of(*lobe.point)];
     flags = static_cast<std::uint8_t>(flags | (lobe.lamps ? 3 : 1));
   }
   std::fill_n(shares_mirrored_.begin(), count, std::uint8_t{0});
@@ -542,7 +540,7 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
       add_light_past_pictures(p, shadow_rays_.direction(receivers_, l.point, l.light), l.light,
                               weight, part_of_light(l, light_of_point_[point_at[l.point]].open));
     } else {
-      add_light({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
+      lights_.add({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
     }
   }
   for (std::size_t k = 0; k < point_at.size(); ++k) {

@@ -9,16 +9,18 @@
 #include <vector>
 
 #include "render/cell_transport.h"
+#include "render/environment_places.h"
+#include "render/further_samples.h"
 #include "render/kernel.h"
+#include "render/light_terms.h"
+#include "render/met_centres.h"
+#include "render/open_lobes.h"
 #include "render/sample_sequence.h"
 #include "render/standard.h"
 #include "render/trace.h"
 
 namespace render {
 
-// A sample's light counts up to so many times display white: a sixteenth of a pixel is then as
-// bright as a display shows.
-inline constexpr float sample_limit = 64;
 // Of a pixel's first further samples, in terms of the effort's.
 inline constexpr float first_tolerance = 0.5F;
 
@@ -52,8 +54,7 @@ class CellBaker final : public RaySink {
   void push(const ShadePoint& from, const NewRay& ray) override;
 
  private:
-  static constexpr int ring_size = cell_size + 2;  // a cell with the pixels around it
-  static constexpr int ring_pixels = ring_size * ring_size;
+  static constexpr int ring_size = MetCentres::side;
   static constexpr int around = 4 * (ring_size - 1);  // pixels around a cell
   static constexpr std::uint16_t nowhere = 0xFFFF;    // no receiver
   static constexpr std::uint32_t no_catcher = ~0U;
@@ -87,16 +88,6 @@ class CellBaker final : public RaySink {
     bool rough;  // in a lobe as those that `open_lobes_` tells of
   };
 
-  // What a centre sees in its rough lobe, as the table's lights tell: the share of the lobe's light
-  // that nothing hides, and of how many lights that is known; 0: nothing is known. A ray in the
-  // middle of the lobe tells as much as a few lights.
-  struct OpenLobe {
-    float share = 1, lights = 0;
-
-    float by_ray() const { return 4 / (lights + 4); }
-    float by_lights() const { return share * (1 - by_ray()); }
-  };
-
   // A lobe, whose compact light waits until it is known who sees which.
   struct Lobe {
     const ShadePoint* point;
@@ -107,25 +98,6 @@ class CellBaker final : public RaySink {
     std::uint32_t number;  // of the lobe on its path, for random numbers
     bool difference;
     bool lamps;  // it mirrors lamps
-  };
-
-  // What the rays of one sample add up to under the planned light.
-  struct Sample {
-    Vec3f added;  // radiance
-    Vec3f plate;  // share of the plate
-
-    Sample& operator+=(const Sample& o) {
-      added += o.added;
-      plate += o.plate;
-      return *this;
-    }
-  };
-
-  // What the camera ray through a pixel's centre met: enough to find edges and to share shading.
-  struct Met {
-    Scene::Surface surface;  // or no_hit
-    Vec3f normal;            // of the triangle, unit, towards the camera
-    Vec3f position;
   };
 
   // Why a pixel takes further camera rays.
@@ -181,11 +153,14 @@ class CellBaker final : public RaySink {
   static std::array<int, 2> pixel_of_ray(int i) {
     return {((i >> 4) & 3) * 4 + (i & 3), (i >> 6) * 4 + ((i >> 2) & 3)};
   }
-  static bool continuous(const Met& a, const Met& b, float pixel_angle, Vec3f camera);
   template <class Sample>  // a point, or a ray
   static std::size_t target_of(const Sample& p) {
     if (p.behind != no_picture_ray) return slots + p.behind;
     return p.slot < cell_pixels ? p.pixel : cell_pixels + p.pixel;
+  }
+  // Of the points that are at work.
+  std::size_t index_of(const ShadePoint& p) const {
+    return static_cast<std::size_t>(&p - points_.data());
   }
   bool is_inside(std::size_t k) const { return (inside_[k / 64] >> (k % 64) & 1) != 0; }
   // Of a sample through no pixel's centre.
@@ -264,6 +239,7 @@ class CellBaker final : public RaySink {
   // `part`: of the point's light, if there is other light as well.
   void add_light_past_pictures(
       const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part = 1);
+  Vec3f direction_through(std::size_t pixel) const;
   bool pictures_may_part(std::size_t k) const;
   float hidden_from(const Met& met) const;
   bool centre_looks_apart(std::size_t pixel);
@@ -278,12 +254,8 @@ class CellBaker final : public RaySink {
   void bounce();
   void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
 
-  // cell_open_lobes.cpp
-  void note_rough_lobe(const ShadePoint& from, const NewRay& ray);
+  // cell_cut_rays.cpp
   void note_cut_ray(const ShadePoint& from, Vec3f throughput, LookUp& sees, bool rough);
-  OpenLobe open_lobe(std::size_t rough, std::size_t word, std::uint64_t members) const;
-  void find_open_lobes();
-  void sum_tints();
   void find_open_sky(int count, bool grid);
   void take_from_environment();
   void add_surroundings(std::size_t slot, std::size_t target, std::size_t pixel, Vec3f weight);
@@ -345,29 +317,17 @@ class CellBaker final : public RaySink {
                  std::uint32_t shadow_point);
 
   // cell_pack.cpp
-  struct KeyedPlace {
-    std::uint64_t texels;  // that it lies between
-    EnvironmentTerm term;
-  };
   void pack();
   void pack_bases();
   void pack_places();
-  void pack_lights(std::vector<CellTransport::LightTerm>& terms);
-  void add_light(const CellTransport::LightTerm& term);
-  void add_place(const EnvironmentTerm& term);
-  void join_places(bool joins_wider);
-  void join_places_of_slot();
-  std::optional<EnvironmentTerm> wider(const EnvironmentTerm& e) const;
-  float change(const EnvironmentTerm& from, const EnvironmentTerm& to) const;
-  bool is_alone(std::vector<KeyedPlace>::const_iterator place) const;
-  bool halve_faint_places();
-  void join_wider_places();
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;
   SampleSequence numbers_of(const ShadePoint& p, std::uint32_t number, std::uint32_t sample) const;
   bool turn_within_lobe(const ShadePoint& from, std::uint32_t number, NewRay& ray) const;
   std::uint32_t pixel_in_picture(const ShadePoint& p) const;
+  bool note_lobe(const ShadePoint& from, const NewRay& asked, const NewRay& sent, bool one_of_many);
+  void see_plate(const ShadePoint& from, Vec3f share);
   float chance_of(const ShadePoint& from, std::uint32_t path) const;
   void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
   void find_compact_tints();
@@ -402,10 +362,6 @@ class CellBaker final : public RaySink {
 
   // cell_edges.cpp
   Met met_at(int i) const;
-  // What the centre of a pixel met.
-  const Met& met_by(std::size_t k) const {
-    return met_[(k / cell_size + 1) * ring_size + k % cell_size + 1];
-  }
   void keep_centres();
   void trace_ring();
   void shade_ring();
@@ -424,15 +380,10 @@ class CellBaker final : public RaySink {
   int neighbour_of(int i, const Further& f) const;
   CellMask edges() const;
   CellMask uncertain(int n) const;
-  float spread_of(std::size_t k, const std::array<Vec3f, cell_pixels>& squares) const;
-  float variance_of_further(std::size_t k) const;
   void count_errors();
   Vec3f direction_in(int x, int y, const std::array<float, 2>& offset) const;
   bool takes_rays(std::size_t k) const { return edge_[k] != Edge::none && edge_[k] != Edge::blend; }
-  void clear_further(std::size_t k);
-  void add_further(std::size_t k, const Sample& sample, int times);
-  void add_to_batch(const Further& f, const Sample& sample);
-  void end_batch();
+  void begin_further(std::size_t k);
 
   RayStream stream_;
   GatherWorkspace gather_;
@@ -454,21 +405,13 @@ class CellBaker final : public RaySink {
   std::array<MirroredHit, cell_pixels> mirrored_hits_;
   std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
-  std::vector<Vec3f> sum_of_light_;               // of a slot, by light; zero between slots
-  std::vector<std::uint64_t> has_sum_;            // bits, by light
-  std::vector<KeyedPlace> keyed_places_;
   std::vector<PointLight> tested_;
   std::vector<PointLamp> reached_;
   std::vector<Doubt> doubts_;
   std::array<std::size_t, 2> doubtful_{};  // pixel and centre whose doubts these are
   std::vector<AskedAgain> asked_;
-  // Many times the transport's.
-  std::vector<CellTransport::LightTerm> lamp_terms_;
-  std::vector<EnvironmentTerm> places_;
-  // Beyond so many terms they are joined, and may then be twice as many, places not by more than
-  // eight times as many as this, and `enough_terms` more.
-  static constexpr std::size_t enough_terms = std::size_t{1} << 15;
-  std::size_t most_lights_ = 0, most_places_ = 0, longest_places_ = enough_terms;
+  LightTerms lights_, lamps_;
+  EnvironmentPlaces places_;
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;
@@ -476,16 +419,7 @@ class CellBaker final : public RaySink {
   std::vector<QueuedRay> queue_;       // capacity reserved
   std::vector<CutRay> cut_rays_;
   std::vector<MapSample> cut_places_;
-  // Of a centre, the roughest of its lobes, and which of the points it is while all are centres;
-  // nowhere: it has none.
-  struct RoughLobe {
-    std::uint16_t point = nowhere;
-    float roughness = 0;
-    Vec3f normal{};
-  };
-  std::array<RoughLobe, cell_pixels> rough_lobes_;
-  std::array<OpenLobe, cell_pixels> open_lobes_;
-  std::vector<float> tinted_;  // (light, block of 4x4): what glass takes, in pixels
+  OpenLobes open_lobes_;  // of centres
   // The share of its light, but for compact lights, that nothing hides: of points, of centres.
   std::array<float, stream_rays> open_sky_;
   std::array<float, cell_pixels> open_sky_of_centre_;
@@ -498,11 +432,11 @@ class CellBaker final : public RaySink {
   std::uint32_t pushed_ = 0;
   std::array<int, cell_pixels> sent_{};  // rays that surfaces have sent on, by pixel
 
-  std::array<Sample, slots> samples_;  // centres, then further ones shaded on their own
+  std::array<CameraSample, slots> samples_;  // centres, then further ones shaded on their own
   // Of all slots, those of picture rays too.
   std::array<CellTransport::Base, CellPicture::all_slots> base_;
   std::array<Light, cell_pixels> light_;  // at what the centres met
-  std::array<Met, ring_pixels> met_;
+  MetCentres met_;
   std::array<Vec3f, slots> first_;          // of `added`, what the first surface gives
   std::array<Vec3f, slots> own_;            // and of that, means that it glows by
   std::array<Vec3f, around> mirrored_;      // of `added` at the pixels around, what it does not
@@ -512,17 +446,8 @@ class CellBaker final : public RaySink {
   CellTransport aside_;  // of the pixels around: it tells nothing of the cell
   std::array<Edge, cell_pixels> edge_;
   CellMask mirrors_;  // centres whose surfaces sent rays on, or mirror lights
-  std::array<Vec3f, cell_pixels> shown_sum_, behind_sum_, squares_,
-      batch_squares_;  // of further samples
-  std::array<std::uint16_t, cell_pixels> counts_, batches_;
-  std::array<int, cell_pixels> least_samples_;  // that small lights ask for
-  // Further samples of a pixel that follow each other, added up.
-  struct Batch {
-    std::size_t pixel = 0;
-    int number = 0, count = 0;
-    Vec3f shown{}, behind{};
-  };
-  Batch batch_;
+  FurtherSamples further_samples_;
+  std::array<int, cell_pixels> least_samples_;            // that small lights ask for
   std::array<std::uint16_t, cell_pixels> index_of_slot_;  // of further samples, in the pattern
   int samples_each_ = 1;  // of the pixels that take further ones now
   std::array<std::array<std::uint16_t, 9>, cell_pixels> borrowed_;  // by neighbour, row by row

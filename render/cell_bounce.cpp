@@ -78,7 +78,7 @@ void CellBaker::bounce() {
           add_environment(q.slot, to, q.sees, q.roughness, q.spread, q.one_of_many, weight);
         }
       };
-      const OpenLobe lobe = q.by_lights ? open_lobes_[q.pixel] : OpenLobe{};
+      const OpenLobe lobe = q.by_lights ? open_lobes_.at(q.pixel) : OpenLobe{};
       const float left = 1 - lobe.by_lights();
       if (left < 1) see_straight_on(target, q.throughput * (1 - left));
       q.throughput = q.throughput * left;

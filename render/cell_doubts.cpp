@@ -95,7 +95,7 @@ void CellBaker::find_doubts(std::size_t pixel, std::size_t centre) {
     for (int x = std::max(px - 1, 0); x <= std::min(px + 1, cell_size - 1); ++x) {
       const auto other = static_cast<std::size_t>(y * cell_size + x);
       if (other == centre || !in(transport_->receiving, other)) continue;
-      if (!continuous(met_by(centre), met_by(other), frame_->pixel_angle, frame_->camera)) continue;
+      if (!met_.continuous(centre, other)) continue;
       for_each_doubt(
           centre, other, [&](std::size_t c) { note(c, false); },
           [&](std::size_t i) { note(i, true); });
@@ -110,8 +110,7 @@ void CellBaker::settle_doubts(int count) {
   clear_receivers();
   Receivers& r = receivers_;
   std::array<bool, stream_rays> has_lobe{};
-  for (const Lobe& lobe : lobes_)
-    has_lobe[static_cast<std::size_t>(lobe.point - points_.data())] = true;
+  for (const Lobe& lobe : lobes_) has_lobe[index_of(*lobe.point)] = true;
   std::array<std::uint32_t, stream_rays + 1> first_of_point{};
   const auto& instances = frame_->inputs.scene->description().instances;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -136,7 +135,7 @@ void CellBaker::settle_doubts(int count) {
     }
   }
   for (const Lobe& lobe : lobes_) {
-    const auto i = static_cast<std::size_t>(lobe.point - points_.data());
+    const auto i = index_of(*lobe.point);
     for (std::size_t a = first_of_point[i]; a < first_of_point[i + 1]; ++a) {
       const AskedAgain& asked = asked_[a];
       const Vec3f more = asked.passed - asked.passed_centre;

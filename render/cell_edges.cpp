@@ -12,10 +12,7 @@ namespace render {
 namespace {
 
 constexpr float display_limit = 4;  // brighter light than this, in display white, looks alike
-constexpr float plate_contrast =
-    0.4F;                         // by which virtual things are taken to differ from the plate
-constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
-constexpr Scene::Surface no_hit{~0U, ~0U};
+constexpr float darkest = 0.01F;    // below, eyes do not tell more: steps up to 1 by their root
 // Where each sample sends on so many rays, as behind ribbed glass, a pixel takes no more samples.
 constexpr int many_rays = 10, most_samples_of_many_rays = 256;
 constexpr float alike_mirrors = 0.99F;  // cosine between normals: what they mirror is alike
@@ -30,10 +27,6 @@ constexpr float corner_contrast = 4;
 Vec3f abs(Vec3f v) { return {std::abs(v.x), std::abs(v.y), std::abs(v.z)}; }
 Vec3f clipped(Vec3f v) {
   return {std::min(v.x, display_limit), std::min(v.y, display_limit), std::min(v.z, display_limit)};
-}
-// What counts of a sample's light for how uncertain its pixel is.
-Vec3f counted(Vec3f v) {
-  return {std::min(v.x, sample_limit), std::min(v.y, sample_limit), std::min(v.z, sample_limit)};
 }
 // How many samples that follow each other in the pattern are looked at together, of so many first
 // ones: so that there are four such batches, or what can be.
@@ -53,10 +46,10 @@ float step_between(Vec3f a, Vec3f b) {
 
 }  // namespace
 
-CellBaker::Met CellBaker::met_at(int index) const {
+Met CellBaker::met_at(int index) const {
   const auto i = static_cast<std::size_t>(index);
   const RayStream& s = stream_;
-  if (s.geom[i] == RTC_INVALID_GEOMETRY_ID) return {no_hit, {}, {}};
+  if (s.geom[i] == RTC_INVALID_GEOMETRY_ID) return {Met::nothing, {}, {}};
   const Vec3f d{s.dx[i], s.dy[i], s.dz[i]};
   const Scene& scene = *frame_->inputs.scene;
   const Vec3f across{s.ngx[i], s.ngy[i], s.ngz[i]};  // in the object's frame inside an instance
@@ -67,9 +60,10 @@ CellBaker::Met CellBaker::met_at(int index) const {
 }
 
 void CellBaker::keep_centres() {
+  met_.begin(frame_->camera, frame_->pixel_angle);
   for (int i = 0; i < cell_pixels; ++i) {
     const auto [x, y] = pixel_of_ray(i);
-    met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)] = met_at(i);
+    met_.at(x, y) = met_at(i);
   }
 }
 
@@ -85,7 +79,7 @@ void CellBaker::trace_ring() {
   trace(around, true, RayKind::camera, frame_->pixel_angle);
   for (int i = 0; i < around; ++i) {
     const auto [x, y] = pixel_around(i);
-    met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)] = met_at(i);
+    met_.at(x, y) = met_at(i);
   }
 }
 
@@ -125,14 +119,13 @@ void CellBaker::shade_ring() {
   aside_.mirrored_receiving = own.mirrored_receiving;
   std::swap(aside_.reach, own.reach);
   transport_ = &aside_;
-  const std::size_t lamp_terms = lamp_terms_.size(), places = places_.size();
+  lights_.begin_aside(), lamps_.begin_aside(), places_.begin_aside();
   const auto sent = sent_;
   shades_ring_ = true;
   shade_points(count, false);
   bounce();
   shades_ring_ = false;
-  lamp_terms_.resize(lamp_terms);
-  places_.resize(places);
+  lights_.end_aside(), lamps_.end_aside(), places_.end_aside();
   sent_ = sent;
   transport_ = &own;
   std::swap(aside_.reach, own.reach);
@@ -140,16 +133,6 @@ void CellBaker::shade_ring() {
   for (std::size_t i = 0; i < around; ++i) {
     mirrored_[i] = samples_[cell_pixels + i].added - first_[cell_pixels + i];
   }
-}
-
-// Whether two neighbouring pixels show one surface: same thing, no crease, no step in depth.
-bool CellBaker::continuous(const Met& a, const Met& b, float pixel_angle, Vec3f camera) {
-  if (a.surface != b.surface) return false;
-  if (a.surface == no_hit) return true;
-  if (dot(a.normal, b.normal) < 0.9F) return false;
-  const Vec3f between = b.position - a.position;
-  const float step = std::min(std::abs(dot(a.normal, between)), std::abs(dot(b.normal, between)));
-  return step < 3 * pixel_angle * length(a.position - camera);
 }
 
 void CellBaker::find_edges() {
@@ -164,9 +147,9 @@ void CellBaker::find_edges() {
     if (!has_direction(table, x0_ + x, y0_ + y) ||
         !has_direction(table, x0_ + x + dx, y0_ + y + dy))
       return;
-    const Met& a = met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)];
-    const Met& b = met_[static_cast<std::size_t>((y + 1 + dy) * ring_size + x + 1 + dx)];
-    if (continuous(a, b, frame_->pixel_angle, frame_->camera)) return;
+    const Met& a = met_.at(x, y);
+    const Met& b = met_.at(x + dx, y + dy);
+    if (met_.continuous(a, b)) return;
     mark(x, y);
     mark(x + dx, y + dy);
   };
@@ -187,8 +170,7 @@ void CellBaker::find_edges() {
 float CellBaker::light_step(std::size_t a, std::size_t b) const {
   const float step = step_between(samples_[a].added, samples_[b].added);
   const float least = smooths_ ? blend_contrast_ : effort_.glint_contrast;
-  if (!(step > least) || !continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera))
-    return step;
+  if (!(step > least) || !met_.continuous(a, b)) return step;
   const CellTransport& t = *transport_;
   const CellTransport::Centres& c = t.centres.front();
   const bool lit = in(t.receiving, a) && in(t.receiving, b);
@@ -223,7 +205,7 @@ void CellBaker::find_glints() {
     if (smooths_ || !is_inside(a) || !is_inside(b)) return;
     if (!(step_between(samples_[a].added, samples_[b].added) > corner_contrast * least)) return;
     // Of one surface, further rays would find what its centres have.
-    if (continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera)) return;
+    if (met_.continuous(a, b)) return;
     for (const std::size_t k : {a, b}) {
       if (!takes_rays(k)) edge_[k] = Edge::surface;
     }
@@ -253,9 +235,7 @@ void CellBaker::find_glints() {
 // allows that a shadow ends between them, other than sharp ones, which further samples find.
 bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
   const CellTransport& t = *transport_;
-  if (!in(t.receiving, a) || !in(t.receiving, b) ||
-      !continuous(met_by(a), met_by(b), frame_->pixel_angle, frame_->camera))
-    return false;
+  if (!in(t.receiving, a) || !in(t.receiving, b) || !met_.continuous(a, b)) return false;
   const CellTransport::Centres& c = t.centres.front();
   const Vec3f diffuse = (c.diffuse.at(a) + c.diffuse.at(b)) * 0.5F;
   const auto shown = [&](std::size_t k, Vec3f in_doubt) {
@@ -294,8 +274,8 @@ int CellBaker::neighbour_of(int index, const Further& f) const {
       const float ox = static_cast<float>(dx) - offset[0], oy = static_cast<float>(dy) - offset[1];
       const float distance = ox * ox + oy * oy;
       if (distance >= best) continue;
-      const Met& there = met_[static_cast<std::size_t>((y + 1) * ring_size + x + 1)];
-      if (!continuous(here, there, frame_->pixel_angle, frame_->camera)) continue;
+      const Met& there = met_.at(x, y);
+      if (!met_.continuous(here, there)) continue;
       if (shares_all && bent_mirror(static_cast<std::size_t>(k), here, there)) continue;
       best = distance;
       found = k;
@@ -316,10 +296,15 @@ void CellBaker::trace_further(int count) {
   }
 }
 
+void CellBaker::begin_further(std::size_t k) {
+  further_samples_.begin(k);
+  borrowed_[k] = {};
+}
+
 // So many of a pixel's further samples are what the centre beside it shows.
 void CellBaker::take_from_centre(std::size_t k, int dx, int dy, int times) {
   const int centre = static_cast<int>(k) + dy * cell_size + dx;
-  add_further(k, samples_[static_cast<std::size_t>(centre)], times);
+  further_samples_.add(k, samples_[static_cast<std::size_t>(centre)], times);
   std::uint16_t& taken = borrowed_[k][static_cast<std::size_t>((dy + 1) * 3 + dx + 1)];
   taken = static_cast<std::uint16_t>(taken + times);
 }
@@ -357,7 +342,7 @@ void CellBaker::finish_further(int count) {
       sample_of_ray[static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(neighbour);
       const auto centre = static_cast<std::size_t>(neighbour);
       if (behind != no_picture_ray) {
-        add_further(f.pixel, samples_[centre], 1);
+        further_samples_.add(f.pixel, samples_[centre]);
       } else {
         take_from_centre(f.pixel, neighbour % cell_size - f.pixel % cell_size,
                          neighbour / cell_size - f.pixel / cell_size, 1);
@@ -384,31 +369,12 @@ void CellBaker::finish_further(int count) {
   lender_.fill(-1);
   bounce();
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-    const Sample& sample = samples_[sample_of_ray[i]];
-    if (sample_of_ray[i] >= cell_pixels) add_further(further_[i].pixel, sample, 1);
-    add_to_batch(further_[i], sample);
+    const CameraSample& sample = samples_[sample_of_ray[i]];
+    if (sample_of_ray[i] >= cell_pixels) further_samples_.add(further_[i].pixel, sample);
+    further_samples_.add_to_batch(further_[i].pixel,
+                                  further_[i].index / batch_of(effort_.aa_samples), sample);
   }
-  end_batch();
-}
-
-// Samples that follow each other in the pattern are spread over the pixel by themselves. What such
-// batches differ by tells how far off the mean of all may be: of an edge much less than what its
-// samples differ by would make believe.
-void CellBaker::add_to_batch(const Further& f, const Sample& sample) {
-  const int number = f.index / batch_of(effort_.aa_samples);
-  if (batch_.count > 0 && (batch_.pixel != f.pixel || batch_.number != number)) end_batch();
-  batch_.pixel = f.pixel, batch_.number = number;
-  ++batch_.count;
-  batch_.shown += counted(sample.added);
-  batch_.behind += sample.plate * plate_contrast;
-}
-
-void CellBaker::end_batch() {
-  if (batch_.count == 0) return;
-  batch_squares_[batch_.pixel] += (batch_.shown * batch_.shown + batch_.behind * batch_.behind) *
-                                  (1 / static_cast<float>(batch_.count));
-  ++batches_[batch_.pixel];
-  batch_ = {};
+  further_samples_.end_batch();
 }
 
 // More camera rays in pixels that an edge crosses. While edges are only smoothed, these are edges
@@ -425,14 +391,14 @@ void CellBaker::sample_edges() {
     const bool mirrors = sent_[k] > 0 || samples_[k].added != first_[k];
     mirrors_[k / 64] |= std::uint64_t{mirrors} << (k % 64);
     if (!takes_rays(k)) continue;
-    clear_further(k);
+    begin_further(k);
     if (past_pictures_ && pictures_may_part(k)) {
       transport_->looks_apart[k / 64] |= std::uint64_t{1} << (k % 64);
     }
     if (!takes_centre) continue;
     if (!centre_looks_apart(k)) borrowed_[k][own_centre] = 1;
-    add_further(k, samples_[k], 1);
-    ++batches_[k];
+    further_samples_.add(k, samples_[k]);
+    further_samples_.count_as_batch(k);
   }
   int first = 0;
   for (int end = effort_.aa_samples; end <= samples_max; first = end, end *= 4) {
@@ -464,17 +430,14 @@ void CellBaker::sample_edges() {
 void CellBaker::blend_neighbours() {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (edge_[k] != Edge::blend) continue;
-    clear_further(k);
+    begin_further(k);
     const int x = static_cast<int>(k % cell_size), y = static_cast<int>(k / cell_size);
-    const auto met = [&](int px, int py) -> const Met& {
-      return met_[static_cast<std::size_t>((py + 1) * ring_size + px + 1)];
-    };
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const int px = x + dx, py = y + dy;
         const bool in = px >= 0 && py >= 0 && px < cell_size && py < cell_size &&
                         is_inside(static_cast<std::size_t>(py * cell_size + px)) &&
-                        continuous(met(x, y), met(px, py), frame_->pixel_angle, frame_->camera);
+                        met_.continuous(met_.at(x, y), met_.at(px, py));
         if (!in) continue;
         const auto tent = static_cast<float>((2 - std::abs(dx)) * (2 - std::abs(dy)));
         const float shown = largest(samples_[static_cast<std::size_t>(py * cell_size + px)].added);
@@ -503,7 +466,7 @@ CellMask CellBaker::uncertain(int n) const {
   std::array<float, cell_pixels> variances{};
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!takes_rays(k)) continue;
-    variances[k] = variance_of_further(k);
+    variances[k] = further_samples_.variance(k);
   }
   const float of_first = first_tolerance * effort_.aa_tolerance;
   const auto samples_n = static_cast<float>(n);
@@ -512,7 +475,7 @@ CellMask CellBaker::uncertain(int n) const {
   CellMask mask{};
   for (int k = 0; k < cell_pixels; ++k) {
     const auto own = static_cast<std::size_t>(k);
-    if (!takes_rays(own) || counts_[own] != n) continue;
+    if (!takes_rays(own) || further_samples_.count(own) != n) continue;
     // A cell that is being found keeps a live frame waiting.
     if (n >= most_samples_of_many_rays && sent_[own] > many_rays * n) continue;
     float around = 0, pixels = 0;
@@ -533,34 +496,13 @@ CellMask CellBaker::uncertain(int n) const {
   return mask;
 }
 
-// The squares of what a pixel's further samples, or batches of them, differ from their mean by,
-// added up. Not less than rounding leaves.
-float CellBaker::spread_of(std::size_t k, const std::array<Vec3f, cell_pixels>& squares) const {
-  const Vec3f shown = shown_sum_[k], behind = behind_sum_[k];
-  const Vec3f of_mean = (shown * shown + behind * behind) * (1 / static_cast<float>(counts_[k]));
-  return std::max(largest(squares[k] - of_mean), 0.0F);
-}
-
-// Of a pixel's further samples, the variance that independent ones would have whose mean is as far
-// off as theirs. Batches that agree may all be off alike: each has a sample in every quarter of
-// the pixel. But then what crosses it is an edge, or small, and the mean of n such samples is off
-// as n^(-3/4) (Mitchell, "Consequences of Stratified Sampling in Graphics", SIGGRAPH 1996).
-float CellBaker::variance_of_further(std::size_t k) const {
-  const auto n = static_cast<float>(counts_[k]), batches = static_cast<float>(batches_[k]);
-  if (!(n > 1)) return 0;
-  const float alone = spread_of(k, squares_) / (n - 1);
-  if (batches == n) return alone;
-  const float spread = batches > 1 ? spread_of(k, batch_squares_) / (batches - 1) : 0.0F;
-  return std::max(spread, alone / std::sqrt(n));
-}
-
 void CellBaker::count_errors() {
   for (std::size_t k = 0; k < cell_pixels; ++k) {
-    const auto n = static_cast<float>(counts_[k]);
+    const auto n = static_cast<float>(further_samples_.count(k));
     if (edge_[k] == Edge::none || !(n > 1)) continue;
     // What was blended is as sure as one of it.
     const float variance =
-        edge_[k] == Edge::blend ? spread_of(k, squares_) : variance_of_further(k);
+        edge_[k] == Edge::blend ? further_samples_.spread(k) : further_samples_.variance(k);
     counting_[k].error = std::sqrt(variance / n);
   }
 }
@@ -577,23 +519,6 @@ Vec3f CellBaker::direction_in(int x, int y, const std::array<float, 2>& offset) 
   const Vec3f a = at(x, y), b = at(x + sx, y), c = at(x, y + sy);
   if (dot(a, a) < 0.5F || dot(b, b) < 0.5F || dot(c, c) < 0.5F) return a;
   return a + (b - a) * fx + (c - a) * fy;
-}
-
-void CellBaker::clear_further(std::size_t k) {
-  squares_[k] = batch_squares_[k] = shown_sum_[k] = behind_sum_[k] = {};
-  batches_[k] = 0;
-  borrowed_[k] = {};
-}
-
-void CellBaker::add_further(std::size_t k, const Sample& sample, int times) {
-  counts_[k] = static_cast<std::uint16_t>(counts_[k] + times);
-  const auto n = static_cast<float>(times);
-  const Vec3f shown = counted(sample.added);
-  // Whatever the plate shows: decisions hold from frame to frame.
-  const Vec3f behind = sample.plate * plate_contrast;
-  shown_sum_[k] += shown * n;
-  behind_sum_[k] += behind * n;
-  squares_[k] += (shown * shown + behind * behind) * n;
 }
 
 }  // namespace render

@@ -126,6 +126,42 @@ bool CellBaker::turn_within_lobe(const ShadePoint& from, std::uint32_t number, N
   return true;
 }
 
+// A lobe about the ray that a surface asked for, if compact light or lamps may show in it. Tells
+// whether these are found apart from the ray that it then sends.
+bool CellBaker::note_lobe(const ShadePoint& from,
+                          const NewRay& asked,
+                          const NewRay& sent,
+                          bool one_of_many) {
+  const bool lamps = mirrors_lamps(from, asked);
+  float share = 0;
+  if (frame_->planned->compact_apart) {
+    share = one_of_many ? 1 : share_without_compact(*frame_->planned, sent.roughness, sent.spread);
+  }
+  if (!(share > 0) && !lamps) return false;
+  const float area = length(asked.spread.a) * length(asked.spread.b);
+  const SeenLobe seen(asked.normal, from.hit.geometric_normal, -from.incoming);
+  const Lobe lobe{.point = &from,
+                  .seen = seen,
+                  .throughput = asked.throughput,
+                  .cone_rad = 0.5F * std::sqrt(area),
+                  .roughness = asked.roughness,
+                  .share = share,
+                  .number = pushed_,
+                  .difference = asked.kind == RayKind::difference,
+                  .lamps = lamps};
+  if (lamps || compact_is_seen_in(lobe)) lobes_.push_back(lobe);
+  return lamps;
+}
+
+// What a surface that sends a ray straight on sees of the plate.
+void CellBaker::see_plate(const ShadePoint& from, Vec3f share) {
+  CellTransport::Base& base = base_[target_of(from)];
+  samples_[from.slot].plate += share;
+  base.plate += share;
+  base.passed += mean(share);
+  base.seen += mean(share);
+}
+
 void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const float weight = largest(asked.throughput);
   if (!(weight > 0)) return;
@@ -136,27 +172,8 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   ray.spread = as_it_came ? from.turns : Spread{bounded(asked.spread.a), bounded(asked.spread.b)};
   const bool one_of_many = turn_within_lobe(from, pushed_, ray);
   const bool straight = ray.kind == RayKind::camera;
-  bool lamps = lamps_apart_[static_cast<std::size_t>(&from - points_.data())] != 0;
-  if (!straight && asked.normal != Vec3f{}) {
-    lamps = mirrors_lamps(from, asked);
-    const float share = !frame_->planned->compact_apart ? 0.0F
-                        : one_of_many
-                            ? 1.0F
-                            : share_without_compact(*frame_->planned, ray.roughness, ray.spread);
-    if (share > 0 || lamps) {
-      const float area = length(asked.spread.a) * length(asked.spread.b);
-      const Lobe lobe{&from,
-                      SeenLobe(asked.normal, from.hit.geometric_normal, -from.incoming),
-                      asked.throughput,
-                      0.5F * std::sqrt(area),
-                      asked.roughness,
-                      share,
-                      pushed_,
-                      asked.kind == RayKind::difference,
-                      lamps};
-      if (lamps || compact_is_seen_in(lobe)) lobes_.push_back(lobe);
-    }
-  }
+  const bool lamps = !straight && asked.normal != Vec3f{} ? note_lobe(from, asked, ray, one_of_many)
+                                                          : lamps_apart_[index_of(from)] != 0;
   // A cut ray is not black: it sees the environment, or the plate, or else what is about here.
   // Bright light is never cut.
   const bool deep = from.depth >= effort_.max_depth;
@@ -185,18 +202,17 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
   const bool dull = ray.kind == RayKind::reflection && from.diffuse != Vec3f{};
   const bool rough = dull && from.depth == 0 && asked.normal != Vec3f{} &&
                      asked.roughness >= rough_lobe && !effort_.chance_cuts;
-  if (rough && from.slot < cell_pixels) note_rough_lobe(from, asked);
+  if (rough && from.slot < cell_pixels) {
+    open_lobes_.note(from.slot,
+                     {asked.normal, from.hit.geometric_normal, -from.incoming, asked.roughness});
+  }
   const bool by_lights = rough && !is_further(from.slot);
   const bool asks =
       !(followed > 0) && !deep && !many && dull && !by_lights && weight >= least_asked * least;
   if (followed < 1 && effort_.dark_cuts) return;
   if (followed < 1 && !asks) {
     if (straight) {
-      CellTransport::Base& base = base_[target_of(from)];
-      samples_[from.slot].plate += ray.throughput;
-      base.plate += ray.throughput;
-      base.passed += mean(ray.throughput);
-      base.seen += mean(ray.throughput);
+      see_plate(from, ray.throughput);
     } else if (ray.kind == RayKind::bent) {
       leave_bent(from.slot, target_of(from), ray.direction, cone, ray.throughput);
     } else if (dull && !(followed > 0)) {
@@ -211,26 +227,26 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     ray.spread = cone;
   }
   ++sent_[from.pixel];
-  queue_.push_back({ray.origin,
-                    ray.direction,
-                    ray.throughput,
-                    sees,
-                    ray.spread,
-                    from.steps,
-                    ray.roughness,
-                    from.pixel,
-                    from.slot,
-                    ray.kind,
-                    static_cast<std::uint8_t>(from.depth + 1),
-                    from.behind,
-                    one_of_many,
-                    lamps,
-                    followed > 0 && followed < 1,
-                    false,
-                    asks,
-                    by_lights,
-                    next_path(from.path, pushed_),
-                    media});
+  queue_.push_back({.origin = ray.origin,
+                    .direction = ray.direction,
+                    .throughput = ray.throughput,
+                    .sees = sees,
+                    .spread = ray.spread,
+                    .steps = from.steps,
+                    .roughness = ray.roughness,
+                    .pixel = from.pixel,
+                    .slot = from.slot,
+                    .kind = ray.kind,
+                    .depth = static_cast<std::uint8_t>(from.depth + 1),
+                    .behind = from.behind,
+                    .one_of_many = one_of_many,
+                    .lamps_apart = lamps,
+                    .beyond_cut = followed > 0 && followed < 1,
+                    .first = false,
+                    .asks = asks,
+                    .by_lights = by_lights,
+                    .path = next_path(from.path, pushed_),
+                    .media = media});
 }
 
 // A number in 0..1: well spread over the samples of a pixel, those of centres over the picture.
@@ -291,8 +307,8 @@ void CellBaker::add_places(std::size_t slot,
                            Vec3f planned_radiance,
                            Vec3f weight) {
   for (const auto& [x, y, share, level] : places) {
-    add_place({weight * share, x, y, static_cast<std::uint16_t>(target),
-               static_cast<std::uint16_t>(level)});
+    places_.add({weight * share, x, y, static_cast<std::uint16_t>(target),
+                 static_cast<std::uint16_t>(level)});
   }
   samples_[slot].added += weight * planned_radiance;
 }
@@ -304,7 +320,7 @@ void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool
   if (grid) find_compact_tints();
   if (lobes_.empty()) return;
   for (const Lobe& lobe : lobes_) {
-    const auto i = static_cast<std::size_t>(lobe.point - points_.data());
+    const auto i = index_of(*lobe.point);
     const bool shared = receiver_of_point[i] == nowhere;
     if (!grid && !shared) continue;
     const std::size_t k = shared ? static_cast<std::size_t>(lender_[i]) : receiver_of_point[i];
@@ -320,7 +336,7 @@ void CellBaker::add_lobes(std::span<const std::uint16_t> receiver_of_point, bool
   }
   if (grid) return;
   const auto receiver_of = [&](const Lobe& lobe) {
-    return receiver_of_point[static_cast<std::size_t>(lobe.point - points_.data())];
+    return receiver_of_point[index_of(*lobe.point)];
   };
   std::ranges::sort(lobes_, {},
                     [&](const Lobe& lobe) { return receiver_of(lobe) * 256U + lobe.number; });
@@ -366,7 +382,7 @@ void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share)
   if (past_pictures_) {
     add_light_past_pictures(p, frame_->planned_table->lights[light].direction, light, weight);
   } else {
-    add_light(
+    lights_.add(
         {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
   }
   samples_[p.slot].added += weight * frame_->planned_table->lights[light].irradiance;

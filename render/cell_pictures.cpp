@@ -79,7 +79,7 @@ void CellBaker::keep_distances() {
   for (std::size_t k = 0; k < cell_pixels && !any; ++k) any = takes_rays(k);
   if (!any) return;
   transport_->nearest_m = ray_far;
-  for (const Met& met : met_) {
+  for (const Met& met : met_.all()) {
     const float far_m = hidden_from(met);
     transport_->nearest_m = std::min(transport_->nearest_m, far_m);
     transport_->farthest_m = std::max(transport_->farthest_m, far_m);
@@ -181,7 +181,7 @@ void CellBaker::add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Ve
       return;
     }
   }
-  lamp_terms_.push_back({slot, number, weight});
+  lamps_.add({slot, number, weight});
 }
 
 // Of being followed, for a ray that is such a share of its pixel. The less room there is, the
@@ -219,19 +219,25 @@ std::uint16_t CellBaker::add_picture_ray(const QueuedRay& ray, float far_m) {
   return static_cast<std::uint16_t>(rays.size() - 1);
 }
 
+// Where a centre looks, in the set.
+Vec3f CellBaker::direction_through(std::size_t pixel) const {
+  const auto& table = *frame_->inputs.directions;
+  const std::size_t t = table.index(y0_ + static_cast<int>(pixel / cell_size),
+                                    x0_ + static_cast<int>(pixel % cell_size));
+  return normalize(frame_->turn.to_set(Vec3f{table.x[t], table.y[t], table.z[t]}));
+}
+
 // Whether pixels see things apart from each other that pictures may come between.
 bool CellBaker::pictures_may_part(std::size_t k) const {
   const int px = static_cast<int>(k % cell_size), py = static_cast<int>(k / cell_size);
   float nearest = ray_far, farthest = 0;
-  for (int y = py; y < py + 3; ++y) {
-    for (int x = px; x < px + 3; ++x) {
-      const float far_m = hidden_from(met_[static_cast<std::size_t>(y * ring_size + x)]);
+  for (int y = py - 1; y <= py + 1; ++y) {
+    for (int x = px - 1; x <= px + 1; ++x) {
+      const float far_m = hidden_from(met_.at(x, y));
       nearest = std::min(nearest, far_m), farthest = std::max(farthest, far_m);
     }
   }
-  const auto& table = *frame_->inputs.directions;
-  const std::size_t t = table.index(y0_ + py, x0_ + px);
-  const Vec3f seen = normalize(frame_->turn.to_set(Vec3f{table.x[t], table.y[t], table.z[t]}));
+  const Vec3f seen = direction_through(k);
   return std::ranges::any_of(frame_->stalls.boxes(), [&](const Scene::Bounds& box) {
     const auto [first, last] = stretch_in(box, frame_->camera, seen, ray_far);
     return first <= last && nearest < last && farthest > first && nearest < farthest;
@@ -241,13 +247,9 @@ bool CellBaker::pictures_may_part(std::size_t k) const {
 // The same for a centre that is one of its pixel's few samples.
 bool CellBaker::centre_looks_apart(std::size_t pixel) {
   if (!in(transport_->looks_apart, pixel)) return false;
-  const auto& table = *frame_->inputs.directions;
-  const std::size_t t = table.index(y0_ + static_cast<int>(pixel / cell_size),
-                                    x0_ + static_cast<int>(pixel % cell_size));
-  const Vec3f seen = normalize(frame_->turn.to_set(Vec3f{table.x[t], table.y[t], table.z[t]}));
   samples_each_ = effort_.aa_samples;
-  return look_apart({static_cast<std::uint16_t>(pixel), 0}, seen, transport_->far_m[pixel],
-                    1 / std::sqrt(static_cast<float>(samples_each_)),
+  return look_apart({static_cast<std::uint16_t>(pixel), 0}, direction_through(pixel),
+                    transport_->far_m[pixel], 1 / std::sqrt(static_cast<float>(samples_each_)),
                     static_cast<std::uint16_t>(pixel)) != no_picture_ray;
 }
 
@@ -311,7 +313,7 @@ void CellBaker::add_light_past_pictures(
       return;
     }
   }
-  add_light({slot, number, weight});
+  lights_.add({slot, number, weight});
 }
 
 // What a light gives a point, of all that this gets if nothing is in the way.
@@ -377,8 +379,7 @@ void CellBaker::compare_with_centre(int index, const Further& f) {
         return !hidden && !shown;
       });
   if (!may_differ) return;
-  needs_pictures_ =
-      !continuous(met_at(index), met_by(f.pixel), frame_->pixel_angle, frame_->camera);
+  needs_pictures_ = !met_.continuous(met_at(index), met_.of(f.pixel));
 }
 
 }  // namespace render

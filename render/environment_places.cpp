@@ -1,0 +1,178 @@
+// Places in the environment, joined where they are many times the same.
+#include "render/environment_places.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+namespace render {
+namespace {
+
+// Slots that look at more places than this have faint ones looked up less sharply, each time that
+// they are joined.
+constexpr std::size_t most_places_of_slot = 256;
+// By how much a slot may then change for one of them at a time, under the planned light.
+constexpr float least_change = 3e-4F;
+// And by how much for all of them that join wider ones at the end, each sample of it.
+constexpr float most_change = 1e-3F;
+
+// A number for the four texels that a term's place lies between.
+std::uint64_t texels_of(const EnvironmentTerm& e) {
+  // Texels are fewer than 2^15 a side; left of and above the first ones there is one more.
+  const auto column = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.x)) + 1);
+  const auto row = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.y)) + 1);
+  return std::uint64_t{e.level} << 40 | row << 20 | column;
+}
+
+// One place in the middle of two that lie between the same texels, both of some weight.
+void join_into(EnvironmentTerm& to, const EnvironmentTerm& from) {
+  const float share = mean(to.weight), weight = mean(from.weight), part = weight / (share + weight);
+  to.weight += from.weight;
+  to.x += (from.x - to.x) * part;
+  to.y += (from.y - to.y) * part;
+}
+
+}  // namespace
+
+EnvironmentPlaces::EnvironmentPlaces() {
+  // More than come together in any scene yet: what is not used of it takes no memory, and growing
+  // would hold all of them twice.
+  places_.reserve(std::size_t{1} << 21);
+}
+
+void EnvironmentPlaces::clear(const Environment& planned,
+                              std::span<const capture::Image* const> levels) {
+  planned_ = &planned;
+  levels_ = levels;
+  places_.clear();
+  most_ = enough_terms;
+}
+
+void EnvironmentPlaces::add(const EnvironmentTerm& place) {
+  if (!is_finite(place.weight)) return;
+  places_.push_back(place);
+  if (places_.size() <= most_ || aside_) return;
+  join(nullptr);
+  most_ = places_.size() + std::min(places_.size(), 8 * enough_terms) + enough_terms;
+  longest_ = std::max(longest_, most_);
+}
+
+std::size_t EnvironmentPlaces::bytes() const {
+  return longest_ * sizeof places_[0] + of_slot_.capacity() * sizeof of_slot_[0];
+}
+
+std::span<EnvironmentTerm> EnvironmentPlaces::join() {
+  join(nullptr);
+  return places_;
+}
+
+std::span<EnvironmentTerm> EnvironmentPlaces::join_wider(const FurtherSamples& samples) {
+  join(&samples);
+  return places_;
+}
+
+// Wider ones only if it is known of how many samples a slot is.
+void EnvironmentPlaces::join(const FurtherSamples* samples) {
+  sort_by_slot(places_);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < places_.size();) {
+    of_slot_.clear();
+    const std::uint16_t slot = places_[i].slot;
+    for (; i < places_.size() && places_[i].slot == slot; ++i) {
+      of_slot_.push_back({texels_of(places_[i]), places_[i]});
+    }
+    join_slot();
+    if (of_slot_.size() > most_places_of_slot && halve_faint()) join_slot();
+    if (samples) {
+      const bool of_further = slot >= cell_pixels && slot < slots;
+      const int count = of_further ? samples->count(slot - cell_pixels) : 1;
+      join_wider_of_slot(static_cast<float>(count));
+    }
+    for (const Keyed& place : of_slot_) places_[kept++] = place.term;
+  }
+  places_.resize(kept);
+}
+
+void EnvironmentPlaces::join_slot() {
+  std::ranges::sort(of_slot_, [](const Keyed& a, const Keyed& b) {
+    return a.texels != b.texels   ? a.texels < b.texels
+           : a.term.x != b.term.x ? a.term.x < b.term.x
+                                  : a.term.y < b.term.y;
+  });
+  std::size_t kept = 0;
+  for (const Keyed& from : of_slot_) {
+    const float weight = mean(from.term.weight);
+    const float share = kept > 0 ? mean(of_slot_[kept - 1].term.weight) : 0;
+    if (weight > 0 && share > 0 && of_slot_[kept - 1].texels == from.texels) {
+      join_into(of_slot_[kept - 1].term, from.term);
+    } else {
+      of_slot_[kept++] = from;
+    }
+  }
+  of_slot_.resize(kept);
+}
+
+// The same place in texels twice as wide, if there are any. Only those of some weight are joined.
+std::optional<EnvironmentTerm> EnvironmentPlaces::wider(const EnvironmentTerm& e) const {
+  const std::size_t level = halved_level(*planned_, e.level);
+  if (level == e.level || !(mean(e.weight) > 0)) return {};
+  const capture::Image &fine = *levels_[e.level], &coarse = *levels_[level];
+  if (coarse.width * 2 != fine.width || coarse.height * 2 != fine.height) return {};
+  return EnvironmentTerm{e.weight, (e.x - 0.5F) / 2, (e.y - 0.5F) / 2, e.slot,
+                         static_cast<std::uint16_t>(level)};
+}
+
+// By how much its slot changes under the planned light.
+float EnvironmentPlaces::change(const EnvironmentTerm& from, const EnvironmentTerm& to) const {
+  const Vec3f by = from.weight * (radiance_at(*levels_[to.level], to.x, to.y) -
+                                  radiance_at(*levels_[from.level], from.x, from.y));
+  return std::max({std::abs(by.x), std::abs(by.y), std::abs(by.z)});
+}
+
+// Where two places of the same texels were not joined, one takes away what the other gives (rays
+// cut by chance): they stay together.
+bool EnvironmentPlaces::is_alone(std::vector<Keyed>::const_iterator place) const {
+  const bool first = place == of_slot_.begin() || std::prev(place)->texels != place->texels;
+  const auto next = std::next(place);
+  return first && (next == of_slot_.end() || next->texels != place->texels);
+}
+
+// Where a slot looks at very many places, those that give it least, and show about the same in
+// texels twice as wide, are looked up there, so that they can be joined. False if there are none.
+bool EnvironmentPlaces::halve_faint() {
+  float all = 0;
+  for (const Keyed& place : of_slot_) all += std::abs(mean(place.term.weight));
+  const float least = all / static_cast<float>(most_places_of_slot);
+  bool halved = false;
+  for (auto place = of_slot_.begin(); place != of_slot_.end(); ++place) {
+    if (mean(place->term.weight) >= least || !is_alone(place)) continue;
+    const auto to = wider(place->term);
+    if (!to || change(place->term, *to) > least_change) continue;
+    *place = {texels_of(*to), *to};
+    halved = true;
+  }
+  return halved;
+}
+
+// A place joins the one that it would be in texels twice as wide, the narrowest first.
+void EnvironmentPlaces::join_wider_of_slot(float samples) {
+  float left = most_change * samples;
+  // They are in order of levels, and wider ones have higher numbers.
+  for (auto place = of_slot_.begin(); place != of_slot_.end(); ++place) {
+    const auto to = is_alone(place) ? wider(place->term) : std::nullopt;
+    if (!to) continue;
+    const auto other =
+        std::ranges::lower_bound(place, of_slot_.end(), texels_of(*to), {}, &Keyed::texels);
+    if (other == of_slot_.end() || other->texels != texels_of(*to) || !is_alone(other) ||
+        !(mean(other->term.weight) > 0))
+      continue;
+    const float by = change(place->term, *to);
+    if (by > std::min(least_change * samples, left)) continue;
+    left -= by;
+    join_into(other->term, *to);
+    place->term.weight = {};
+  }
+  std::erase_if(of_slot_, [](const Keyed& place) { return place.term.weight == Vec3f{}; });
+}
+
+}  // namespace render
