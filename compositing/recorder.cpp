@@ -136,6 +136,7 @@ class Recorder::Take {
   bool push(RecordedFrame frame);
   void wait_for_room();
   RecorderStatus status() const;
+  void begin_close();
   void close();
 
  private:
@@ -257,13 +258,17 @@ RecorderStatus Recorder::Take::status() const {
   return status_;
 }
 
-void Recorder::Take::close() {
+void Recorder::Take::begin_close() {
   {
     const std::lock_guard lock(mutex_);
     closing_ = true;
   }
   work_.notify_one();
   room_.notify_all();
+}
+
+void Recorder::Take::close() {
+  begin_close();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -276,6 +281,8 @@ void Recorder::Take::run() {
   } catch (const std::exception& error) {
     stop(error.what());
   }
+  const std::lock_guard lock(mutex_);
+  status_.finished = true;
 }
 
 std::vector<capture::Sound> Recorder::Take::take_waiting_sounds() {
@@ -392,6 +399,7 @@ Recorder::~Recorder() = default;
 bool Recorder::push(RecordedFrame frame) { return take_->push(std::move(frame)); }
 void Recorder::wait_for_room() { take_->wait_for_room(); }
 RecorderStatus Recorder::status() const { return take_->status(); }
+void Recorder::begin_close() { take_->begin_close(); }
 void Recorder::close() { take_->close(); }
 
 }  // namespace compositing

@@ -61,6 +61,7 @@ struct RecorderStatus {
   double worst_write_s = 0;  // longest time that one frame took to write
   double write_s = 0;        // time spent writing, in all
   std::string error;         // why recording stopped; "" = it has not
+  bool finished = false;     // the files are closed
 };
 
 // Throws as Recorder's constructor, for all that can be told before anything is written.
@@ -92,6 +93,8 @@ class Recorder {
 
   // Writes what is queued and finishes the files. Further frames are dropped. Again: does nothing.
   void close();
+  // The same, but does not wait for it: status().finished tells when it is done.
+  void begin_close();
 
  private:
   class Take;

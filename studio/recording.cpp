@@ -1,8 +1,10 @@
 // Recordings of shows.
 #include "studio/recording.h"
 
-#include <optional>
+#include <algorithm>
+#include <utility>
 
+#include "compositing/output_file.h"
 #include "compositing/timecode.h"
 #include "studio/set_files.h"
 #include "studio/show.h"
@@ -10,15 +12,16 @@
 namespace studio {
 namespace {
 
-// Stretches of sound that follow each other, as one.
-std::optional<capture::Sound> joined(const std::vector<capture::Sound>& pieces) {
-  if (pieces.empty()) return std::nullopt;
-  capture::Sound whole = pieces.front();
-  for (std::size_t i = 1; i < pieces.size(); ++i) {
-    const std::vector<float>& more = pieces[i].samples;
-    whole.samples.insert(whole.samples.end(), more.begin(), more.end());
+// Takes that are being finished: more would only slow each other and the show.
+constexpr std::size_t most_ended = 2;
+
+bool share_files(const RecordSettings& a, const RecordSettings& b) {
+  for (const std::string* of_a : {&a.file, &a.fill, &a.key, &a.exr}) {
+    for (const std::string* of_b : {&b.file, &b.fill, &b.key, &b.exr}) {
+      if (!of_a->empty() && !of_b->empty() && compositing::is_one_file(*of_a, *of_b)) return true;
+    }
   }
-  return whole;
+  return false;
 }
 
 }  // namespace
@@ -53,42 +56,74 @@ void Recording::check(const RecordSettings& settings) const {
 void Recording::start(const RecordSettings& settings) {
   const compositing::RecorderSettings recorder = settings_of(settings);
   for (const std::string* written : {&settings.file, &settings.fill, &settings.key}) {
-    if (recorder_) spare_take(settings_, *written);
+    if (take_) spare_take(take_->settings, *written);
   }
+  finish_those_in_the_way(settings);
   compositing::check(recorder);  // else the take that runs goes on
   stop();
-  recorder_ = std::make_unique<compositing::Recorder>(recorder);
-  settings_ = settings;
+  finish_those_in_the_way(settings);
+  while (ended_.size() > most_ended) finish_oldest();
+  take_ = {settings, std::make_unique<compositing::Recorder>(recorder)};
 }
 
 void Recording::stop() {
-  if (!recorder_) return;
-  recorder_->close();
-  last_status_ = recorder_->status();
-  recorder_.reset();
+  if (!take_) return;
+  take_->recorder->begin_close();
+  ended_.push_back(std::move(*take_));
+  take_.reset();
+}
+
+void Recording::finish() {
+  while (!ended_.empty()) finish_oldest();
+}
+
+void Recording::finish_oldest() {
+  Take take = std::move(ended_.front());
+  ended_.pop_front();
+  take.recorder->close();
+  last_status_ = take.recorder->status();
+  const bool tells = !take_ && ended_.empty();
+  if (!last_status_.error.empty() && !tells) notes_.push_back(last_status_.error);
+}
+
+void Recording::finish_those_in_the_way(const RecordSettings& settings) {
+  const auto is_in_the_way = [&](const Take& take) { return share_files(take.settings, settings); };
+  while (std::ranges::any_of(ended_, is_in_the_way)) finish_oldest();
+}
+
+void Recording::forget_finished() {
+  while (!ended_.empty() && ended_.front().recorder->status().finished) finish_oldest();
 }
 
 void Recording::record(const ShownFrame& shown, bool wait) {
-  if (!recorder_) return;
-  if (wait) recorder_->wait_for_room();
+  if (!take_) return;
+  const RecordSettings& settings = take_->settings;
+  if (wait) take_->recorder->wait_for_room();
   compositing::RecordedFrame frame;
   frame.number = shown.prepared.job.frame;
   frame.time = shown.prepared.job.time;
   // What waits is kept: only what is written.
-  const bool has_pair = !settings_.fill.empty();
-  if (has_pair || !settings_.exr.empty()) {
+  const bool has_pair = !settings.fill.empty();
+  if (has_pair || !settings.exr.empty()) {
     frame.rgba = {shown.result, &shown.result->rgba};
     frame.matte = {shown.result, &shown.result->matte};
   }
   if (has_pair) frame.plate = shown.prepared.plate;
-  if (has_pair || !settings_.file.empty()) frame.display_rgb8 = shown.rgb8;
+  if (has_pair || !settings.file.empty()) frame.display_rgb8 = shown.rgb8;
   frame.tone = compositing::curve_of(shown.prepared.job.tone);
-  frame.sound = joined(shown.prepared.sound);
-  recorder_->push(std::move(frame));
+  frame.sound = shown.prepared.sound;
+  take_->recorder->push(std::move(frame));
 }
 
-compositing::RecorderStatus Recording::status() const {
-  return recorder_ ? recorder_->status() : last_status_;
+compositing::RecorderStatus Recording::status() {
+  forget_finished();
+  if (take_) return take_->recorder->status();
+  return ended_.empty() ? last_status_ : ended_.back().recorder->status();
+}
+
+std::vector<std::string> Recording::take_notes() {
+  forget_finished();
+  return std::exchange(notes_, {});
 }
 
 }  // namespace studio

@@ -1,7 +1,11 @@
 // The show's recording: started and stopped while the show runs.
 #pragma once
 
+#include <deque>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "compositing/recorder.h"
 #include "render/renderer.h"
@@ -23,30 +27,47 @@ struct RecordingForm {
   std::shared_ptr<const compositing::Display> display;  // whose codes are recorded
 };
 
-// One thread uses it.
+// One thread uses it. The show never waits for the end of a take: its files are finished beside it.
 class Recording {
  public:
   explicit Recording(const RecordingForm& form) : form_(form) {}
 
   // Throws as start(), for all that can be told before.
   void check(const RecordSettings& settings) const;
-  // Ends what runs and starts anew. Throws as compositing::Recorder; what runs goes on then.
+  // Ends what runs and starts anew. Throws as compositing::Recorder; what runs goes on then. Waits
+  // only for an earlier take that is still being finished, if it is of the same files or one of
+  // many.
   void start(const RecordSettings& settings);
-  // Finishes the files; nothing if none runs.
+  // Ends the take that runs, if one does; its files are finished while the show goes on.
   void stop();
-  bool running() const { return recorder_ != nullptr; }
+  // Until the files of all takes that have ended are finished.
+  void finish();
+  bool running() const { return take_.has_value(); }
+  // Whether files of a take that has ended are not finished yet.
+  bool finishing() const { return !ended_.empty(); }
   // Hands a frame over if a recording runs. `wait` = for room, rather than to drop the frame.
   void record(const ShownFrame& shown, bool wait);
   // Of the present or last recording.
-  compositing::RecorderStatus status() const;
+  compositing::RecorderStatus status();
+  // Why takes failed that the status tells nothing of any more, for another one runs.
+  std::vector<std::string> take_notes();
 
  private:
+  struct Take {
+    RecordSettings settings;
+    std::unique_ptr<compositing::Recorder> recorder;
+  };
+
   compositing::RecorderSettings settings_of(const RecordSettings& settings) const;
+  void forget_finished();
+  void finish_oldest();
+  void finish_those_in_the_way(const RecordSettings& settings);
 
   RecordingForm form_;
-  RecordSettings settings_;  // of the present or last recording
-  std::unique_ptr<compositing::Recorder> recorder_;
+  std::optional<Take> take_;
+  std::deque<Take> ended_;  // the latest last
   compositing::RecorderStatus last_status_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace studio

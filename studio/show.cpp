@@ -133,6 +133,7 @@ class Show::Stages {
       }
     }
     recording_.stop();
+    recording_.finish();
     inputs.wait();
     changing_ = maker_.is_changing();
     publish(true);
@@ -456,6 +457,7 @@ class Show::Stages {
         start_recording(start->record);
       } else {
         recording_.stop();
+        if (!options_.live) recording_.finish();  // its frames depend on no timing
       }
     });
   }
@@ -466,6 +468,7 @@ class Show::Stages {
     status.finished = finished;
     status.recording = recording_.running();
     status.recorder = recording_.status();
+    for (std::string& what : recording_.take_notes()) note(std::move(what));
     note_sound(status);
     publish(status);
   }

@@ -133,6 +133,7 @@ TEST_F(ShowNotes, KeepNoPicturesThatATakeDoesNotWrite) {
     EXPECT_EQ(shown.prepared.plate.use_count(), 1) << n;
   }
   recording.stop();
+  recording.finish();
   EXPECT_EQ(recording.status().written, 20);
 }
 
@@ -193,7 +194,9 @@ class HoarseCamera final : public GreyCamera {
     }
     return frame;
   }
-  std::optional<capture::Sound> take_sound() override { return std::exchange(sound_, {}); }
+  std::optional<capture::Sound> take_sound(capture::Time) override {
+    return std::exchange(sound_, {});
+  }
 
  private:
   std::int64_t first_;
