@@ -120,7 +120,6 @@ void V4l2Camera::open(const CameraOptions& options) {
   settings_ = request_;
   settings_.fourcc = layout.fourcc;
   settings_.size = PictureSize{layout.width, layout.height};
-  if (stream_->rate().num > 0) settings_.rate = stream_->rate();
   crop_ = crop_within(options.crop, layout.width, layout.height);
   frames_.set_layout(layout, crop_);
   info_.width = crop_.width;

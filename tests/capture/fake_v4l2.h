@@ -76,6 +76,7 @@ struct FakeDevice {
   // What was set.
   v4l2_pix_format format{};
   v4l2_fract interval{1, 30};
+  bool sets_interval = true;  // else it stays, whatever is asked for
   bool streaming = false;
 };
 
@@ -166,6 +167,9 @@ class FakeV4l2 final : public capture::V4l2Io {
       case VIDIOC_S_FMT:
         return set_format(device, static_cast<v4l2_format*>(argument)->fmt.pix);
       case VIDIOC_S_PARM:
+        if (!device.sets_interval) {
+          static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe = device.interval;
+        }
         device.interval = static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe;
         return 0;
       case VIDIOC_QUERY_EXT_CTRL:

@@ -369,6 +369,22 @@ TEST_F(V4l2CameraTest, ReturnsUnderAnotherNumberAfterItWasUnplugged) {
   EXPECT_LT(io_->clock - gone, 3s);
 }
 
+// As HDMI grabbers do, which follow their signal.
+TEST_F(V4l2CameraTest, ReturnsThoughItHasARateThatItDoesNotList) {
+  device().interval = {1, 50};
+  device().sets_interval = false;
+  const auto camera = open("/dev/video0?format=YUYV");
+  EXPECT_EQ(camera->info().rate, (Rational{50, 1}));
+  camera->next();
+  device().present = false;
+  camera->next();
+  device().present = true;
+  device().events.clear();
+  std::optional<Frame> frame = camera->next();
+  for (int i = 0; i < 300 && frame->status == FrameStatus::lost; ++i) frame = camera->next();
+  EXPECT_EQ(frame->status, FrameStatus::good) << frame->note;
+}
+
 TEST_F(V4l2CameraTest, WaitsForADeviceThatCameBackAsSomethingElse) {
   const auto camera = open("/dev/video0?format=YUYV");
   camera->next();
