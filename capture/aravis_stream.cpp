@@ -250,7 +250,11 @@ void AravisStream::set_rate(const std::optional<Rational>& wanted) {
     throw std::runtime_error("rate " + words_of(*wanted) + " was asked for; the camera sets " +
                              std::to_string(now) + " instead");
   }
-  rate_ = wanted ? *wanted : Rational{std::llround(now * 1000), 1000};
+  // Cameras tell 29.97 for 30000/1001.
+  constexpr double of_rounding = 1e-4;
+  rate_ = wanted
+              ? *wanted
+              : nominal_rate(now, of_rounding).value_or(Rational{std::llround(now * 1000), 1000});
 }
 
 void AravisStream::set_gain(double gain) {
