@@ -43,7 +43,7 @@ void AravisSearch::search(std::unique_ptr<AravisStream> gone) {
         fault = "another camera is there: " + there.model + " " + there.serial;
         stream.reset();
       }
-    } catch (const std::runtime_error& error) {
+    } catch (const std::exception& error) {
       fault = error.what();
     }
     lock.lock();

@@ -127,7 +127,7 @@ void FrameRecording::write_all() {
     std::string failure;
     try {
       write(frame);
-    } catch (const std::runtime_error& error) {
+    } catch (const std::exception& error) {
       failure = error.what();
     }
     lock.lock();
