@@ -53,7 +53,7 @@ class BracketedCamera final : public Camera {
 
   const CameraInfo& info() const override { return camera_->info(); }
   std::optional<Frame> next() override;
-  std::optional<Sound> take_sound() override { return camera_->take_sound(); }
+  std::optional<Sound> take_sound(Time until) override { return camera_->take_sound(until); }
   CameraStatistics statistics() const override;
   std::optional<ExposureRange> exposure_range() const override { return camera_->exposure_range(); }
 

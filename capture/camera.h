@@ -86,9 +86,10 @@ class Camera {
   // frame later may then come with an image of before it, or none, and what is wrong with a picture
   // that was not made counts nowhere.
   virtual bool skip() { return next().has_value(); }
-  // The sound up to and including the last frame's time that was not taken yet; after the end, up
-  // to where the next frame would have been. What is not taken within 10 s is dropped.
-  virtual std::optional<Sound> take_sound() { return std::nullopt; }
+  // The sound up to and including `until`, or the last frame's time if that is earlier, that was
+  // not taken yet; after the end, up to where the next frame would have been. What is 10 s older
+  // than the frame before the last one is dropped.
+  virtual std::optional<Sound> take_sound(Time /*until*/ = Time::max()) { return std::nullopt; }
   virtual CameraStatistics statistics() const = 0;
 
   // Nothing if the exposure cannot be set from frame to frame.

@@ -119,6 +119,7 @@ libav::PacketHandle MediaFile::read() {
       break;
     }
   }
+  at_end_ = true;
   return nullptr;
 }
 
@@ -166,15 +167,28 @@ void MediaFile::leave_sound_out() {
   waiting_[index(Track::sound)].clear();
 }
 
+bool MediaFile::stamps_may_jump() const {
+  return (context_->iformat->flags & AVFMT_TS_DISCONT) != 0;
+}
+
+std::optional<Time> MediaFile::length() const {
+  if (context_->duration_estimation_method == AVFMT_DURATION_FROM_BITRATE) return std::nullopt;
+  const std::int64_t length = context_->duration;  // of any track; AV_NOPTS_VALUE is below 0
+  constexpr std::int64_t longest = std::int64_t{AV_TIME_BASE} * 3600 * 24 * 365;
+  if (length <= 0 || length > longest) return std::nullopt;
+  return Time{length * (std::nano::den / AV_TIME_BASE)};
+}
+
 bool MediaFile::rewind() {
-  // Those whose stamps may jump seek by decoding times, and land behind the first picture.
-  if ((context_->iformat->flags & AVFMT_TS_DISCONT) != 0) return false;
+  // These seek by decoding times, and land behind the first picture.
+  if (stamps_may_jump()) return false;
   return seek(video_->start_time == AV_NOPTS_VALUE ? 0 : video_->start_time);
 }
 
 bool MediaFile::seek(std::int64_t pts) {
   waiting_ = {};
   waiting_bytes_ = 0;
+  at_end_ = false;
   return avformat_seek_file(context_.get(), video_->index, INT64_MIN, pts, pts, 0) >= 0;
 }
 

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <deque>
+#include <optional>
 #include <string>
 
+#include "capture/frame.h"
 #include "capture/libav.h"
 
 struct AVStream;
@@ -31,10 +33,18 @@ class MediaFile {
 
   // The next packet of a track; null at the end. Packets of the other track that lie before it wait
   // in memory, up to a bound: beyond it the oldest of the sound are dropped, but none of the video,
-  // and this returns null for the sound although the file goes on.
+  // and this returns null for the sound although the file goes on, until some of them are read.
   libav::PacketHandle next_packet(Track track);
+  // Whether nothing more can be read: what waits in memory is the rest.
+  bool at_end() const { return at_end_; }
   // Whether packets of the track lie in memory already.
   bool has_packet(Track track) const { return !waiting_[index(track)].empty(); }
+
+  // Whether time stamps may jump where recordings were joined, as in MPEG's streams: nothing lies
+  // between them.
+  bool stamps_may_jump() const;
+  // As the file tells it; nothing where it does not, or is only guessed at.
+  std::optional<Time> length() const;
 
   // From now on it is silent.
   void leave_sound_out();
@@ -54,6 +64,7 @@ class MediaFile {
   AVStream* sound_ = nullptr;
   std::array<std::deque<libav::PacketHandle>, 2> waiting_;
   std::int64_t waiting_bytes_ = 0;
+  bool at_end_ = false;
 };
 
 }  // namespace capture

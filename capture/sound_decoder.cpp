@@ -15,6 +15,12 @@ namespace capture {
 namespace {
 
 constexpr std::chrono::seconds max_untaken{10};
+constexpr std::chrono::seconds longest_piece{60};  // longer ones begin later
+
+// What joined recordings' stamps jump by, back and forth.
+constexpr std::int64_t least_jump_back_s = 1, least_jump_on_s = 10;
+// Sound is no farther than this ahead of the pictures that lie beside it.
+constexpr std::int64_t most_ahead_s = 30;
 
 // Time stamps are rounded (to 1 ms in Matroska): what lies so close to the end of the sound before
 // it follows without a gap.
@@ -61,6 +67,7 @@ void SoundDecoder::begin(std::int64_t first_pts, Time start) {
   floor_ = sample_at(start);
   offset_ = floor_ - av_rescale_q(first_pts, file_.video().time_base, {1, rate_});
   decoded_ = floor_;
+  newest_ = std::max(newest_, floor_);
   at_end_ = false;
 }
 
@@ -73,17 +80,22 @@ bool SoundDecoder::follow(SoundDecoder& before) {
 
 void SoundDecoder::skip_to(Time from) { taken_ = std::max(taken_, sample_at(from)); }
 
-void SoundDecoder::keep_up(Time until) {
-  const std::int64_t end = sample_at(until);
-  while (decoded_ <= end && decode_packet(true)) {
-  }
-  skip_to(until - max_untaken);
+void SoundDecoder::drop_taken() {
   while (!segments_.empty() && segments_.front().position + length(segments_.front()) <= taken_) {
     segments_.pop_front();
   }
 }
 
+void SoundDecoder::keep_up(Time until, Time newest) {
+  newest_ = sample_at(newest);
+  skip_to(until - max_untaken);
+  const std::int64_t end = sample_at(until);
+  while (decoded_ <= end && decode_packet(true)) drop_taken();
+  drop_taken();
+}
+
 std::optional<Sound> SoundDecoder::take(Time until) {
+  skip_to(until - longest_piece);
   const std::int64_t end = sample_at(until) + 1;
   while (decoded_ < end && decode_packet(false)) {
   }
@@ -102,9 +114,7 @@ std::optional<Sound> SoundDecoder::take(Time until) {
     }
   }
   taken_ = end;
-  while (!segments_.empty() && segments_.front().position + length(segments_.front()) <= taken_) {
-    segments_.pop_front();
-  }
+  drop_taken();
   return sound;
 }
 
@@ -128,6 +138,9 @@ bool SoundDecoder::decode_packet(bool only_waiting) {
     return false;
   }
   const libav::PacketHandle packet = file_.next_packet(Track::sound);
+  if (!packet && !file_.at_end()) {
+    return false;  // so many pictures lie before it that they are to be read first
+  }
   at_end_ = !packet;
   // Damaged packets leave silence.
   if (avcodec_send_packet(context_.get(), packet.get()) < 0) {
@@ -171,15 +184,22 @@ void SoundDecoder::take_frame(const AVFrame& frame) {
     return;
   }
   samples.resize(static_cast<std::size_t>(count) * static_cast<std::size_t>(channels_));
-  std::int64_t position = decoded_;
-  if (frame.best_effort_timestamp != AV_NOPTS_VALUE) {
-    const std::int64_t stamped =
-        offset_ + av_rescale_q(frame.best_effort_timestamp, file_.sound()->time_base, {1, rate_});
-    if (std::abs(stamped - decoded_) > rate_ / joins_per_second) {
-      position = stamped;
-    }
+  const std::int64_t stamp = frame.best_effort_timestamp;
+  add(stamp != AV_NOPTS_VALUE ? position_of(stamp) : decoded_, std::move(samples));
+}
+
+std::int64_t SoundDecoder::position_of(std::int64_t stamp) {
+  const std::int64_t stamped = offset_ + av_rescale_q(stamp, file_.sound()->time_base, {1, rate_});
+  const std::int64_t off = stamped - decoded_;
+  const bool jumps = off < -least_jump_back_s * rate_ || off > least_jump_on_s * rate_;
+  if (jumps && file_.stamps_may_jump()) {
+    offset_ -= off;
+    return decoded_;
   }
-  add(position, std::move(samples));
+  if (std::abs(off) <= rate_ / joins_per_second || stamped > newest_ + most_ahead_s * rate_) {
+    return decoded_;
+  }
+  return stamped;
 }
 
 void SoundDecoder::add(std::int64_t position, std::vector<float> samples) {

@@ -69,7 +69,7 @@ class VideoFile : public Camera {
   const CameraInfo& info() const override { return info_; }
   std::optional<Frame> next() override { return pass(true); }
   bool skip() override { return pass(false).has_value(); }
-  std::optional<Sound> take_sound() override;
+  std::optional<Sound> take_sound(Time until) override;
   CameraStatistics statistics() const override { return statistics_; }
 
  private:
@@ -142,7 +142,8 @@ VideoFile::VideoFile(const std::string& path,
   open();
   info_.rate = rate_of(file_->video());
   info_.frames = loop_ ? 0 : count_frames(*file_, info_.rate);
-  clock_.emplace(Rational{file_->video().time_base.num, file_->video().time_base.den}, info_.rate);
+  clock_.emplace(Rational{file_->video().time_base.num, file_->video().time_base.den}, info_.rate,
+                 StampRules{.may_jump = file_->stamps_may_jump(), .length = file_->length()});
   if (options.frame) {
     skip_to(*options.frame);
   }
@@ -257,7 +258,7 @@ void VideoFile::skip_to(std::int64_t frame) {
     const Frame skipped = make_frame({nullptr, picture->pts, FrameStatus::good, {}});
     if (sound_) {
       sound_->skip_to(skipped.time);
-      sound_->keep_up(skipped.time);
+      sound_->keep_up(skipped.time, skipped.time);
     }
   }
 }
@@ -383,18 +384,19 @@ std::optional<Frame> VideoFile::pass(bool makes_picture) {
   ++statistics_.delivered;
   statistics_.lost += frame->status == FrameStatus::lost ? 1 : 0;
   statistics_.damaged += frame->status == FrameStatus::damaged ? 1 : 0;
-  last_time_ = frame->time;
+  // What lies between is taken as time goes by: one picture may stand for minutes.
   if (sound_) {
-    sound_->keep_up(last_time_);
+    sound_->keep_up(last_time_, frame->time);
   }
+  last_time_ = frame->time;
   return frame;
 }
 
-std::optional<Sound> VideoFile::take_sound() {
+std::optional<Sound> VideoFile::take_sound(Time until) {
   if (!sound_ || statistics_.delivered == 0) {
     return std::nullopt;
   }
-  return sound_->take(ended_ ? end_of_pass() : last_time_);
+  return sound_->take(std::min(until, ended_ ? end_of_pass() : last_time_));
 }
 
 }  // namespace

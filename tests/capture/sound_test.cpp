@@ -1,6 +1,7 @@
 // The sound of video files, in step with their frames.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -133,6 +134,74 @@ TEST_F(Clap, IsInTimeWhenTheFileIsStartedLater) {
   EXPECT_EQ(first->time, std::chrono::milliseconds(200)) << "none from before the first frame";
   const Heard heard = play(*camera);
   EXPECT_NEAR(heard.clap_s, heard.flash_s, 0.010);
+}
+
+// Two recordings, one behind the other: the second one's stamps begin anew.
+TEST_F(Clap, IsHeardInEachOfJoinedRecordings) {
+  const std::string one = make("one.ts", "-c:v mpeg2video -c:a mp2");
+  const std::string joined = (directory_ / "joined.ts").string();
+  std::ofstream both(joined, std::ios::binary);
+  for (int i = 0; i < 3; ++i) both << std::ifstream(one, std::ios::binary).rdbuf();
+  both.close();
+  const auto camera = open_camera(joined);
+  std::vector<double> flashes_s;
+  std::vector<float> heard;
+  const int rate = camera->info().sound_rate;
+  Time last{-1};
+  while (const std::optional<Frame> frame = camera->next()) {
+    EXPECT_LE(frame->time - last, std::chrono::milliseconds(81));
+    last = frame->time;
+    if (frame->image->at(24, 32, 1) > 0.5F) {
+      flashes_s.push_back(static_cast<double>(frame->time.count()) * 1e-9);
+    }
+    if (const auto sound = camera->take_sound()) {
+      heard.insert(heard.end(), sound->samples.begin(), sound->samples.end());
+    }
+  }
+  ASSERT_EQ(flashes_s.size(), 3U);
+  for (const double at_s : flashes_s) {
+    const auto near = static_cast<std::size_t>((at_s - 0.06) * rate);
+    ASSERT_LT(near + static_cast<std::size_t>(rate) / 8, heard.size());
+    const auto from = heard.begin() + static_cast<std::ptrdiff_t>(near);
+    EXPECT_TRUE(std::any_of(from, from + rate / 8, [](float s) { return std::abs(s) > 0.05F; }))
+        << at_s;
+  }
+}
+
+// As screens are recorded: nothing moves for longer than sound is kept.
+TEST_F(Clap, IsHeardBehindAPictureThatStandsForLong) {
+  const std::string clip = (directory_ / "still.mkv").string();
+  independent::ffmpeg(
+      "-f lavfi -i color=black:size=16x16:rate=1/12:duration=36 -f lavfi -i "
+      "sine=duration=36:sample_rate=8000 -c:v ffv1 -c:a pcm_s16le '" +
+      clip + "'");
+  const auto camera = open_camera(clip);
+  camera->next();
+  std::size_t samples = 0, loud = 0;
+  for (Time time{}; time < std::chrono::seconds(24); time += std::chrono::milliseconds(40)) {
+    if (time % std::chrono::seconds(12) == Time{}) camera->next();  // one is read ahead
+    const auto sound = camera->take_sound(time + std::chrono::milliseconds(40));
+    ASSERT_TRUE(sound);
+    samples += sound->samples.size();
+    loud += static_cast<std::size_t>(
+        std::ranges::count_if(sound->samples, [](float s) { return std::abs(s) > 0.01F; }));
+  }
+  EXPECT_EQ(samples, 8000U * 24 + 1);
+  EXPECT_GT(loud, samples * 8 / 10);
+}
+
+// More pictures lie before its first sound than may wait in memory.
+TEST_F(Clap, IsHeardThoughItBeginsFarBehindInTheFile) {
+  const std::string clip = (directory_ / "late.mkv").string();
+  independent::ffmpeg(
+      "-f lavfi -i color=gray:size=1280x720:rate=25:duration=5 -itsoffset 4 -f lavfi -i "
+      "sine=duration=1:sample_rate=8000 -c:v rawvideo -pix_fmt gray -c:a pcm_s16le '" +
+      clip + "'");
+  ASSERT_GT(std::filesystem::file_size(clip), 100U << 20);
+  const auto camera = open_camera(clip);
+  const Heard heard = play(*camera);
+  EXPECT_NEAR(heard.clap_s, 4, 0.01);
+  EXPECT_NEAR(static_cast<double>(heard.samples.size()), 40000, 1);
 }
 
 // 3 s of so much sound that it does not all fit in memory, with a clap at 2.5 s.
