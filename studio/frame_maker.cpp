@@ -90,8 +90,13 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
   rate_ = rate.value_or(set_.show.fps.value_or(own));
-  // A live plate shows no more pictures than there are.
-  if (plate_->is_live() && plate_rate.num > 0 && rate_.value() > plate_rate.value()) {
+  // A live plate shows no more pictures than there are. Cameras tell rates to a few digits.
+  constexpr double of_rounding = 1e-4;
+  if (plate_->is_live() && plate_rate.num > 0 &&
+      rate_.value() > plate_rate.value() * (1 + of_rounding)) {
+    notes_.push_back(fmt::format(
+        "the show has {:.6g} frames a second, as many as its plate: {:.6g} were asked for",
+        plate_rate.value(), rate_.value()));
     rate_ = plate_rate;
   }
   live_ = live_ || live_plate;
@@ -144,22 +149,28 @@ FrameMaker::Due FrameMaker::wait_for_plate() {
   if (!first_due_) {
     first_due_ = plate_->wait_for_newer(until);
     last_due_ = {0, first_due_->time};
+    last_picture_ = first_due_->time;
     return last_due_;
   }
-  // The camera may be the faster one.
-  capture::Time soonest = last_due_.time + 3 * period / 4;
+  // The camera may be the faster one. If it is not, each of its pictures is due, however unevenly
+  // they are stamped.
+  const bool own_rate = rate_ == plate_->info().rate;
+  capture::Time soonest =
+      own_rate ? last_picture_ + capture::Time{1} : last_due_.time + 3 * period / 4;
   while (true) {
     const capture::Frame newest = plate_->wait_for_newer(until, soonest);
     if (newest.time < soonest) break;
     const std::int64_t number = number_of(newest);
     if (static_cast<double>(number) - place_of(newest.time) <= most_parted) {
       last_due_ = {number, newest.time};
+      last_picture_ = newest.time;
       return last_due_;
     }
     soonest = newest.time + capture::Time{1};  // one picture too many
   }
-  // As late as a picture may be that comes now.
-  const capture::Time time = std::max(last_due_.time + period, capture::monotonic_now() - patience);
+  // Before the stamp of a picture that comes now, or later ones would come too late for ever.
+  const capture::Time time =
+      std::max(last_due_.time + period, capture::monotonic_now() - plate_delay_ - period);
   last_due_ = {std::max<std::int64_t>(std::llround(place_of(time)), last_due_.frame + 1), time};
   return last_due_;
 }
@@ -179,14 +190,18 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     note_plate(*frame);
     prepared.job.cam_from_set = pose_at(*frame);
     if (plate_->is_live()) {
+      if (frame->status != capture::FrameStatus::lost) {
+        plate_delay_ = std::max(plate_->arrived() - frame->time, capture::Time{});
+      }
       prepared.arrived =
           Clock::time_point(std::chrono::duration_cast<Clock::duration>(plate_->arrived()));
     }
     prepared.plate = half_plate(*frame);
     prepared.plate_exposure_s =
         frame->exposure_s > 0 ? frame->exposure_s : set_.camera.exposure_s.value_or(0);
-    plate_->read_sound_to(time + capture::time_of_frame(1, rate_));
-    prepared.sound = plate_->take_sound();
+    const capture::Time next = time + capture::time_of_frame(1, rate_);
+    plate_->read_sound_to(next);
+    prepared.sound = plate_->take_sound(next);
     videos = videos_->at(time);
     prepared.notes = videos_->take_notes();
     std::ranges::move(take_notes(), std::back_inserter(prepared.notes));

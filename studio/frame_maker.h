@@ -51,7 +51,7 @@ struct PreparedFrame {
   std::vector<PersonStatus> persons;                      // of the set, in its order
   std::int64_t held_shapes = 0;    // objects that deform, whose shape is not the one due
   std::vector<std::string> notes;  // what went wrong while it was made
-  std::vector<capture::Sound> sound;
+  std::optional<capture::Sound> sound;
   std::chrono::steady_clock::time_point arrived;  // of the plate
   render::MatchResult match;
   ProbeStatus probe;
@@ -242,7 +242,9 @@ class FrameMaker {
   bool plate_is_lost_ = false, is_off_track_ = false;
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;
-  std::int64_t uncounted_ = 0;  // frames of the show that a live plate's count leaves out
+  capture::Time last_picture_{};  // stamp of its newest one that was due
+  capture::Time plate_delay_{};   // from the stamp of its last picture to its arrival
+  std::int64_t uncounted_ = 0;    // frames of the show that a live plate's count leaves out
   std::shared_ptr<const capture::Image> last_image_;  // that last_plate_ was made from
   std::shared_ptr<const capture::HalfImage> last_plate_;
 };

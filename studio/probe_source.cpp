@@ -243,9 +243,12 @@ double ProbeSource::exposure_s_of(const capture::Frame& frame) const {
 // The frame after those that were taken; of a live camera, waits for it.
 capture::Frame ProbeSource::wait_for_next() {
   if (camera_->is_live()) camera_->wait_for_newer(capture::monotonic_now() + next_patience);
-  const std::optional<capture::Time> time = camera_->next_time();
+  // Of a live one, others may have come meanwhile.
+  const std::optional<capture::Time> time =
+      camera_->is_live() ? capture::Time::max() : camera_->next_time();
   if (!time) return {};
-  return camera_->advance(*time, 1).front();
+  std::vector<capture::Frame> next = camera_->advance(*time, 1);
+  return next.empty() ? capture::Frame{} : std::move(next.front());
 }
 
 // The first cycle is taken at once, so that no frame is lit by half a bracket. It ends with an

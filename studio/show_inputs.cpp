@@ -41,7 +41,7 @@ std::unique_ptr<Source> open_plate(const Set& set) {
   if (set.show.fps) options.picture_rate = *set.show.fps;
   std::unique_ptr<Source> source;
   try {
-    source = std::make_unique<Source>(capture::open_camera(camera.source, options), true);
+    source = std::make_unique<Source>(capture::open_camera(camera.source, options));
   } catch (const std::runtime_error& error) {
     fail(set, camera.source_place, error.what());
   } catch (const std::invalid_argument& error) {

@@ -17,8 +17,7 @@ constexpr capture::Time of_rounding = 1us;    // a file's frame is due so much b
 
 }  // namespace
 
-Source::Source(std::unique_ptr<capture::Camera> camera, bool with_sound)
-    : camera_(std::move(camera)), with_sound_(with_sound) {
+Source::Source(std::unique_ptr<capture::Camera> camera) : camera_(std::move(camera)) {
   const capture::Rational rate = camera_->info().rate;
   if (rate.num > 0) period_ = capture::time_of_frame(1, rate);
   if (camera_->info().live) {
@@ -49,19 +48,19 @@ capture::CameraStatistics Source::statistics() const {
 
 void Source::read_ahead() {
   if (auto frame = camera_->next()) next_.push_back({std::move(*frame), {}});
-  if (!with_sound_) return;
-  if (auto sound = camera_->take_sound()) sound_.push_back(std::move(*sound));
 }
 
 // Takes over what has come of a live camera.
 void Source::fetch(capture::Time until) {
   for (capture::Arrival& arrival : live_->take(until)) next_.push_back(std::move(arrival));
-  while (next_.size() > most_waiting) next_.pop_front();
 }
 
-// Goes on to the next frame, if that is due by then.
+// Goes on to the next frame, if that is due by then. Of a live camera, also if more have come than
+// there is room for: one that is ahead of who asks, as of one with a longer delay, shows what is
+// least ahead rather than standing still.
 bool Source::step(capture::Time time) {
-  if (next_.empty() || next_.front().frame.time > time + early()) return false;
+  const bool is_due = !next_.empty() && next_.front().frame.time <= time + early();
+  if (!is_due && next_.size() <= most_waiting) return false;
   period_ = std::max(next_.front().frame.time - current_.frame.time, capture::Time{1});
   current_ = std::move(next_.front());
   next_.pop_front();
@@ -73,6 +72,7 @@ std::vector<capture::Frame> Source::advance(capture::Time time, std::size_t most
   if (live_) fetch({});
   std::vector<capture::Frame> passed;
   while (passed.size() < most && step(time)) passed.push_back(current_.frame);
+  while (next_.size() > 2 * most_waiting) next_.pop_front();
   return passed;
 }
 
@@ -106,6 +106,7 @@ const capture::Frame& Source::wait_for_newer(capture::Time until, capture::Time 
   while ((next_.empty() || newest().time < soonest) && !live_->ended() &&
          capture::monotonic_now() < until) {
     fetch(until);
+    while (next_.size() > most_waiting) next_.pop_front();
   }
   return newest();
 }
@@ -119,6 +120,8 @@ void Source::read_sound_to(capture::Time time) {
   }
 }
 
-std::vector<capture::Sound> Source::take_sound() { return std::exchange(sound_, {}); }
+std::optional<capture::Sound> Source::take_sound(capture::Time until) {
+  return live_ ? std::nullopt : camera_->take_sound(until);
+}
 
 }  // namespace studio

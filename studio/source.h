@@ -14,12 +14,13 @@ namespace studio {
 // Gives the newest frame whose time is not after a time asked for (of a file: by more than a
 // microsecond, for times are rounded); frames in between are passed over. So two sources of
 // different rates stay together, and one that stalls shows its last frame.
-// A live camera is read on a thread of its own: only what has come counts, and nobody waits.
+// A live camera is read on a thread of its own: only what has come counts, and nobody waits. It
+// keeps no more than a few frames whose time has not come; where these are more, the first of them
+// comes before its time.
 class Source {
  public:
-  // Reads the first frame. Throws std::runtime_error if there is none. Its sound is kept only where
-  // somebody takes it: `with_sound`.
-  explicit Source(std::unique_ptr<capture::Camera> camera, bool with_sound = false);
+  // Reads the first frame. Throws std::runtime_error if there is none.
+  explicit Source(std::unique_ptr<capture::Camera> camera);
 
   const capture::CameraInfo& info() const;
   capture::CameraStatistics statistics() const;
@@ -54,8 +55,9 @@ class Source {
   // Reads ahead as far as the sound up to this time takes, but no more than a few frames; nothing
   // where there is no sound, and of a live camera.
   void read_sound_to(capture::Time time);
-  // Sound up to the frames that were read so far, in order.
-  std::vector<capture::Sound> take_sound();
+  // The sound up to a time, and no further than the frames that were read so far, that was not
+  // taken yet; none of a live camera.
+  std::optional<capture::Sound> take_sound(capture::Time until);
 
  private:
   void read_ahead();
@@ -70,8 +72,6 @@ class Source {
   std::deque<capture::Arrival> next_;  // a file's next frame; all that have come of a live one
   capture::Time period_{};             // between the last two frames
   bool still_ = false;
-  bool with_sound_;
-  std::vector<capture::Sound> sound_;
 };
 
 }  // namespace studio

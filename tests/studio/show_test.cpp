@@ -203,6 +203,54 @@ TEST_F(ShowTest, CountsALivePlatesFramesByItsClockWhereTheCameraIsAnotherOneThan
   expect_by_clock("60");
 }
 
+// Its pictures are there a while after the time of their stamps, and that is off by up to `jitter`,
+// one to one side and the next one to the other. From number `gap` on, four are missing.
+class LateCamera final : public GreyCamera {
+ public:
+  LateCamera(capture::Rational rate, capture::Time delay, capture::Time jitter, std::int64_t gap)
+      : GreyCamera(50, rate, 0), delay_(delay), jitter_(jitter), gap_(gap) {
+    info_.live = true;
+  }
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (!frame) return frame;
+    if (frame->number >= gap_) frame->number += 4;
+    const capture::Time even = start_ + capture::time_of_frame(frame->number, info_.rate);
+    frame->time = frame->number % 2 == 0 ? even + jitter_ : even - jitter_;
+    std::this_thread::sleep_for(even + delay_ - capture::monotonic_now());
+    return frame;
+  }
+
+ private:
+  capture::Time start_ = capture::monotonic_now();
+  capture::Time delay_, jitter_;
+  std::int64_t gap_;
+};
+
+TEST_F(ShowTest, ShowsEachPictureOfALivePlateHoweverUnevenItsStamps) {
+  capture::register_camera("late", [](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<LateCamera>(capture::Rational{12, 1}, 60ms, 25ms, 1000);
+  });
+  Show show(made_set("late:1"));
+  show.run();
+  EXPECT_GE(show.status()->frames, 47);  // a busy machine may be late for one
+}
+
+// One gap, and a show that counted by when pictures usually come would be ahead of them for ever.
+TEST_F(ShowTest, FindsBackToALivePlateThatIsLateByManyFrames) {
+  capture::register_camera("late", [](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<LateCamera>(capture::Rational{20, 1}, 400ms, 0ms, 15);
+  });
+  Show show(made_set("late:1"));
+  std::int64_t of_their_time = 0;
+  show.run([&](const ShownFrame& shown) {
+    const render::FrameJob& job = shown.prepared.job;
+    of_their_time += job.textures[0].time == job.time ? 1 : 0;
+  });
+  EXPECT_GE(of_their_time, 45);
+  EXPECT_LE(show.status()->dropped, 6);
+}
+
 TEST_F(ShowTest, EndsWhereItsUserThrowsWhileItIsPaused) {
   ShowOptions options;
   options.frames = 1000;

@@ -95,6 +95,41 @@ TEST(Source, HoldsFewOfTheFramesThatAShowIsLateBy) {
   EXPECT_LE(most, 20U);
 }
 
+// Gives a picture every other millisecond, at once.
+class QuickCamera final : public GreyCamera {
+ public:
+  QuickCamera() : GreyCamera(100'000, {500, 1}, 0) { info_.live = true; }
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    frame->time = next_;
+    std::this_thread::sleep_for(next_ - capture::monotonic_now());
+    next_ += 2ms;
+    return frame;
+  }
+
+ private:
+  capture::Time next_ = capture::monotonic_now();
+};
+
+// A camera that is quick, by the time of one whose pictures come late: more are ahead of it than
+// are kept.
+TEST(Source, MovesOnThoughItIsAheadOfWhoAsks) {
+  Source newest(std::make_unique<QuickCamera>()), all(std::make_unique<QuickCamera>());
+  const std::int64_t first = newest.current().number;
+  std::vector<std::int64_t> numbers;
+  const capture::Time end = capture::monotonic_now() + 600ms;
+  while (capture::monotonic_now() < end) {
+    const capture::Time asked = capture::monotonic_now() - 300ms;
+    ASSERT_TRUE(newest.at(asked));
+    for (const auto& frame : all.advance(asked, 1000)) numbers.push_back(frame.number);
+    std::this_thread::sleep_for(4ms);
+  }
+  EXPECT_GT(newest.current().number, first + 100);
+  EXPECT_GT(newest.current().time, end - 300ms);
+  EXPECT_GT(numbers.size(), 50U);
+  EXPECT_TRUE(std::ranges::is_sorted(numbers));
+}
+
 TEST(Source, EndsWhenItsLastFrameHasBeenShownForAsLongAsTheOthers) {
   Source source = grey_source(3, 10);
   EXPECT_EQ(source.at(299ms)->number, 2);
@@ -176,43 +211,52 @@ class HummingCamera final : public GreyCamera {
   }
   std::optional<capture::Frame> next() override {
     auto frame = GreyCamera::next();
-    if (frame) heard_ = frame->time;
+    if (frame) read_ = frame->time;
     return frame;
   }
-  std::optional<capture::Sound> take_sound() override {
-    if (!heard_) return std::nullopt;
-    capture::Sound sound{*heard_, 1, 1000, std::vector<float>(40, 0.5F)};
-    heard_.reset();
+  std::optional<capture::Sound> take_sound(capture::Time until) override {
+    const auto end = std::min(until, read_) / 1ms;
+    if (end <= taken_) return std::nullopt;
+    const auto count = static_cast<std::size_t>(end - taken_);
+    capture::Sound sound{taken_ * 1ms, 1, 1000, std::vector<float>(count, 0.5F)};
+    taken_ = end;
     return sound;
   }
 
  private:
-  std::optional<capture::Time> heard_;
+  capture::Time read_{};
+  std::int64_t taken_ = 0;  // samples
 };
 
-// For hours of a person's video nobody does.
-TEST(Source, KeepsNoSoundThatNobodyTakes) {
-  Source source(std::make_unique<HummingCamera>(25));
-  EXPECT_TRUE(source.at(800ms));
-  EXPECT_TRUE(source.take_sound().empty());
-}
-
 TEST(Source, ReadsTheSoundOfFramesThatAShowPassesOver) {
-  Source source(std::make_unique<HummingCamera>(25), true);
-  std::size_t samples = 0;
+  Source source(std::make_unique<HummingCamera>(26));
+  const auto take = [](Source& from, capture::Time until) {
+    from.read_sound_to(until);
+    const auto sound = from.take_sound(until);
+    return sound ? sound->samples.size() : 0;
+  };
   for (int frame = 0; frame < 5; ++frame) {  // at five frames a second
     ASSERT_TRUE(source.at(frame * 200ms));
-    source.read_sound_to((frame + 1) * 200ms);
-    for (const capture::Sound& sound : source.take_sound()) samples += sound.samples.size();
-    EXPECT_GE(samples, static_cast<std::size_t>(frame + 1) * 200);
+    EXPECT_EQ(take(source, (frame + 1) * 200ms), 200U);
   }
-  EXPECT_EQ(samples, 1000U);
-  source.read_sound_to(1000s);
+  EXPECT_EQ(take(source, 1000s), 0U);
   Source far(std::make_unique<HummingCamera>(100000));
-  far.read_sound_to(1000s);
-  samples = 0;
-  for (const capture::Sound& sound : far.take_sound()) samples += sound.samples.size();
-  EXPECT_LT(samples, 1000U) << "no more pictures are held than a few";
+  EXPECT_LT(take(far, 1000s), 1000U) << "no more pictures are held than a few";
+}
+
+// A picture that stands for minutes: what is heard meanwhile belongs to the show's frames.
+TEST(Source, GivesSoundUpToTheTimeThatIsAskedFor) {
+  Source source(std::make_unique<HummingCamera>(100));
+  ASSERT_TRUE(source.at(0s));
+  source.read_sound_to(300ms);
+  const auto first = source.take_sound(100ms);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->samples.size(), 100U);
+  EXPECT_FALSE(source.take_sound(100ms));
+  const auto second = source.take_sound(250ms);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->time, 100ms);
+  EXPECT_EQ(second->samples.size(), 150U);
 }
 
 TEST(Source, RefusesACameraWithoutFrames) { EXPECT_THROW(grey_source(0, 25), std::runtime_error); }
