@@ -64,6 +64,7 @@ ExrSequence::ExrSequence(const ExrSequenceSettings& settings) : settings_(settin
     throw std::runtime_error(settings.dir + ": no folder that can be written to: " +
                              std::generic_category().message(errno != 0 ? errno : ENOTDIR));
   }
+  lock_.emplace(settings.dir);
 }
 
 std::string ExrSequence::path_of(std::int64_t number) const {

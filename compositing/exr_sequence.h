@@ -7,6 +7,7 @@
 
 #include "capture/frame.h"
 #include "capture/image.h"
+#include "compositing/output_file.h"
 #include "compositing/timecode.h"
 
 namespace compositing {
@@ -20,8 +21,9 @@ struct ExrSequenceSettings {
 
 class ExrSequence {
  public:
-  // Throws std::invalid_argument for an unknown compression, std::runtime_error with path and
-  // reason if the folder cannot be made or written.
+  // Keeps others from the folder as long as it lives. Throws std::invalid_argument for an unknown
+  // compression, std::runtime_error with path and reason if the folder cannot be made or written,
+  // or another program writes it.
   explicit ExrSequence(const ExrSequenceSettings& settings);
 
   // Writes frame.NNNNNN.exr: rgba (height, width, 4), matte (height, width, 1), bits as they are,
@@ -42,6 +44,7 @@ class ExrSequence {
 
  private:
   ExrSequenceSettings settings_;
+  std::optional<FolderLock> lock_;  // nothing until the folder is there
 };
 
 }  // namespace compositing

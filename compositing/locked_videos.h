@@ -1,6 +1,7 @@
 // Two Matroska files whose pictures stay locked to each other: as many, with the same times.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -27,6 +28,9 @@ class LockedVideos {
   // Finishes both, if they have pictures. Throws std::runtime_error like VideoWriter::close, once
   // both are whole if it is an index that cannot be written.
   void close();
+
+  // As VideoWriter::pictures(), of both.
+  std::int64_t pictures() const { return std::min(first_.pictures(), second_.pictures()); }
 
   // After a failure, here or elsewhere: finishes both with the same pictures, as many as are whole
   // in both.

@@ -31,6 +31,14 @@ struct Opened {
   bool made = false;  // it was not there
 };
 
+// Until it is closed. Any failure but one is a file system that has no locks.
+void lock(int descriptor, const std::string& path, const char* other) {
+  if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
+  ::close(descriptor);
+  throw std::runtime_error(path + ": is being written by another program: name another " + other +
+                           ", or wait until that one has ended");
+}
+
 // As it is, and locked until it is closed: two who write to one file destroy it for each other.
 // Whoever removes it holds the lock.
 Opened open_to_write(const std::string& path) {
@@ -45,13 +53,7 @@ Opened open_to_write(const std::string& path) {
     }
     struct stat found {};
     if (::fstat(descriptor, &found) != 0 || !S_ISREG(found.st_mode)) return {descriptor, made};
-    // Any other failure is a file system that has no locks.
-    if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-      ::close(descriptor);
-      throw std::runtime_error(path +
-                               ": is being written by another program: name another file, or wait "
-                               "until that one has ended");
-    }
+    lock(descriptor, path, "file");
     if (::fstat(descriptor, &found) != 0 || found.st_nlink > 0) return {descriptor, made};
     ::close(descriptor);  // who asked whether it could be written has removed it meanwhile
   }
@@ -76,6 +78,19 @@ void require_writable(const std::string& path) {
   ::close(opened.descriptor);
 }
 
+FolderLock::FolderLock(const std::string& folder)
+    : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+  if (descriptor_ < 0) {
+    throw std::runtime_error(folder +
+                             ": cannot be opened: " + std::generic_category().message(errno));
+  }
+  lock(descriptor_, folder, "folder");
+}
+
+FolderLock::~FolderLock() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
 void require_writable_folder(const std::string& path) {
   namespace fs = std::filesystem;
   std::error_code none;
@@ -91,6 +106,7 @@ void require_writable_folder(const std::string& path) {
     throw std::runtime_error(path + ": cannot be written to: " + there.string() + ": " +
                              std::generic_category().message(errno));
   }
+  if (fs::equivalent(there, path, none)) FolderLock{path};  // nobody writes it now
 }
 
 OutputFile::OutputFile(const std::string& path) : path_(path) {

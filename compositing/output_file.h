@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 struct AVIOContext;
@@ -20,6 +21,19 @@ void require_writable(const std::string& path);
 // Whether a folder is there that can be written to, or can be made. Makes nothing. Throws as
 // require_writable.
 void require_writable_folder(const std::string& path);
+
+// Keeps others of its kind, of any program, from a folder for as long as it lives.
+class FolderLock {
+ public:
+  // Throws std::runtime_error with path and reason if another one has it, or it cannot be opened.
+  explicit FolderLock(const std::string& folder);
+  FolderLock(FolderLock&& from) noexcept : descriptor_(std::exchange(from.descriptor_, -1)) {}
+  FolderLock& operator=(FolderLock&&) = delete;
+  ~FolderLock();
+
+ private:
+  int descriptor_;
+};
 
 class OutputFile {
  public:

@@ -387,6 +387,8 @@ void Recorder::Take::stop(const std::string& error) {
   {
     const std::lock_guard lock(mutex_);
     status_.error = error;
+    if (video_) status_.written = std::min(status_.written, video_->pictures());
+    if (pair_) status_.written = std::min(status_.written, pair_->pictures());
     // The frame that failed, if it was one, and those behind it.
     status_.dropped += taken_ - status_.written + static_cast<std::int64_t>(queue_.size());
     queue_.clear();

@@ -53,7 +53,7 @@ struct RecordedFrame {
 };
 
 struct RecorderStatus {
-  std::int64_t written = 0;
+  std::int64_t written = 0;  // that all of its files have, once they are closed
   std::int64_t dropped = 0;  // came while the queue was full, or after an error
   // Chunks of another form, with a time far after their frame, or of too many dropped frames.
   std::int64_t sounds_left_out = 0;

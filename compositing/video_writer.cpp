@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <new>
 #include <optional>
@@ -101,7 +102,7 @@ void append_24_bits(std::span<const float> samples, std::uint8_t* out) {
 void validate(const VideoSettings& settings) {
   constexpr int largest_side = 16384;  // H.264 ends there
   const std::string& file = settings.file;
-  require(file.size() > 4 && file.ends_with(".mkv"),
+  require(std::filesystem::path(file).extension() == ".mkv",
           "\"" + file + "\": takes are Matroska files, name it *.mkv");
   constexpr std::int64_t largest = std::numeric_limits<int>::max();
   const capture::Rational rate = settings.rate;
@@ -142,6 +143,13 @@ void validate(const VideoSettings& settings) {
 struct Checkpoint {
   std::int64_t index = 0;
   std::int64_t place = 0;
+  std::int64_t pictures = 0;
+};
+
+// So many pictures are whole in the file's first `place` bytes.
+struct Whole {
+  std::int64_t place = 0;
+  std::int64_t pictures = 0;
 };
 
 struct VideoWriter::State {
@@ -157,6 +165,8 @@ struct VideoWriter::State {
   void open_streams();
   void write_packet(AVPacket* packet, const AVStream* stream, AVRational time_base);
   void encode(const AVFrame* picture_or_end);
+  void mark(std::int64_t whole_pictures);
+  std::int64_t whole_at(std::int64_t place) const;
   void write_gathered();
   void give_gathered_up();
   std::int64_t room_for_index() const;
@@ -176,6 +186,8 @@ struct VideoWriter::State {
   std::int64_t last_index = -1;
   std::int64_t next_sample = 0;
   std::vector<Checkpoint> checkpoints;  // the last few
+  std::vector<Whole> wholes;            // as many as the file has marks
+  std::int64_t pictures = 0;            // that the muxer has; after a failure, that the file has
   bool begun = false, drained = false, finished = false;
 };
 
@@ -231,7 +243,19 @@ void VideoWriter::State::open_streams() {
   const int error = avformat_write_header(context, &options);
   av_dict_free(&options);
   if (error < 0) fail("the header cannot be written", error);
+  mark(0);
+}
+
+void VideoWriter::State::mark(std::int64_t whole_pictures) {
   file.mark();
+  if (!wholes.empty() && wholes.back().place == file.place()) return;
+  if (wholes.size() == checkpoints_kept) wholes.erase(wholes.begin());
+  wholes.push_back({file.place(), whole_pictures});
+}
+
+std::int64_t VideoWriter::State::whole_at(std::int64_t place) const {
+  const auto there = std::ranges::find(wholes, place, &Whole::place);
+  return there != wholes.end() ? there->pictures : 0;
 }
 
 void VideoWriter::State::write_packet(AVPacket* ready,
@@ -243,7 +267,9 @@ void VideoWriter::State::write_packet(AVPacket* ready,
   const int error = av_write_frame(muxer.get(), ready);
   av_packet_unref(ready);
   if (error < 0) fail("writing failed", error);
-  file.mark();  // the muxer gathers a cluster, and writes it at once when the next one starts
+  // The muxer gathers a cluster, and writes it at once when the next one starts: now, perhaps.
+  mark(pictures);
+  if (stream == picture_stream) ++pictures;
 }
 
 void VideoWriter::State::encode(const AVFrame* picture_or_end) {
@@ -262,7 +288,7 @@ void VideoWriter::State::write_gathered() {
   if (const int error = av_write_frame(muxer.get(), nullptr); error < 0) {
     fail("writing failed", error);
   }
-  file.mark();
+  mark(pictures);
 }
 
 // What the muxer still holds refers to pictures that were lost.
@@ -354,7 +380,7 @@ void VideoWriter::checkpoint() {
   state.write_gathered();
   std::vector<Checkpoint>& kept = state.checkpoints;
   if (kept.size() == checkpoints_kept) kept.erase(kept.begin());
-  kept.push_back({state.last_index, state.file.place()});
+  kept.push_back({state.last_index, state.file.place(), state.pictures});
 }
 
 void VideoWriter::drain() {
@@ -381,8 +407,13 @@ void VideoWriter::salvage() noexcept {
   if (!state.is_open()) return;
   state.finished = true;
   state.give_gathered_up();
-  if (state.file.cut_back(state.room_for_index())) av_write_trailer(state.muxer.get());
+  const bool has_room = state.file.cut_back(state.room_for_index());
+  const std::int64_t end = has_room ? state.file.place() : state.wholes.back().place;
+  state.pictures = state.whole_at(end);
+  if (has_room) av_write_trailer(state.muxer.get());
 }
+
+std::int64_t VideoWriter::pictures() const { return state_->pictures; }
 
 void VideoWriter::salvage_together(VideoWriter& a, VideoWriter& b) noexcept {
   State& one = *a.state_;
@@ -397,6 +428,8 @@ void VideoWriter::salvage_together(VideoWriter& a, VideoWriter& b) noexcept {
     const auto same = std::ranges::find(other.checkpoints, last->index, &Checkpoint::index);
     if (same == other.checkpoints.end()) continue;
     const bool fits = one.file.cut_to(last->place, room) & other.file.cut_to(same->place, room);
+    one.pictures = last->pictures;
+    other.pictures = same->pictures;
     if (!fits) continue;
     av_write_trailer(one.muxer.get());
     av_write_trailer(other.muxer.get());

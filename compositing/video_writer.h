@@ -63,6 +63,9 @@ class VideoWriter {
   // Finishes the file, if there is anything in it. Throws std::runtime_error like write_picture.
   void close();
 
+  // Pictures that the file has; of what was written last, only once it is finished.
+  std::int64_t pictures() const;
+
   // After a failure: keeps what was written whole, gives up the rest, and finishes the file.
   void salvage() noexcept;
 

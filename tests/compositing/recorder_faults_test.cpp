@@ -106,6 +106,7 @@ TEST_F(RecorderFaultsTest, StopsCleanlyWhenTheDiskIsFull) {
     const double duration_s = times_s.back();
     times_s.pop_back();
     EXPECT_GE(times_s.size(), 20U) << codec;
+    EXPECT_GE(static_cast<std::int64_t>(times_s.size()), status.written);
     EXPECT_LE(static_cast<std::int64_t>(times_s.size()), status.written + 1);
     EXPECT_NEAR(duration_s, static_cast<double>(times_s.size()) / 25, 1.1) << codec;
     for (std::size_t i = 0; i < times_s.size(); ++i) {
@@ -122,6 +123,28 @@ TEST_F(RecorderFaultsTest, StopsCleanlyWhenTheDiskIsFull) {
           << i;
     }
   }
+}
+
+TEST_F(RecorderFaultsTest, KeepsOthersFromAFolderOfFrames) {
+  RecorderSettings settings = small_take("");
+  settings.exr_dir = path("take");
+  const auto refusal = [&] {
+    try {
+      check(settings);
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_EQ(refusal(), "");
+  {
+    const Recorder recorder(settings);
+    EXPECT_EQ(refusal(), settings.exr_dir +
+                             ": is being written by another program: name another folder, or wait "
+                             "until that one has ended");
+    EXPECT_THROW(Recorder{settings}, std::runtime_error);
+  }
+  EXPECT_EQ(refusal(), "");
 }
 
 TEST_F(RecorderFaultsTest, ClosesTheVideoWholeWhenItIsTheExrFramesThatFail) {
@@ -156,6 +179,7 @@ TEST_F(RecorderFaultsTest, RefusesWhatCannotBeWrittenAtOnceWithPathAndReason) {
   const std::string missing = path("no/such/folder/take.mkv");
   EXPECT_EQ(reason(small_take(missing)),
             missing + ": cannot be written: No such file or directory");
+  EXPECT_THROW(Recorder(small_take(path(".mkv"))), std::invalid_argument);
   fs::create_directories(path("folder.mkv"));
   EXPECT_EQ(reason(small_take(path("folder.mkv"))),
             path("folder.mkv") + ": cannot be written: Is a directory");
