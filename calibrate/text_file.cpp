@@ -16,7 +16,10 @@ constexpr std::size_t largest_file = std::size_t{64} << 20U;
 
 std::string read_text_file(const std::string& path) {
   const std::vector<std::byte> bytes = capture::read_file(path, largest_file);
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";  // of spreadsheets
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  return std::string(text);
 }
 
 void write_text_file(const std::string& path, std::string_view text) {

@@ -40,16 +40,26 @@ std::vector<std::byte> read_file(const std::string& path, std::size_t max_bytes)
 }
 
 void write_file(const std::string& path, std::span<const std::byte> bytes) {
-  const std::string partial = path + ".part";
-  File file(std::fopen(partial.c_str(), "wbe"), &std::fclose);
+  namespace fs = std::filesystem;
+  std::error_code error;
+  const fs::file_status there = fs::status(path, error);
+  const fs::path real = fs::weakly_canonical(path, error);
+  const std::string target = error ? path : real.string();
+  const std::string partial = target + ".part";
+  bool in_place = fs::exists(there) && !fs::is_regular_file(there);
+  File file(std::fopen(in_place ? target.c_str() : partial.c_str(), "wbe"), &std::fclose);
+  if (!file && errno == EACCES && fs::exists(there)) {  // the file may be written, its folder not
+    in_place = true;
+    file.reset(std::fopen(target.c_str(), "wbe"));
+  }
   if (!file) throw failure(path, "cannot be written", errno);
   const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
-  const bool closed = std::fclose(file.release()) == 0;
-  if (!written || !closed || std::rename(partial.c_str(), path.c_str()) != 0) {
-    const int error = errno;
-    std::remove(partial.c_str());
-    throw failure(path, "cannot be written", error);
-  }
+  int failed = written ? 0 : errno;
+  if (std::fclose(file.release()) != 0 && failed == 0) failed = errno;
+  if (failed == 0 && !in_place && std::rename(partial.c_str(), target.c_str()) != 0) failed = errno;
+  if (failed == 0) return;
+  if (!in_place) std::remove(partial.c_str());
+  throw failure(path, "cannot be written", failed);
 }
 
 }  // namespace capture

@@ -2,13 +2,12 @@
 #include "capture/png.h"
 
 #include <array>
-#include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <new>
 #include <stdexcept>
 #include <string>
 
+#include "capture/files.h"
 #include "capture/libav.h"
 
 extern "C" {
@@ -87,12 +86,8 @@ void write_png(const std::filesystem::path& path,
     throw std::invalid_argument("a PNG of another size than its texels");
   }
   const libav::PacketHandle packet = encode(path, width, height, channels, texels);
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file.write(reinterpret_cast<const char*>(packet->data), packet->size);
-  file.close();
-  if (!file) {
-    fail(path, std::string(std::strerror(errno)) + "; is the folder there, and the disk not full?");
-  }
+  const std::span<const std::uint8_t> bytes(packet->data, static_cast<std::size_t>(packet->size));
+  write_file(path.string(), std::as_bytes(bytes));
 }
 
 }  // namespace capture

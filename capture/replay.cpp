@@ -141,10 +141,14 @@ std::vector<PictureEntry> read_list(const std::filesystem::path& list) {
 // The pictures in a folder, in the order of their names.
 std::vector<PictureEntry> read_bracket(const std::filesystem::path& folder, Rational rate) {
   std::vector<std::string> pictures;
-  for (const auto& file : std::filesystem::directory_iterator(folder)) {
+  std::error_code error;
+  for (const auto& file : std::filesystem::directory_iterator(folder, error)) {
     if (file.is_regular_file() && is_picture(file.path().string())) {
       pictures.push_back(file.path().string());
     }
+  }
+  if (error) {
+    throw std::runtime_error("cannot open replay:" + folder.string() + ": " + error.message());
   }
   if (pictures.empty()) {
     throw std::runtime_error("cannot open replay:" + folder.string() +

@@ -4,12 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
+#include <span>
 #include <stdexcept>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/files.h"
 #include "studio/machine.h"
 #include "studio/svg_png.h"
 
@@ -78,10 +79,7 @@ std::string csv_cell_of(const Pairs& pairs, const std::string& name) {
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+  capture::write_file(path.string(), std::as_bytes(std::span(text)));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -16,6 +17,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "capture/files.h"
 #include "compositing/output_file.h"
 
 namespace studio {
@@ -85,10 +87,8 @@ void require_figures_file(const std::string& path) {
 void Console::figures(std::string_view json) {
   if (figures_file_.empty()) return;
   require_figures_file(figures_file_);
-  std::ofstream file(figures_file_, std::ios::binary | std::ios::trunc);
-  file << json << '\n';
-  file.close();
-  if (!file) throw std::runtime_error(figures_file_ + ": the figures cannot be written");
+  const std::string text = std::string(json) + '\n';
+  capture::write_file(figures_file_, std::as_bytes(std::span(text)));
 }
 
 }  // namespace studio

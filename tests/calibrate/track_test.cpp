@@ -101,6 +101,12 @@ TEST(WriteTrack, IsUndoneByReadTrack) {
   }
 }
 
+TEST(ReadTrack, TakesASpreadsheetsByteOrderMark) {
+  const std::string path = testing::TempDir() + "marked_track.csv";
+  std::ofstream(path) << "\xEF\xBB\xBFtime_s,px,py,pz,qw,qx,qy,qz\r\n0,1,2,3,1,0,0,0\r\n";
+  EXPECT_EQ(read_track(path).keys.size(), 1U);
+}
+
 TEST(ReadTrack, PassesOverCommentsSpacesAndCarriageReturns) {
   const std::string path = made::make_temporary_directory() / "track.csv";
   std::ofstream(path) << "# from the tracker\r\ntime_s,px,py,pz,qw,qx,qy,qz\r\n\r\n"
