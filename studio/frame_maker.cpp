@@ -188,7 +188,8 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     frame = plate_->at(time + plate_->info().jitter);
     if (!frame) return std::nullopt;
     note_plate(*frame);
-    prepared.job.cam_from_set = pose_at(*frame);
+    // A picture is of the camera's place then; a still stands for all times.
+    prepared.job.cam_from_set = pose_at(plate_->is_still() ? time : frame->time);
     if (plate_->is_live()) {
       if (frame->status != capture::FrameStatus::lost) {
         plate_delay_ = std::max(plate_->arrived() - frame->time, capture::Time{});
@@ -270,9 +271,9 @@ void FrameMaker::note_plate(const capture::Frame& frame) {
   plate_is_lost_ = lost;
 }
 
-calibrate::Pose FrameMaker::pose_at(const capture::Frame& frame) {
+calibrate::Pose FrameMaker::pose_at(capture::Time time) {
   if (!track_) return set_.camera.pose.cam_from_set;
-  const double time_s = seconds(frame.time);
+  const double time_s = seconds(time);
   const calibrate::TrackedPose at = calibrate::pose_at(*track_, time_s);
   if (!at.inside && !is_off_track_) {
     notes_.push_back(

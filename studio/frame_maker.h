@@ -206,7 +206,7 @@ class FrameMaker {
   void open_once_left(const Open& open) const;
   void finish_change();
   void note_plate(const capture::Frame& frame);
-  calibrate::Pose pose_at(const capture::Frame& frame);
+  calibrate::Pose pose_at(capture::Time time);
   double place_of(capture::Time time) const;
   std::int64_t number_of(const capture::Frame& picture);
   std::shared_ptr<const capture::HalfImage> half_plate(const capture::Frame& frame);

@@ -327,7 +327,8 @@ void ProbeSource::prime_live(std::size_t cycle) {
   }
   if (bracket_->shots() == 0) {
     throw std::runtime_error("of no frame within 5 s the exposure could be told" +
-                             (why.empty() ? "" : ": " + why));
+                             (why.empty() ? "" : ": " + why) +
+                             "; on a machine that is busy with other things, start again");
   }
 }
 

@@ -58,6 +58,7 @@ void Recording::start(const RecordSettings& settings) {
   for (const std::string* written : {&settings.file, &settings.fill, &settings.key}) {
     if (take_) spare_take(take_->settings, *written);
   }
+  if (take_ && share_files(take_->settings, settings)) stop();  // into a folder of frames
   finish_those_in_the_way(settings);
   compositing::check(recorder);  // else the take that runs goes on
   stop();

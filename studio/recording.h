@@ -34,9 +34,9 @@ class Recording {
 
   // Throws as start(), for all that can be told before.
   void check(const RecordSettings& settings) const;
-  // Ends what runs and starts anew. Throws as compositing::Recorder; what runs goes on then. Waits
-  // only for an earlier take that is still being finished, if it is of the same files or one of
-  // many.
+  // Ends what runs and starts anew. Throws as compositing::Recorder; what runs goes on then, unless
+  // its frames go to the same folder. Waits only for an earlier take that is still being finished,
+  // if it is of the same files or one of many.
   void start(const RecordSettings& settings);
   // Ends the take that runs, if one does; its files are finished while the show goes on.
   void stop();

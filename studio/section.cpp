@@ -268,13 +268,19 @@ bool Section::integers(std::string_view key, std::span<int> target, int low, int
   return true;
 }
 
+std::string words_for_missing(const std::filesystem::path& path, std::error_code why) {
+  if (why)
+    return fmt::format("names {}, which cannot be looked at: {}", path.string(), why.message());
+  return fmt::format("names {}, which does not exist", path.string());
+}
+
 bool Section::file(std::string_view key, const std::filesystem::path& base, std::string& target) {
   std::string given;
   if (!text(key, given)) return false;
   const std::filesystem::path path = (base / given).lexically_normal();
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
-    fault(key, fmt::format("names {}, which does not exist", path.string()));
+    fault(key, words_for_missing(path, error));
     return false;
   }
   target = path.string();

@@ -58,6 +58,9 @@ struct Range {
   double high = std::numeric_limits<double>::max();
 };
 
+// What to say of a path that is not there, or, by `why`, cannot be looked at.
+std::string words_for_missing(const std::filesystem::path& path, std::error_code why);
+
 // Every reading function returns true and sets its target if the key is there and good; a key that
 // is there and bad leaves the target alone and adds a fault. finish() then names unknown keys.
 // Names in messages are "SECTION.key". The table must outlive the section.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -92,13 +93,14 @@ void check_timecode(Section& section, const RecordSettings& record, const ShowSe
   if (record.timecode.empty()) return;
   std::vector<capture::Rational> rates{{60, 1}, {60000, 1001}};
   if (show.fps) rates = {*show.fps};
-  std::string why;
+  std::string why =
+      fmt::format("\"{}\" is none at any rate up to 60 frames per second", record.timecode);
   for (const capture::Rational rate : rates) {
     try {
       static_cast<void>(compositing::parse_timecode(record.timecode, rate));
       return;
     } catch (const std::invalid_argument& error) {
-      if (why.empty()) why = error.what();
+      if (show.fps) why = error.what();
     }
   }
   section.fault("timecode", fmt::format("cannot be: {}", why));
@@ -202,6 +204,11 @@ Set read_set(const std::string& path) {
   std::int64_t instances = 0;
   for (const Section& section : root.tables("object")) {
     set.objects.push_back(read_object_section(section, context));
+    const auto before = std::span(set.objects).first(set.objects.size() - 1);
+    if (const std::string& name = set.objects.back().name;
+        !name.empty() && std::ranges::find(before, name, &ObjectSettings::name) != before.end()) {
+      faults.add(section.place(), fmt::format("there are two objects named \"{}\"", name));
+    }
     const auto& copies = set.objects.back().copies;
     instances += std::int64_t{copies[0]} * copies[1];
     if (instances > most_instances) {

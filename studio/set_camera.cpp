@@ -175,10 +175,15 @@ void read_probe_source(Section& section, const fs::path& base, ProbeSettings& pr
   if (fs::is_directory(path, error)) {
     probe.kind = ProbeSettings::Kind::bracket;
     for (const auto& entry : fs::directory_iterator(path, error)) {
-      if (entry.is_regular_file(error)) probe.shots.push_back(entry.path().string());
+      std::error_code none;
+      if (entry.is_regular_file(none)) probe.shots.push_back(entry.path().string());
     }
     std::ranges::sort(probe.shots);
-    if (probe.shots.empty()) section.fault("source", fmt::format("{} holds no files", path));
+    if (error) {
+      section.fault("source", fmt::format("{} cannot be looked into: {}", path, error.message()));
+    } else if (probe.shots.empty()) {
+      section.fault("source", fmt::format("{} holds no files", path));
+    }
   } else if (path.empty()) {
     probe.kind = ProbeSettings::Kind::camera;
   }
@@ -243,7 +248,7 @@ bool read_source_key(Section& section,
   const bool sequence = path.filename().string().find('%') != std::string::npos;
   std::error_code error;
   if (!fs::exists(sequence ? path.parent_path() : path, error)) {
-    section.fault(key, fmt::format("names {}, which does not exist", path.string()));
+    section.fault(key, words_for_missing(path, error));
     return false;
   }
   uri = scheme + ":" + path.string();

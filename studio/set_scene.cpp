@@ -330,7 +330,16 @@ SetScene describe_scene(const Set& set, const std::stop_token& stop) {
         found = loaded.emplace(i, add_model(scene, load_object(object, result.notes, stop))).first;
         note_missing_shapes(object, name, result.notes);
       }
+      const std::size_t before = scene.instances.size();
       place_copies(result, object, i, name, found->second);
+      if (const std::size_t all = scene.instances.size();
+          all > static_cast<std::size_t>(most_instances)) {
+        faults.add(object.place,
+                   fmt::format("{}: {} instances of its parts, {} with the objects before, but a "
+                               "set holds at most {}",
+                               name, all - before, all, most_instances));
+        break;
+      }
     } catch (const std::runtime_error& error) {
       faults.add(object.place, error.what());
     } catch (const std::invalid_argument& error) {

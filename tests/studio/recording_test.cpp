@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "compositing/exr_sequence.h"
 #include "studio/show.h"
 #include "tests/compositing/take.h"
 
@@ -96,6 +97,28 @@ TEST_F(TakesOfAShow, WaitsForATakeOfTheSameFile) {
   recording.stop();
   recording.finish();
   EXPECT_EQ(frames_of("take.mkv"), "2");
+}
+
+// Their numbers tell them apart.
+TEST_F(TakesOfAShow, GoOnInTheSameFolderOfFrames) {
+  form_.width = form_.height = 16;
+  Recording recording(form_);
+  RecordSettings frames;
+  frames.exr = path("frames");
+  auto result = std::make_shared<render::FrameResult>();
+  result->rgba = {16, 16, std::vector<capture::Half>(16 * 16 * 4), 4};
+  result->matte = {16, 16, std::vector<capture::Half>(16 * 16), 1};
+  ShownFrame shown;
+  shown.result = result;
+  for (int take = 0; take < 2; ++take) {
+    recording.start(frames);
+    shown.prepared.job.frame = take;
+    recording.record(shown, false);
+  }
+  recording.stop();
+  recording.finish();
+  EXPECT_EQ(recording.status().error, "");
+  EXPECT_EQ(compositing::ExrSequence::frames_in(frames.exr), 2);
 }
 
 TEST_F(TakesOfAShow, HasNoMoreThanAFewTakesToFinish) {

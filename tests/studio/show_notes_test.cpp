@@ -58,6 +58,21 @@ TEST_F(ShowNotes, NotesThatTheCamerasTrackHasEnded) {
   EXPECT_THAT(show.status()->notes, ElementsAre(HasSubstr("no pose at 0.120 s")));
 }
 
+// A still stands for all times: the camera moves before it.
+TEST_F(ShowNotes, FollowsATrackOverAStill) {
+  std::ofstream(dir_ / "track.csv") << "time_s,px,py,pz,qw,qx,qy,qz\n"
+                                       "0,0,-8,4,0.7,-0.7,0,0\n0.2,2,-8,4,0.7,-0.7,0,0\n";
+  Set set = made_set("grey:1,25,0");
+  set.camera.pose.track = (dir_ / "track.csv").string();
+  FrameMaker maker(set);
+  const auto at = [&](std::int64_t frame) {
+    return calibrate::position_of(maker.make(frame).value().job.cam_from_set);
+  };
+  EXPECT_NEAR(at(0).x, 0, 1e-5);
+  EXPECT_NEAR(at(2).x, 0.8, 1e-5);
+  EXPECT_NEAR(at(9).x, 2, 1e-5);
+}
+
 TEST_F(ShowNotes, GoesOnRecordingWhereTheNextTakeCannotBe) {
   ShowOptions options;
   options.frames = 12;
