@@ -270,9 +270,12 @@ void calibrate_light(const LightOptions& options, Console& console) {
   figures["warnings"] = found.warnings;
   console.figures(json_text(figures));
   for (const std::string& warning : found.warnings) console.warn(warning);
-  console.say(fmt::format("from {} {}: +- {:.2f}, {:.2f}, {:.2f} %{}", pairs,
+  const bool too_few = std::ranges::all_of(found.sigma, [](double sigma) { return sigma >= 1; });
+  console.say(fmt::format("from {} {}: {}{}", pairs,
                           patches.empty() ? "directions that both cameras see" : "painted patches",
-                          100 * found.sigma[0], 100 * found.sigma[1], 100 * found.sigma[2],
+                          too_few ? "too few to tell how sure it is"
+                                  : fmt::format("+- {:.2f}, {:.2f}, {:.2f} %", 100 * found.sigma[0],
+                                                100 * found.sigma[1], 100 * found.sigma[2]),
                           std::isfinite(found.heldout_error)
                               ? fmt::format("; held-out error {:.1f} %", 100 * found.heldout_error)
                               : ""));
