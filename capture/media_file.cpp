@@ -22,6 +22,12 @@ namespace {
 // one gets no more.
 constexpr std::int64_t max_waiting_bytes = 64 << 20;
 
+// What the stamps of joined recordings jump by, back and on.
+constexpr Time least_jump_back = std::chrono::seconds(1), least_jump_on = std::chrono::seconds(10);
+bool is_jump(Time by) { return by < -least_jump_back || by > least_jump_on; }
+// So many packets may lie between a track's and the other's.
+constexpr std::size_t most_ahead = 500;
+
 // After so many errors in a row a damaged file is at its end.
 constexpr int max_read_errors = 32;
 
@@ -108,7 +114,83 @@ MediaFile::MediaFile(const std::string& path) : path_(path) {
   }
 }
 
+std::optional<Track> MediaFile::track_of(const AVPacket& packet) const {
+  if (packet.stream_index == video_->index) return Track::video;
+  if (sound_ != nullptr && packet.stream_index == sound_->index) return Track::sound;
+  return std::nullopt;
+}
+
+// From where the track's last packet ended.
+Time MediaFile::jump_of(const AVPacket& packet, Track track) const {
+  const std::int64_t stamp = packet.dts != AV_NOPTS_VALUE ? packet.dts : packet.pts;
+  const std::optional<Time>& end = ends_[index(track)];
+  if (stamp == AV_NOPTS_VALUE || !end) return {};
+  const AVRational base = track == Track::video ? video_->time_base : sound_->time_base;
+  return Time{av_rescale_q(stamp, base, {1, std::nano::den})} + moved_by_ - *end;
+}
+
+// The first packet of a track that is still to come; null if it is not near.
+const AVPacket* MediaFile::look_ahead(Track track) {
+  for (std::size_t i = 0;; ++i) {
+    if (i == ahead_.size()) {
+      if (i == most_ahead) return nullptr;
+      libav::PacketHandle packet = read_as_stamped();
+      if (!packet) return nullptr;
+      ahead_.push_back(std::move(packet));
+    }
+    if (track_of(*ahead_[i]) == track) return ahead_[i].get();
+  }
+}
+
+// A jump of both tracks is a join. Of one alone it is a gap, or a picture that stands for long.
+void MediaFile::find_join(const AVPacket& packet, Track track) {
+  const AVPacket* const picture = track == Track::video ? &packet : look_ahead(Track::video);
+  if (picture == nullptr) return;
+  const Time by = jump_of(*picture, Track::video);
+  if (!is_jump(by)) return;
+  if (by > Time{} && ends_[index(Track::sound)]) {
+    const AVPacket* const sound = track == Track::sound ? &packet : look_ahead(Track::sound);
+    if (sound != nullptr && !is_jump(jump_of(*sound, Track::sound))) return;
+  }
+  moved_by_ -= by;
+}
+
+void MediaFile::move(AVPacket& packet, Track track) {
+  const AVRational base = track == Track::video ? video_->time_base : sound_->time_base;
+  const std::int64_t by = av_rescale_q(moved_by_.count(), {1, std::nano::den}, base);
+  if (packet.dts != AV_NOPTS_VALUE) packet.dts += by;
+  if (packet.pts != AV_NOPTS_VALUE) packet.pts += by;
+  const std::int64_t stamp = packet.dts != AV_NOPTS_VALUE ? packet.dts : packet.pts;
+  if (stamp == AV_NOPTS_VALUE) return;
+  if (packet.duration <= 0 && track == Track::video && video_->r_frame_rate.num > 0) {
+    packet.duration = av_rescale_q(1, av_inv_q(video_->r_frame_rate), base);
+  }
+  ends_[index(track)] = Time{av_rescale_q(stamp + packet.duration, base, {1, std::nano::den})};
+}
+
+// The next packet of the file, moved.
 libav::PacketHandle MediaFile::read() {
+  libav::PacketHandle packet;
+  if (ahead_.empty()) {
+    packet = read_as_stamped();
+  } else {
+    packet = std::move(ahead_.front());
+    ahead_.pop_front();
+  }
+  at_end_ = !packet;
+  if (!packet) return nullptr;
+  const std::optional<Track> track = track_of(*packet);
+  if (track && stamps_may_jump()) {
+    if (is_jump(jump_of(*packet, *track))) find_join(*packet, *track);
+    move(*packet, *track);
+  }
+  if (track == Track::video && packet->pts != AV_NOPTS_VALUE) {
+    latest_picture_ = std::max(latest_picture_.value_or(packet->pts), packet->pts);
+  }
+  return packet;
+}
+
+libav::PacketHandle MediaFile::read_as_stamped() {
   libav::PacketHandle packet = libav::make_packet();
   for (int errors = 0; errors < max_read_errors; ++errors) {
     const int error = av_read_frame(context_.get(), packet.get());
@@ -119,7 +201,6 @@ libav::PacketHandle MediaFile::read() {
       break;
     }
   }
-  at_end_ = true;
   return nullptr;
 }
 
@@ -172,6 +253,8 @@ bool MediaFile::stamps_may_jump() const {
 }
 
 std::optional<Time> MediaFile::length() const {
+  // Of joined streams, the last part's.
+  if (stamps_may_jump()) return std::nullopt;
   if (context_->duration_estimation_method == AVFMT_DURATION_FROM_BITRATE) return std::nullopt;
   const std::int64_t length = context_->duration;  // of any track; AV_NOPTS_VALUE is below 0
   constexpr std::int64_t longest = std::int64_t{AV_TIME_BASE} * 3600 * 24 * 365;
@@ -189,6 +272,10 @@ bool MediaFile::seek(std::int64_t pts) {
   waiting_ = {};
   waiting_bytes_ = 0;
   at_end_ = false;
+  ahead_.clear();
+  ends_ = {};
+  moved_by_ = {};
+  latest_picture_.reset();
   return avformat_seek_file(context_.get(), video_->index, INT64_MIN, pts, pts, 0) >= 0;
 }
 

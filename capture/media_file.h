@@ -21,6 +21,9 @@ enum class Track { video, sound };
 
 // An open container: its best video stream and, if it has any, the sound that goes with it.
 // Playlists and other files that point elsewhere are refused.
+//
+// MPEG's streams may have been joined: then the stamps of both tracks jump there, back by more than
+// 1 s or on by more than 10 s. They are moved so that the pictures go on, and the sound with them.
 class MediaFile {
  public:
   // Throws std::runtime_error with path, reason and what to do.
@@ -40,9 +43,8 @@ class MediaFile {
   // Whether packets of the track lie in memory already.
   bool has_packet(Track track) const { return !waiting_[index(track)].empty(); }
 
-  // Whether time stamps may jump where recordings were joined, as in MPEG's streams: nothing lies
-  // between them.
-  bool stamps_may_jump() const;
+  // The latest stamp of a picture that was read, in the video's time base.
+  std::optional<std::int64_t> latest_picture() const { return latest_picture_; }
   // As the file tells it; nothing where it does not, or is only guessed at.
   std::optional<Time> length() const;
 
@@ -57,6 +59,13 @@ class MediaFile {
  private:
   static std::size_t index(Track track) { return track == Track::video ? 0 : 1; }
   libav::PacketHandle read();
+  libav::PacketHandle read_as_stamped();
+  std::optional<Track> track_of(const AVPacket& packet) const;
+  bool stamps_may_jump() const;
+  Time jump_of(const AVPacket& packet, Track track) const;
+  const AVPacket* look_ahead(Track track);
+  void find_join(const AVPacket& packet, Track track);
+  void move(AVPacket& packet, Track track);
 
   std::string path_;
   libav::FormatContext context_;
@@ -65,6 +74,10 @@ class MediaFile {
   std::array<std::deque<libav::PacketHandle>, 2> waiting_;
   std::int64_t waiting_bytes_ = 0;
   bool at_end_ = false;
+  std::deque<libav::PacketHandle> ahead_;    // read, to find out about a jump
+  std::array<std::optional<Time>, 2> ends_;  // of the tracks' last packets, moved
+  Time moved_by_{};
+  std::optional<std::int64_t> latest_picture_;
 };
 
 }  // namespace capture

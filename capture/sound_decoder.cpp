@@ -15,12 +15,12 @@ namespace capture {
 namespace {
 
 constexpr std::chrono::seconds max_untaken{10};
-constexpr std::chrono::seconds longest_piece{60};  // longer ones begin later
+// Of one piece at most; longer ones begin later.
+constexpr std::int64_t longest_piece_s = 60, most_samples = std::int64_t{1} << 26;
 
-// What joined recordings' stamps jump by, back and forth.
-constexpr std::int64_t least_jump_back_s = 1, least_jump_on_s = 10;
-// Sound is no farther than this ahead of the pictures that lie beside it.
-constexpr std::int64_t most_ahead_s = 30;
+// Sound is no farther than this ahead of the pictures that lie beside it, and no later after the
+// end of the file.
+constexpr std::int64_t most_ahead_s = 30, most_behind_end_s = 10;
 
 // Time stamps are rounded (to 1 ms in Matroska): what lies so close to the end of the sound before
 // it follows without a gap.
@@ -67,7 +67,6 @@ void SoundDecoder::begin(std::int64_t first_pts, Time start) {
   floor_ = sample_at(start);
   offset_ = floor_ - av_rescale_q(first_pts, file_.video().time_base, {1, rate_});
   decoded_ = floor_;
-  newest_ = std::max(newest_, floor_);
   at_end_ = false;
 }
 
@@ -86,8 +85,7 @@ void SoundDecoder::drop_taken() {
   }
 }
 
-void SoundDecoder::keep_up(Time until, Time newest) {
-  newest_ = sample_at(newest);
+void SoundDecoder::keep_up(Time until) {
   skip_to(until - max_untaken);
   const std::int64_t end = sample_at(until);
   while (decoded_ <= end && decode_packet(true)) drop_taken();
@@ -95,8 +93,8 @@ void SoundDecoder::keep_up(Time until, Time newest) {
 }
 
 std::optional<Sound> SoundDecoder::take(Time until) {
-  skip_to(until - longest_piece);
   const std::int64_t end = sample_at(until) + 1;
+  taken_ = std::max(taken_, end - std::min(longest_piece_s * rate_, most_samples / channels_));
   while (decoded_ < end && decode_packet(false)) {
   }
   if (end <= taken_) {
@@ -188,16 +186,17 @@ void SoundDecoder::take_frame(const AVFrame& frame) {
   add(stamp != AV_NOPTS_VALUE ? position_of(stamp) : decoded_, std::move(samples));
 }
 
-std::int64_t SoundDecoder::position_of(std::int64_t stamp) {
-  const std::int64_t stamped = offset_ + av_rescale_q(stamp, file_.sound()->time_base, {1, rate_});
-  const std::int64_t off = stamped - decoded_;
-  const bool jumps = off < -least_jump_back_s * rate_ || off > least_jump_on_s * rate_;
-  if (jumps && file_.stamps_may_jump()) {
-    offset_ -= off;
-    return decoded_;
+// Where stamps are damaged it follows the sound before.
+std::int64_t SoundDecoder::position_of(std::int64_t stamp) const {
+  const AVRational samples{1, rate_};
+  const std::int64_t stamped = offset_ + av_rescale_q(stamp, file_.sound()->time_base, samples);
+  if (std::abs(stamped - decoded_) <= rate_ / joins_per_second) return decoded_;
+  if (const auto picture = file_.latest_picture()) {
+    const std::int64_t beside = offset_ + av_rescale_q(*picture, file_.video().time_base, samples);
+    if (stamped > beside + most_ahead_s * rate_) return decoded_;
   }
-  if (std::abs(off) <= rate_ / joins_per_second || stamped > newest_ + most_ahead_s * rate_) {
-    return decoded_;
+  if (const auto length = file_.length()) {
+    if (stamped > floor_ + sample_at(*length) + most_behind_end_s * rate_) return decoded_;
   }
   return stamped;
 }

@@ -35,9 +35,8 @@ class SoundDecoder {
   void skip_to(Time from);
 
   // Decodes packets that already lie in memory, up to `until`; what is 10 s older and was not taken
-  // is dropped. `newest`: the newest picture that was read. Sound whose stamps are far after it
-  // follows the sound before: they are damaged.
-  void keep_up(Time until, Time newest);
+  // is dropped.
+  void keep_up(Time until);
 
   // The sound from where the last one ended, up to and including `until`.
   std::optional<Sound> take(Time until);
@@ -54,7 +53,7 @@ class SoundDecoder {
   };
   std::int64_t sample_at(Time time) const;
   std::int64_t length(const Segment& segment) const;
-  std::int64_t position_of(std::int64_t stamp);
+  std::int64_t position_of(std::int64_t stamp) const;
   void drop_taken();
   bool decode_packet(bool only_waiting);
   void take_frame(const AVFrame& frame);
@@ -71,7 +70,6 @@ class SoundDecoder {
   std::int64_t floor_ = 0;    // no sound before it
   std::int64_t taken_ = 0;    // position up to which sound was taken
   std::int64_t decoded_ = 0;  // position up to which sound was decoded
-  std::int64_t newest_ = 0;   // of the pictures
   bool at_end_ = false;
   std::deque<Segment> segments_;
 };

@@ -13,14 +13,15 @@ constexpr Rational assumed_rate{25, 1};
 
 // A jump that no recording has: such stamps are damage.
 constexpr std::chrono::hours max_step{24};
-constexpr Time least_jump_back = std::chrono::seconds(1), least_jump_on = std::chrono::seconds(10);
+// By how much one that goes beyond the end is on, and beyond the end, at least.
+constexpr std::chrono::seconds least_jump{10};
 
 }  // namespace
 
-StampClock::StampClock(Rational tick, Rational rate, const StampRules& rules)
+StampClock::StampClock(Rational tick, Rational rate, std::optional<Time> length)
     : tick_(tick),
       rate_(rate),
-      rules_(rules),
+      length_(length),
       last_step_(time_of_frame(1, rate.num > 0 ? rate : assumed_rate)) {}
 
 Time StampClock::period() const { return rate_.num > 0 ? time_of_frame(1, rate_) : last_step_; }
@@ -29,19 +30,13 @@ std::int64_t StampClock::nearest_frame(Time time) const {
   return std::llround(static_cast<double>(time.count()) / std::nano::den * rate_.value());
 }
 
-// The time that a stamp tells; nothing if it is damaged.
-std::optional<Time> StampClock::stamped(std::int64_t stamp) {
-  Wide wide_ns = (Wide{stamp} - origin_) * tick_.num * std::nano::den / tick_.den + base_.count();
-  const Wide off = last_ ? wide_ns - end().count() : Wide{0};
-  if (rules_.may_jump && (off < -least_jump_back.count() || off > least_jump_on.count())) {
-    origin_ = stamp;
-    base_ = end();
-    wide_ns = base_.count();
-  }
+std::optional<Time> StampClock::since_first(std::int64_t stamp) const {
+  const Wide ticks = Wide{stamp} - first_stamp_.value_or(stamp);
+  const Wide wide_ns = ticks * tick_.num * std::nano::den / tick_.den;
   const Time limit = last_.value_or(Time{}) + max_step;
-  const bool ends_before = rules_.length && off > least_jump_on.count() &&
-                           wide_ns > (*rules_.length + least_jump_on).count();
-  if (wide_ns < 0 || wide_ns > limit.count() || ends_before) {
+  const bool is_beyond = length_ && wide_ns > Time(*length_ + least_jump).count() &&
+                         wide_ns > Time(end() + least_jump).count();
+  if (wide_ns < 0 || wide_ns > limit.count() || is_beyond) {
     return std::nullopt;
   }
   const Time stamped{static_cast<Time::rep>(wide_ns)};
@@ -58,9 +53,8 @@ std::optional<Time> StampClock::stamped(std::int64_t stamp) {
 Time StampClock::time_of(std::optional<std::int64_t> stamp) {
   if (stamp && !first_stamp_ && !last_) {
     first_stamp_ = stamp;
-    origin_ = *stamp;
   }
-  std::optional<Time> time = stamp && first_stamp_ ? stamped(*stamp) : std::nullopt;
+  std::optional<Time> time = stamp && first_stamp_ ? since_first(*stamp) : std::nullopt;
   if (!time || (last_ && *time <= *last_)) {
     time = end();
   }
@@ -89,8 +83,6 @@ std::optional<std::int64_t> StampClock::frame_at(Time time) const {
 
 void StampClock::restart(std::optional<std::int64_t> first_stamp) {
   first_stamp_ = first_stamp;
-  origin_ = first_stamp.value_or(0);
-  base_ = {};
   last_.reset();
 }
 

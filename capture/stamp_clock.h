@@ -8,22 +8,15 @@
 
 namespace capture {
 
-// What a container's stamps may be.
-struct StampRules {
-  // They jump where recordings were joined, back by more than 1 s or on by more than 10 s: frames
-  // go on there as if nothing lay between.
-  bool may_jump = false;
-  std::optional<Time> length;  // they end there: jumps beyond are damage
-};
-
 // Times since the first frame, always rising. Containers and recorders round their stamps, often to
 // 1 ms: a stamp within an eighth of a frame, or one tick, of a frame's time at the nominal rate is
 // taken to be exactly that, so that frames neither drift nor jitter. Frames without a stamp follow
 // the one before at the rate.
 class StampClock {
  public:
-  // Ticks of num/den seconds; rate 0/1 = unknown (25/1 where a frame has no stamp).
-  StampClock(Rational tick, Rational rate, const StampRules& rules = {});
+  // Ticks of num/den seconds; rate 0/1 = unknown (25/1 where a frame has no stamp). Where the
+  // `length` is known, stamps that jump beyond it are damage.
+  StampClock(Rational tick, Rational rate, std::optional<Time> length = {});
 
   // Of the next frame. Stamps that do not rise, or are absurd, count as missing.
   Time time_of(std::optional<std::int64_t> stamp);
@@ -39,16 +32,14 @@ class StampClock {
   void restart(std::optional<std::int64_t> first_stamp = std::nullopt);
 
  private:
-  std::optional<Time> stamped(std::int64_t stamp);
+  std::optional<Time> since_first(std::int64_t stamp) const;
   std::int64_t nearest_frame(Time time) const;
   Time period() const;
 
   Rational tick_;
   Rational rate_;
-  StampRules rules_;
+  std::optional<Time> length_;
   std::optional<std::int64_t> first_stamp_;
-  std::int64_t origin_ = 0;  // the stamp whose time is base_: of what was joined, another one
-  Time base_{};
   std::optional<Time> last_;
   Time last_step_;
 };

@@ -143,7 +143,7 @@ VideoFile::VideoFile(const std::string& path,
   info_.rate = rate_of(file_->video());
   info_.frames = loop_ ? 0 : count_frames(*file_, info_.rate);
   clock_.emplace(Rational{file_->video().time_base.num, file_->video().time_base.den}, info_.rate,
-                 StampRules{.may_jump = file_->stamps_may_jump(), .length = file_->length()});
+                 file_->length());
   if (options.frame) {
     skip_to(*options.frame);
   }
@@ -258,7 +258,7 @@ void VideoFile::skip_to(std::int64_t frame) {
     const Frame skipped = make_frame({nullptr, picture->pts, FrameStatus::good, {}});
     if (sound_) {
       sound_->skip_to(skipped.time);
-      sound_->keep_up(skipped.time, skipped.time);
+      sound_->keep_up(skipped.time);
     }
   }
 }
@@ -386,7 +386,7 @@ std::optional<Frame> VideoFile::pass(bool makes_picture) {
   statistics_.damaged += frame->status == FrameStatus::damaged ? 1 : 0;
   // What lies between is taken as time goes by: one picture may stand for minutes.
   if (sound_) {
-    sound_->keep_up(last_time_, frame->time);
+    sound_->keep_up(last_time_);
   }
   last_time_ = frame->time;
   return frame;

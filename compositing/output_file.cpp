@@ -199,9 +199,7 @@ bool OutputFile::cut_back(std::int64_t room) noexcept {
   for (auto place = marks_.rbegin(); place != marks_.rend(); ++place) {
     if (cut_to(*place, room)) return true;
   }
-  // Cutting gave up what might have gone beyond this mark; nothing more can be done if it fails.
-  if (!marks_.empty()) static_cast<void>(has_room(marks_.back(), 0));
-  return false;
+  return false;  // it ends at the first mark now
 }
 
 }  // namespace compositing

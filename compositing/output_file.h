@@ -57,8 +57,8 @@ class OutputFile {
   void discard(bool discarding) noexcept;
 
   // Cuts the file back to the last mark after which `room` more bytes can be written, and lets
-  // libav write there again. If there is no such mark, cuts it back to the last one and returns
-  // false.
+  // libav write there again. If there is no such mark, cuts it back to the first one that is known
+  // and returns false.
   bool cut_back(std::int64_t room) noexcept;
 
   // Cuts the file back to a place. Whether `room` more bytes can be written there by libav.

@@ -281,6 +281,10 @@ void Recorder::Take::run() {
   } catch (const std::exception& error) {
     stop(error.what());
   }
+  // Others may write there from now on.
+  video_.reset();
+  pair_.reset();
+  exr_.reset();
   const std::lock_guard lock(mutex_);
   status_.finished = true;
 }

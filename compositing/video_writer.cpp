@@ -408,7 +408,7 @@ void VideoWriter::salvage() noexcept {
   state.finished = true;
   state.give_gathered_up();
   const bool has_room = state.file.cut_back(state.room_for_index());
-  const std::int64_t end = has_room ? state.file.place() : state.wholes.back().place;
+  const std::int64_t end = has_room ? state.file.place() : state.wholes.front().place;
   state.pictures = state.whole_at(end);
   if (has_room) av_write_trailer(state.muxer.get());
 }

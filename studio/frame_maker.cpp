@@ -20,6 +20,7 @@ using Clock = std::chrono::steady_clock;
 constexpr capture::Rational rate_of_stills{25, 1};
 // Frames by which a live plate's own count may differ from its clock.
 constexpr double most_parted = 1.5;
+constexpr double of_rounding = 1e-4;  // cameras tell rates to a few digits
 
 // Measures a stage from its making to its end.
 class StageTimer {
@@ -90,8 +91,7 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
   rate_ = rate.value_or(set_.show.fps.value_or(own));
-  // A live plate shows no more pictures than there are. Cameras tell rates to a few digits.
-  constexpr double of_rounding = 1e-4;
+  // A live plate shows no more pictures than there are.
   if (plate_->is_live() && plate_rate.num > 0 &&
       rate_.value() > plate_rate.value() * (1 + of_rounding)) {
     notes_.push_back(fmt::format(
@@ -154,7 +154,8 @@ FrameMaker::Due FrameMaker::wait_for_plate() {
   }
   // The camera may be the faster one. If it is not, each of its pictures is due, however unevenly
   // they are stamped.
-  const bool own_rate = rate_ == plate_->info().rate;
+  const double told = plate_->info().rate.value();
+  const bool own_rate = std::abs(rate_.value() - told) <= of_rounding * told;
   capture::Time soonest =
       own_rate ? last_picture_ + capture::Time{1} : last_due_.time + 3 * period / 4;
   while (true) {
@@ -162,7 +163,8 @@ FrameMaker::Due FrameMaker::wait_for_plate() {
     if (newest.time < soonest) break;
     const std::int64_t number = number_of(newest);
     if (static_cast<double>(number) - place_of(newest.time) <= most_parted) {
-      last_due_ = {number, newest.time};
+      // Time never falls, though a frame without a picture was ahead of this one's.
+      last_due_ = {number, std::max(newest.time, last_due_.time + capture::Time{1})};
       last_picture_ = newest.time;
       return last_due_;
     }

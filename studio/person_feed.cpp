@@ -298,11 +298,13 @@ void PersonFeed::update(Person& person, capture::Time time) {
   // What has given no picture yet has no age.
   capture::Time youngest = capture::Time::max();
   for (const Person::Camera& camera : person.cameras) {
-    if (camera.feed.has_picture()) youngest = std::min(youngest, camera.feed.age());
+    if (camera.feed.has_picture())
+      youngest = std::min(youngest, std::chrono::abs(camera.feed.age()));
   }
   for (Person::Camera& camera : person.cameras) {
     const PersonCameraFeed& feed = camera.feed;
-    camera.late = !feed.has_picture() || feed.age() > youngest + feed.period() * 3 / 2;
+    camera.late =
+        !feed.has_picture() || std::chrono::abs(feed.age()) > youngest + feed.period() * 3 / 2;
   }
 }
 

@@ -64,6 +64,7 @@ void Recording::start(const RecordSettings& settings) {
   stop();
   finish_those_in_the_way(settings);
   while (ended_.size() > most_ended) finish_oldest();
+  note_last_error();
   take_ = {settings, std::make_unique<compositing::Recorder>(recorder)};
 }
 
@@ -83,8 +84,13 @@ void Recording::finish_oldest() {
   ended_.pop_front();
   take.recorder->close();
   last_status_ = take.recorder->status();
-  const bool tells = !take_ && ended_.empty();
-  if (!last_status_.error.empty() && !tells) notes_.push_back(last_status_.error);
+  told_ = last_status_.error.empty();
+  if (take_ || !ended_.empty()) note_last_error();
+}
+
+void Recording::note_last_error() {
+  if (!told_) notes_.push_back(last_status_.error);
+  told_ = true;
 }
 
 void Recording::finish_those_in_the_way(const RecordSettings& settings) {
@@ -119,7 +125,9 @@ void Recording::record(const ShownFrame& shown, bool wait) {
 compositing::RecorderStatus Recording::status() {
   forget_finished();
   if (take_) return take_->recorder->status();
-  return ended_.empty() ? last_status_ : ended_.back().recorder->status();
+  if (!ended_.empty()) return ended_.back().recorder->status();
+  told_ = true;
+  return last_status_;
 }
 
 std::vector<std::string> Recording::take_notes() {

@@ -60,6 +60,7 @@ class Recording {
 
   compositing::RecorderSettings settings_of(const RecordSettings& settings) const;
   void forget_finished();
+  void note_last_error();
   void finish_oldest();
   void finish_those_in_the_way(const RecordSettings& settings);
 
@@ -67,6 +68,7 @@ class Recording {
   std::optional<Take> take_;
   std::deque<Take> ended_;  // the latest last
   compositing::RecorderStatus last_status_;
+  bool told_ = true;  // it, by status() or a note
   std::vector<std::string> notes_;
 };
 

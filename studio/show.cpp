@@ -457,8 +457,8 @@ class Show::Stages {
         start_recording(start->record);
       } else {
         recording_.stop();
-        if (!options_.live) recording_.finish();  // its frames depend on no timing
       }
+      if (!options_.live) recording_.finish();  // its frames depend on no timing
     });
   }
 

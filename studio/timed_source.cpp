@@ -67,8 +67,8 @@ std::optional<capture::Frame> TimedSource::at(capture::Time time) {
   if (frame && !lost) pictured_ = frame;
   // Asked for the first time, and after its end.
   if (!frame && !pictured_ && source_.current().image) pictured_ = source_.current();
-  age_ = source_.is_still() || !pictured_ ? capture::Time{}
-                                          : std::max(asked - pictured_->time, capture::Time{});
+  age_ = source_.is_still() || !pictured_ ? capture::Time{} : asked - pictured_->time;
+  if (!source_.is_live()) age_ = std::max(age_, capture::Time{});
   return frame;
 }
 

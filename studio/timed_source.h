@@ -45,7 +45,7 @@ class TimedSource {
   const capture::Frame& newest() const { return pictured_ ? *pictured_ : source_.first(); }
   const capture::Frame& first() const { return source_.first(); }
   // How old its newest picture was at the time that was asked for last; 0 for stills, and before a
-  // file begins.
+  // file begins. Below 0 of a live source that is ahead (Source).
   capture::Time age() const { return age_; }
   const capture::CameraInfo& info() const { return source_.info(); }
 

@@ -71,7 +71,6 @@ TEST_F(TakesOfAShow, GoesOnWithAnotherTakeWhileTheLastOneIsFinished) {
   EXPECT_FALSE(recording.status().finished);
   recording.start(take("second.mkv"));
   EXPECT_TRUE(recording.running());
-  EXPECT_TRUE(recording.finishing());
   record(recording, 3);
   recording.stop();
   recording.finish();
@@ -121,7 +120,7 @@ TEST_F(TakesOfAShow, GoOnInTheSameFolderOfFrames) {
   EXPECT_EQ(compositing::ExrSequence::frames_in(frames.exr), 2);
 }
 
-TEST_F(TakesOfAShow, HasNoMoreThanAFewTakesToFinish) {
+TEST_F(TakesOfAShow, WriteEachOfManyThatFollowAtOnce) {
   Recording recording(form_);
   for (int i = 0; i < 6; ++i) {
     recording.start(take(std::to_string(i) + ".mkv"));
@@ -130,6 +129,20 @@ TEST_F(TakesOfAShow, HasNoMoreThanAFewTakesToFinish) {
   recording.stop();
   recording.finish();
   for (int i = 0; i < 6; ++i) EXPECT_EQ(frames_of(std::to_string(i) + ".mkv"), "8");
+}
+
+// Nobody has looked at its status meanwhile.
+TEST_F(TakesOfAShow, TellsOfATakeThatFailedBeforeAnotherOfItsFile) {
+  Recording recording(form_);
+  recording.start(take("take.mkv"));
+  {
+    const FileSizeLimit full(std::uintmax_t{2} << 20);
+    record(recording, 30);
+    recording.stop();
+    recording.start(take("take.mkv"));
+  }
+  EXPECT_THAT(recording.take_notes(), Contains(HasSubstr(path("take.mkv"))));
+  EXPECT_EQ(recording.status().error, "");
 }
 
 TEST_F(TakesOfAShow, TellsOfATakeThatFailedWhileItWasFinished) {
