@@ -46,7 +46,8 @@ void write_file(const std::string& path, std::span<const std::byte> bytes) {
   const fs::path real = fs::weakly_canonical(path, error);
   const std::string target = error ? path : real.string();
   const std::string partial = target + ".part";
-  bool in_place = fs::exists(there) && !fs::is_regular_file(there);
+  // What a shell has sent /dev/stdout to is a file, but more may follow.
+  bool in_place = path.starts_with("/dev/") || (fs::exists(there) && !fs::is_regular_file(there));
   File file(std::fopen(in_place ? target.c_str() : partial.c_str(), "wbe"), &std::fclose);
   if (!file && errno == EACCES && fs::exists(there)) {  // the file may be written, its folder not
     in_place = true;
