@@ -54,7 +54,8 @@ void write_file(const std::string& path, std::span<const std::byte> bytes) {
     file.reset(std::fopen(target.c_str(), "wbe"));
   }
   if (!file) throw failure(path, "cannot be written", errno);
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
+  const bool written =
+      bytes.empty() || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
   int failed = written ? 0 : errno;
   if (std::fclose(file.release()) != 0 && failed == 0) failed = errno;
   if (failed == 0 && !in_place && std::rename(partial.c_str(), target.c_str()) != 0) failed = errno;
