@@ -25,6 +25,11 @@ constexpr std::int64_t max_waiting_bytes = 64 << 20;
 // What the stamps of joined recordings jump by, back and on.
 constexpr Time least_jump_back = std::chrono::seconds(1), least_jump_on = std::chrono::seconds(10);
 bool is_jump(Time by) { return by < -least_jump_back || by > least_jump_on; }
+// Of stamps and times in nanoseconds: 36 years. Sums of a few stay numbers.
+bool is_sane(std::int64_t value) {
+  constexpr std::int64_t most = std::int64_t{1} << 60;
+  return value > -most && value < most;
+}
 // So many packets may lie between a track's and the other's.
 constexpr std::size_t most_ahead = 500;
 
@@ -120,13 +125,20 @@ std::optional<Track> MediaFile::track_of(const AVPacket& packet) const {
   return std::nullopt;
 }
 
+// When a packet is, before it is moved; nothing if its stamp is none, or absurd.
+std::optional<Time> MediaFile::time_of(const AVPacket& packet, Track track) const {
+  const std::int64_t stamp = packet.dts != AV_NOPTS_VALUE ? packet.dts : packet.pts;
+  if (stamp == AV_NOPTS_VALUE) return std::nullopt;
+  const AVRational base = track == Track::video ? video_->time_base : sound_->time_base;
+  const std::int64_t time_ns = av_rescale_q(stamp, base, {1, std::nano::den});
+  return is_sane(time_ns) ? std::optional(Time{time_ns}) : std::nullopt;
+}
+
 // From where the track's last packet ended.
 Time MediaFile::jump_of(const AVPacket& packet, Track track) const {
-  const std::int64_t stamp = packet.dts != AV_NOPTS_VALUE ? packet.dts : packet.pts;
+  const std::optional<Time> time = time_of(packet, track);
   const std::optional<Time>& end = ends_[index(track)];
-  if (stamp == AV_NOPTS_VALUE || !end) return {};
-  const AVRational base = track == Track::video ? video_->time_base : sound_->time_base;
-  return Time{av_rescale_q(stamp, base, {1, std::nano::den})} + moved_by_ - *end;
+  return time && end ? *time + moved_by_ - *end : Time{};
 }
 
 // The first packet of a track that is still to come; null if it is not near.
@@ -152,20 +164,23 @@ void MediaFile::find_join(const AVPacket& packet, Track track) {
     const AVPacket* const sound = track == Track::sound ? &packet : look_ahead(Track::sound);
     if (sound != nullptr && !is_jump(jump_of(*sound, Track::sound))) return;
   }
-  moved_by_ -= by;
+  if (is_sane((moved_by_ - by).count())) moved_by_ -= by;
 }
 
 void MediaFile::move(AVPacket& packet, Track track) {
-  const AVRational base = track == Track::video ? video_->time_base : sound_->time_base;
-  const std::int64_t by = av_rescale_q(moved_by_.count(), {1, std::nano::den}, base);
-  if (packet.dts != AV_NOPTS_VALUE) packet.dts += by;
-  if (packet.pts != AV_NOPTS_VALUE) packet.pts += by;
-  const std::int64_t stamp = packet.dts != AV_NOPTS_VALUE ? packet.dts : packet.pts;
-  if (stamp == AV_NOPTS_VALUE) return;
-  if (packet.duration <= 0 && track == Track::video && video_->r_frame_rate.num > 0) {
-    packet.duration = av_rescale_q(1, av_inv_q(video_->r_frame_rate), base);
+  const std::optional<Time> time = time_of(packet, track);
+  if (!time) return;
+  const AVStream& stream = track == Track::video ? *video_ : *sound_;
+  constexpr AVRational ns{1, std::nano::den};
+  const std::int64_t by = av_rescale_q(moved_by_.count(), ns, stream.time_base);
+  for (std::int64_t* stamp : {&packet.dts, &packet.pts}) {
+    if (*stamp != AV_NOPTS_VALUE && is_sane(*stamp) && is_sane(by)) *stamp += by;
   }
-  ends_[index(track)] = Time{av_rescale_q(stamp + packet.duration, base, {1, std::nano::den})};
+  if (packet.duration <= 0 && stream.r_frame_rate.num > 0 && track == Track::video) {
+    packet.duration = av_rescale_q(1, av_inv_q(stream.r_frame_rate), stream.time_base);
+  }
+  const Time length{av_rescale_q(packet.duration, stream.time_base, ns)};
+  ends_[index(track)] = *time + moved_by_ + std::clamp(length, Time{}, least_jump_back);
 }
 
 // The next packet of the file, moved.

@@ -62,6 +62,7 @@ class MediaFile {
   libav::PacketHandle read_as_stamped();
   std::optional<Track> track_of(const AVPacket& packet) const;
   bool stamps_may_jump() const;
+  std::optional<Time> time_of(const AVPacket& packet, Track track) const;
   Time jump_of(const AVPacket& packet, Track track) const;
   const AVPacket* look_ahead(Track track);
   void find_join(const AVPacket& packet, Track track);

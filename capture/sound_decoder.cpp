@@ -58,6 +58,12 @@ std::int64_t SoundDecoder::sample_at(Time time) const {
   return av_rescale_rnd(time.count(), rate_, std::nano::den, AV_ROUND_DOWN);
 }
 
+// Of a stamp, whatever it is: sums of a few stay numbers.
+std::int64_t SoundDecoder::samples_of(std::int64_t stamp, const AVStream& stream) const {
+  constexpr std::int64_t most = std::int64_t{1} << 60;
+  return std::clamp(av_rescale_q(stamp, stream.time_base, {1, rate_}), -most, most);
+}
+
 std::int64_t SoundDecoder::length(const Segment& segment) const {
   return static_cast<std::int64_t>(segment.samples.size()) / channels_;
 }
@@ -65,7 +71,7 @@ std::int64_t SoundDecoder::length(const Segment& segment) const {
 void SoundDecoder::begin(std::int64_t first_pts, Time start) {
   avcodec_flush_buffers(context_.get());
   floor_ = sample_at(start);
-  offset_ = floor_ - av_rescale_q(first_pts, file_.video().time_base, {1, rate_});
+  offset_ = floor_ - samples_of(first_pts, file_.video());
   decoded_ = floor_;
   at_end_ = false;
 }
@@ -188,11 +194,10 @@ void SoundDecoder::take_frame(const AVFrame& frame) {
 
 // Where stamps are damaged it follows the sound before.
 std::int64_t SoundDecoder::position_of(std::int64_t stamp) const {
-  const AVRational samples{1, rate_};
-  const std::int64_t stamped = offset_ + av_rescale_q(stamp, file_.sound()->time_base, samples);
+  const std::int64_t stamped = offset_ + samples_of(stamp, *file_.sound());
   if (std::abs(stamped - decoded_) <= rate_ / joins_per_second) return decoded_;
   if (const auto picture = file_.latest_picture()) {
-    const std::int64_t beside = offset_ + av_rescale_q(*picture, file_.video().time_base, samples);
+    const std::int64_t beside = offset_ + samples_of(*picture, file_.video());
     if (stamped > beside + most_ahead_s * rate_) return decoded_;
   }
   if (const auto length = file_.length()) {

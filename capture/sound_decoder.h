@@ -52,6 +52,7 @@ class SoundDecoder {
     std::vector<float> samples;
   };
   std::int64_t sample_at(Time time) const;
+  std::int64_t samples_of(std::int64_t stamp, const AVStream& stream) const;
   std::int64_t length(const Segment& segment) const;
   std::int64_t position_of(std::int64_t stamp) const;
   void drop_taken();

@@ -87,9 +87,7 @@ FolderLock::FolderLock(const std::string& folder)
   lock(descriptor_, folder, "folder");
 }
 
-FolderLock::~FolderLock() {
-  if (descriptor_ >= 0) ::close(descriptor_);
-}
+FolderLock::~FolderLock() { ::close(descriptor_); }
 
 void require_writable_folder(const std::string& path) {
   namespace fs = std::filesystem;

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
 struct AVIOContext;
@@ -27,8 +26,8 @@ class FolderLock {
  public:
   // Throws std::runtime_error with path and reason if another one has it, or it cannot be opened.
   explicit FolderLock(const std::string& folder);
-  FolderLock(FolderLock&& from) noexcept : descriptor_(std::exchange(from.descriptor_, -1)) {}
-  FolderLock& operator=(FolderLock&&) = delete;
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
   ~FolderLock();
 
  private:

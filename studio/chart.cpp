@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <span>
 #include <stdexcept>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "capture/files.h"
+#include "calibrate/text_file.h"
 #include "studio/machine.h"
 #include "studio/svg_png.h"
 
@@ -76,10 +75,6 @@ std::string csv_cell_of(const Pairs& pairs, const std::string& name) {
     if (key == name) return csv_cell(value);
   }
   return "";
-}
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  capture::write_file(path.string(), std::as_bytes(std::span(text)));
 }
 
 }  // namespace
@@ -173,9 +168,9 @@ void write_chart(const Chart& chart, const std::string& directory) {
   const std::filesystem::path base = std::filesystem::path(directory) / chart.stage;
   const auto named = [&](const char* ending) { return base.string() + ending; };
   const std::string svg = chart_svg(chart);
-  write_text(named(".json"), chart_json(chart) + "\n");
-  write_text(named(".csv"), chart_csv(chart));
-  write_text(named(".svg"), svg);
+  calibrate::write_text_file(named(".json"), chart_json(chart) + "\n");
+  calibrate::write_text_file(named(".csv"), chart_csv(chart));
+  calibrate::write_text_file(named(".svg"), svg);
   write_svg_as_png(svg, named(".png"), 2);
 }
 

@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <span>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -17,7 +16,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "capture/files.h"
+#include "calibrate/text_file.h"
 #include "compositing/output_file.h"
 
 namespace studio {
@@ -87,8 +86,7 @@ void require_figures_file(const std::string& path) {
 void Console::figures(std::string_view json) {
   if (figures_file_.empty()) return;
   require_figures_file(figures_file_);
-  const std::string text = std::string(json) + '\n';
-  capture::write_file(figures_file_, std::as_bytes(std::span(text)));
+  calibrate::write_text_file(figures_file_, std::string(json) + '\n');
 }
 
 }  // namespace studio
