@@ -163,11 +163,11 @@ std::int64_t OutputFile::seek(void* file, std::int64_t offset, int whence) {
 
 std::int64_t OutputFile::place() const { return avio_tell(context_); }
 
-void OutputFile::mark() {
+void OutputFile::mark(std::int64_t pictures) {
   const std::int64_t here = place();
-  if (!marks_.empty() && marks_.back() == here) return;
+  if (!marks_.empty() && marks_.back().place == here) return;
   if (marks_.size() == marks_kept) marks_.erase(marks_.begin());
-  marks_.push_back(here);
+  marks_.push_back({here, pictures});
 }
 
 void OutputFile::discard(bool discarding) noexcept {
@@ -194,10 +194,11 @@ bool OutputFile::cut_to(std::int64_t place, std::int64_t room) noexcept {
 }
 
 bool OutputFile::cut_back(std::int64_t room) noexcept {
-  for (auto place = marks_.rbegin(); place != marks_.rend(); ++place) {
-    if (cut_to(*place, room)) return true;
+  for (; !marks_.empty(); marks_.pop_back()) {
+    if (cut_to(marks_.back().place, room)) return true;
+    if (marks_.size() == 1) break;  // it ends there now
   }
-  return false;  // it ends at the first mark now
+  return false;
 }
 
 }  // namespace compositing

@@ -46,8 +46,12 @@ class OutputFile {
 
   AVIOContext* context() const { return context_; }
 
-  // Remembers that all up to here is whole. Only the last few places are kept.
-  void mark();
+  // Remembers that all up to here is whole, and so many pictures of it. Only the last few places
+  // are kept.
+  void mark(std::int64_t pictures);
+
+  // Pictures up to the last place that is remembered: after cut_back(), those that are left.
+  std::int64_t whole_pictures() const { return marks_.empty() ? 0 : marks_.back().pictures; }
 
   // Bytes so far.
   std::int64_t place() const;
@@ -57,13 +61,17 @@ class OutputFile {
 
   // Cuts the file back to the last mark after which `room` more bytes can be written, and lets
   // libav write there again. If there is no such mark, cuts it back to the first one that is known
-  // and returns false.
+  // and returns false. Marks beyond are forgotten.
   bool cut_back(std::int64_t room) noexcept;
 
   // Cuts the file back to a place. Whether `room` more bytes can be written there by libav.
   bool cut_to(std::int64_t place, std::int64_t room) noexcept;
 
  private:
+  struct Mark {
+    std::int64_t place = 0, pictures = 0;
+  };
+
   static int write(void* file, std::uint8_t* data, int size);
   bool begin() noexcept;
   void leave() noexcept;
@@ -75,7 +83,7 @@ class OutputFile {
   bool made_ = false;   // it was not there
   bool begun_ = false;  // what was there is gone
   AVIOContext* context_ = nullptr;
-  std::vector<std::int64_t> marks_;
+  std::vector<Mark> marks_;
   bool discarding_ = false;
 };
 

@@ -146,12 +146,6 @@ struct Checkpoint {
   std::int64_t pictures = 0;
 };
 
-// So many pictures are whole in the file's first `place` bytes.
-struct Whole {
-  std::int64_t place = 0;
-  std::int64_t pictures = 0;
-};
-
 struct VideoWriter::State {
   struct FreeOutput {
     void operator()(AVFormatContext* context) const { avformat_free_context(context); }
@@ -165,8 +159,6 @@ struct VideoWriter::State {
   void open_streams();
   void write_packet(AVPacket* packet, const AVStream* stream, AVRational time_base);
   void encode(const AVFrame* picture_or_end);
-  void mark(std::int64_t whole_pictures);
-  std::int64_t whole_at(std::int64_t place) const;
   void write_gathered();
   void give_gathered_up();
   std::int64_t room_for_index() const;
@@ -186,7 +178,6 @@ struct VideoWriter::State {
   std::int64_t last_index = -1;
   std::int64_t next_sample = 0;
   std::vector<Checkpoint> checkpoints;  // the last few
-  std::vector<Whole> wholes;            // as many as the file has marks
   std::int64_t pictures = 0;            // that the muxer has; after a failure, that the file has
   bool begun = false, drained = false, finished = false;
 };
@@ -243,19 +234,7 @@ void VideoWriter::State::open_streams() {
   const int error = avformat_write_header(context, &options);
   av_dict_free(&options);
   if (error < 0) fail("the header cannot be written", error);
-  mark(0);
-}
-
-void VideoWriter::State::mark(std::int64_t whole_pictures) {
-  file.mark();
-  if (!wholes.empty() && wholes.back().place == file.place()) return;
-  if (wholes.size() == checkpoints_kept) wholes.erase(wholes.begin());
-  wholes.push_back({file.place(), whole_pictures});
-}
-
-std::int64_t VideoWriter::State::whole_at(std::int64_t place) const {
-  const auto there = std::ranges::find(wholes, place, &Whole::place);
-  return there != wholes.end() ? there->pictures : 0;
+  file.mark(0);
 }
 
 void VideoWriter::State::write_packet(AVPacket* ready,
@@ -268,7 +247,7 @@ void VideoWriter::State::write_packet(AVPacket* ready,
   av_packet_unref(ready);
   if (error < 0) fail("writing failed", error);
   // The muxer gathers a cluster, and writes it at once when the next one starts: now, perhaps.
-  mark(pictures);
+  file.mark(pictures);
   if (stream == picture_stream) ++pictures;
 }
 
@@ -288,7 +267,7 @@ void VideoWriter::State::write_gathered() {
   if (const int error = av_write_frame(muxer.get(), nullptr); error < 0) {
     fail("writing failed", error);
   }
-  mark(pictures);
+  file.mark(pictures);
 }
 
 // What the muxer still holds refers to pictures that were lost.
@@ -408,8 +387,7 @@ void VideoWriter::salvage() noexcept {
   state.finished = true;
   state.give_gathered_up();
   const bool has_room = state.file.cut_back(state.room_for_index());
-  const std::int64_t end = has_room ? state.file.place() : state.wholes.front().place;
-  state.pictures = state.whole_at(end);
+  state.pictures = state.file.whole_pictures();
   if (has_room) av_write_trailer(state.muxer.get());
 }
 

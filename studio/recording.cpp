@@ -62,7 +62,6 @@ void Recording::start(const RecordSettings& settings) {
   finish_those_in_the_way(settings);
   compositing::check(recorder);  // else the take that runs goes on
   stop();
-  finish_those_in_the_way(settings);
   while (ended_.size() > most_ended) finish_oldest();
   note_last_error();
   take_ = {settings, std::make_unique<compositing::Recorder>(recorder)};
