@@ -10,6 +10,7 @@
 #include <future>
 #include <mutex>
 #include <thread>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -31,7 +32,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t most_notes = 10;
 // How often a show that stands still looks for an edit that is on its way.
 constexpr std::chrono::milliseconds look_again{20};
 
@@ -358,7 +358,7 @@ class Show::Stages {
     tally_.status().lost_plate_frames = work.plate.lost;
     tally_.status().damaged_plate_frames = work.plate.damaged;
     publish(false);
-    shown.notes = take_untold();
+    shown.notes = notes_.take_new();
     if (on_frame) on_frame(shown);
   }
 
@@ -486,11 +486,7 @@ class Show::Stages {
   void publish(ShowStatus& status) {
     status.paused = paused_;
     status.changing = changing_;
-    {
-      const std::lock_guard lock(mutex_);
-      status.notes = notes_;
-      status.noted = noted_;
-    }
+    std::tie(status.notes, status.noted) = notes_.told();
     auto told = std::make_shared<const ShowStatus>(status);
     const std::lock_guard lock(mutex_);
     status_.swap(told);
@@ -506,23 +502,7 @@ class Show::Stages {
     }
   }
 
-  // Where they are too many, one of the same kind goes, so that what is told of every frame does
-  // not hide the rest.
-  void note(std::string what) {
-    const std::lock_guard lock(mutex_);
-    untold_.push_back(what);
-    notes_.push_back(std::move(what));
-    ++noted_;
-    if (notes_.size() <= most_notes) return;
-    const std::string kind = kind_of_note(notes_.back());
-    const auto same = std::ranges::find(notes_, kind, kind_of_note);
-    notes_.erase(same + 1 == notes_.end() ? notes_.begin() : same);
-  }
-
-  std::vector<std::string> take_untold() {
-    const std::lock_guard lock(mutex_);
-    return std::exchange(untold_, {});
-  }
+  void note(std::string what) { notes_.add(std::move(what)); }
 
   ShowOptions options_;  // live wherever the plate is
   std::optional<std::int64_t> frames_;
@@ -553,9 +533,7 @@ class Show::Stages {
   mutable std::mutex mutex_;
   std::condition_variable posted_;
   std::vector<ShowCommand> commands_;
-  std::vector<std::string> notes_;   // the last of them
-  std::vector<std::string> untold_;  // all since the last frame that was shown
-  std::int64_t noted_ = 0;
+  Notes notes_;
   std::mutex publishing_;  // before mutex_
   std::atomic<bool> paused_ = false;
   std::atomic<bool> changing_ = false;
