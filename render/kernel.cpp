@@ -63,13 +63,12 @@ void for_rows(const TileView& tile, std::ptrdiff_t stride, int x0, int y0, Visit
   }
 }
 
-// Calls values into the cache, to be read or, `written`, to be put there: the next cell's row,
-// while this one's is at work. No machine foresees sixteen rows by itself.
-template <int written = 0>
+// Calls values into the cache: the next cell's row, while this one's is at work. No machine
+// foresees sixteen rows by itself.
 void call_for(const capture::Half* at, std::size_t count) {
   constexpr std::size_t line = 32;
-  for (std::size_t i = 0; i < count; i += line) __builtin_prefetch(at + i, written);
-  __builtin_prefetch(at + count - 1, written);
+  for (std::size_t i = 0; i < count; i += line) __builtin_prefetch(at + i);
+  __builtin_prefetch(at + count - 1);
 }
 
 void TileWorkspace::Impl::load_plate(const TileView& tile, int x0, int y0) {
@@ -108,16 +107,9 @@ Four with_light(Four plate, Four added) {
   return (added < 0) & (sum < least) ? least : sum;
 }
 
-// Halves of values that halves can hold; else the nearest that they can, counted.
-void put_halves(std::span<float> values, capture::Half* to, RenderStatistics& statistics) {
-  // As bits without the sign: what is no number is above all others.
-  std::uint32_t most = 0;
-  for (const float value : values) {
-    most = std::max(most, std::bit_cast<std::uint32_t>(value) & 0x7FFFFFFF);
-  }
-  const bool fit = most <= std::bit_cast<std::uint32_t>(capture::half_max);
-  for (std::size_t i = 0; !fit && i < values.size(); ++i) {
-    float& value = values[i];
+// Halves of values some of which halves cannot hold: the nearest that they can, counted.
+void put_clamped(std::span<float> values, capture::Half* to, RenderStatistics& statistics) {
+  for (float& value : values) {
     if (std::abs(value) <= capture::half_max) continue;
     ++statistics.clamped_values;
     value = std::isnan(value) ? 0.0F : std::clamp(value, -capture::half_max, capture::half_max);
@@ -125,34 +117,59 @@ void put_halves(std::span<float> values, capture::Half* to, RenderStatistics& st
   capture::halves_from_floats(values, to);
 }
 
+// Whether halves can hold all that it has seen.
+class FitsHalves {
+ public:
+  void see(Four v) {
+    // As bits without the sign: what is no number is above all others.
+    const Words bits = std::bit_cast<Words>(v) & 0x7FFFFFFF;
+    most_ = bits > most_ ? bits : most_;
+  }
+  explicit operator bool() const {
+    return bits_of(most_ > std::bit_cast<std::int32_t>(capture::half_max)) == 0;
+  }
+
+ private:
+  using Words = std::int32_t __attribute__((vector_size(16)));
+  Words most_{};
+};
+
 void TileWorkspace::Impl::write(const FrameContext& frame,
                                 const TileView& tile,
                                 int x0,
                                 int y0) const {
   const calibrate::DirectionTable& directions = *frame.inputs.directions;
   RenderStatistics& statistics = *tile.statistics;
-  std::array<float, cell_size * 4> rgba;
-  std::array<float, cell_size> matte;
   int y = y0, virtual_pixels = 0, affected_pixels = 0;
   for_rows(tile, tile.stride, x0, y0, [&](const CellRow& row) {
     const float* sensitivity =
         directions.sensitivity.empty() ? nullptr : &directions.sensitivity[directions.index(y, x0)];
+    capture::Half* const to_rgba = tile.rgba + 4 * row.in_image;
+    capture::Half* const to_matte = tile.matte + row.in_image;
+    std::array<float, cell_size * 4> rgba;
+    std::array<float, cell_size> matte;
+    FitsHalves fits;
     for (std::size_t x = 0; x < row.length; ++x) {
       const std::size_t k = row.in_cell + x;
-      const Four light = sensitivity ? picture.added[k] * sensitivity[x] : picture.added[k];
-      const float coverage = 1 - picture.seen[k];
-      matte[x] = 1 - picture.share[k][3];
-      Four shown = with_light(plate[k] * picture.share[k], light);
-      shown[3] = coverage;
+      const Four added = picture.added[k], share = picture.share[k], dimmed = 1 - share;
+      Four shown = with_light(plate[k] * share, sensitivity ? added * sensitivity[x] : added);
+      shown[3] = 1 - picture.seen[k];
+      fits.see(shown), fits.see(dimmed);
+      // Halves at once, and floats for a row that does not fit.
+      stream_halves(shown, to_rgba + 4 * x);
+      to_matte[x] = capture::half_from_float(dimmed[3]);
       std::memcpy(&rgba[4 * x], &shown, sizeof shown);
+      matte[x] = dimmed[3];
       // Of the last of four of what is added, nothing is known.
-      const unsigned covered = bits_of(shown > 0) & 8, lit = bits_of(picture.added[k] != 0) & 7;
+      const unsigned covered = bits_of(shown > 0) & 8;
+      const unsigned affected = (bits_of(added != 0) & 7) | covered | (bits_of(dimmed != 0) & 8);
       virtual_pixels += static_cast<int>(covered >> 3);
-      affected_pixels += (lit | covered | static_cast<unsigned>(matte[x] != 0)) != 0;
+      affected_pixels += affected != 0;
     }
-    call_for<1>(tile.rgba + 4 * (row.in_image + cell_size), 4 * cell_size);
-    put_halves(std::span(rgba).first(4 * row.length), tile.rgba + 4 * row.in_image, statistics);
-    put_halves(std::span(matte).first(row.length), tile.matte + row.in_image, statistics);
+    if (!fits) {
+      put_clamped(std::span(rgba).first(4 * row.length), to_rgba, statistics);
+      put_clamped(std::span(matte).first(row.length), to_matte, statistics);
+    }
     ++y;
   });
   statistics.virtual_pixels += static_cast<std::uint64_t>(virtual_pixels);
@@ -315,6 +332,7 @@ void render_tile(const FrameContext& context, const TileView& tile, TileWorkspac
       workspace.impl().render_cell(context, tile, x, y);
     }
   }
+  end_stream();
 }
 
 void render_tile(const FrameContext& context,

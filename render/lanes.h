@@ -178,6 +178,21 @@ inline void store_halves(Four v, capture::Half* to) {
   for (int i = 0; i < 4; ++i) to[i] = capture::half_from_float(v[i]);
 #endif
 }
+// The same past the caches, for pictures that are read when all of them is there: no line is
+// fetched to be overwritten. Other threads see it after end_stream().
+inline void stream_halves(Four v, capture::Half* to) {
+#if defined(__F16C__) && defined(__x86_64__)
+  const __m128i halves = _mm_cvtps_ph(std::bit_cast<__m128>(v), _MM_FROUND_TO_NEAREST_INT);
+  _mm_stream_si64(reinterpret_cast<long long*>(to), _mm_cvtsi128_si64(halves));
+#else
+  store_halves(v, to);
+#endif
+}
+inline void end_stream() {
+#if defined(__SSE2__)
+  _mm_sfence();
+#endif
+}
 // Eight colours, from each of the four values of all.
 inline std::array<Four, 8> fours_of(Eight r, Eight g, Eight b, Eight rest) {
   const auto by_two = [](Eight v, Eight w) {
