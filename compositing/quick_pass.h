@@ -50,6 +50,7 @@ class QuickPass {
         scratch_(scratch),
         store_(in.plate, in.noise, scratch, out),
         across_(static_cast<int>(store_.across())),
+        primary_(channels_of(in.plate.colour)[0]),
         smooths_(in.noise > 0 && scratch.has_previous) {
     for (auto& looks : scratch.looks) looks.assign(store_.across() + 2, {});
   }
@@ -130,7 +131,7 @@ class QuickPass {
     store_.mark_written(block);
     // Without smoothing nothing is kept, and so nothing would take it back.
     if (in_.noise > 0) store_.keep_whole(block);
-    switch (channels_of(in_.plate.colour)[0]) {
+    switch (primary_) {
       case 0:
         return put_whole<0>(top, x, rows);
       case 1:
@@ -285,7 +286,8 @@ class QuickPass {
   const Inputs in_;
   KeyScratch& scratch_;
   KeyStore store_;
-  int across_;  // blocks of a row
+  int across_;   // blocks of a row
+  int primary_;  // channel of the screen's colour
   bool smooths_;
   std::array<Half, together> halves_;  // that wait
   std::size_t count_ = 0;
