@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <vector>
 
 #include <Eigen/Dense>
 
@@ -19,6 +20,15 @@ constexpr float most_sigma = 0.1F;                   // of a patch that is worth
 constexpr float own_error = 0.004F;                  // of light: what is neither noise nor shift
 constexpr int fewest = 4;                            // patches that must agree
 constexpr float agreed = 0.5F;                       // cells: spread of patches that agree
+
+// One sigma, of two thirds of the values: where half of what is seen moves by itself, it is wide.
+float spread_about(float centre, std::vector<float>& values) {
+  constexpr float per_sigma = 0.967F;
+  for (float& value : values) value = std::abs(value - centre);
+  const auto third = values.begin() + static_cast<std::ptrdiff_t>(2 * values.size() / 3);
+  std::ranges::nth_element(values, third);
+  return *third / per_sigma;
+}
 
 }  // namespace
 
@@ -143,8 +153,11 @@ bool PlateWatch::step(
   const Grid& grid = plate_[static_cast<std::size_t>(level)];
   const auto& seen = seen_[static_cast<std::size_t>(level)];
   const int scale = 1 << level, across = side / scale;
-  const float x0 = static_cast<float>(patch.column / scale) - right;
-  const float y0 = static_cast<float>(patch.row / scale) - down;
+  // A patch may begin in the middle of a coarse cell.
+  const auto begin = [scale](int fine) {
+    return static_cast<float>(fine) / static_cast<float>(scale);
+  };
+  const float x0 = begin(patch.column) - right, y0 = begin(patch.row) - down;
   const int column = static_cast<int>(std::floor(x0)), row = static_cast<int>(std::floor(y0));
   const float u = x0 - static_cast<float>(column), v = y0 - static_cast<float>(row);
   if (column < 1 || row < 1 || column + across + 2 >= grid.columns || row + across + 2 >= grid.rows)
@@ -218,10 +231,7 @@ PlateShift PlateWatch::look_at(const Rows& frame) {
   if (shift.seen < fewest || 3 * shift.seen < shift.patches) return shift;
   const auto count = static_cast<float>(shift.seen);
   const float right = capture::median_in_place(rights_), down = capture::median_in_place(downs_);
-  for (float& value : rights_) value = std::abs(value - right);
-  for (float& value : downs_) value = std::abs(value - down);
-  const float spread =
-      1.48F * std::max(capture::median_in_place(rights_), capture::median_in_place(downs_));
+  const float spread = std::max(spread_about(right, rights_), spread_about(down, downs_));
   const auto pixels = static_cast<float>(pixels_);
   shift.known = spread <= agreed;
   shift.right_px = right * pixels, shift.down_px = down * pixels;

@@ -79,8 +79,16 @@ TEST(PlateWatch, MeasuresPushesToAQuarterOfAPixelBehindAPersonAndUnderOtherLight
   PlateWatch watch(plate_of_room());
   std::uint64_t seed = 100;
   for (const float light : {1.0F, 0.7F, 1.2F}) {
-    for (const auto& [right, down] : std::vector<std::pair<float, float>>{
-             {0, 0}, {0.5F, 0}, {-1.25F, 0.75F}, {2, -3}, {-4, 4}, {5, 1}}) {
+    for (const auto& [right, down] : std::vector<std::pair<float, float>>{{0, 0},
+                                                                          {0.5F, 0},
+                                                                          {-1.25F, 0.75F},
+                                                                          {2, -3},
+                                                                          {-4, 4},
+                                                                          {5, 1},
+                                                                          {5, 5},
+                                                                          {-5, -5},
+                                                                          {-5, 0},
+                                                                          {0, -5}}) {
       Image light_there = room(right, down, light);
       put_person(light_there, 200 + 40 * light);
       const PlateShift shift = look(watch, filmed(light_there, ++seed));
@@ -146,6 +154,10 @@ TEST(PlateWatch, MakesTheKeySayThatTheCameraWasMovedWithinTenFramesAndTakeItBack
   EXPECT_LT(pushed.confidence, 0.75);
   EXPECT_NEAR(pushed.shift.right_px, 3, 0.3);
   // A shake of one frame is none.
+  EXPECT_NE(run(0, 0, 10).status, KeyStatus::moved);
+  const KeyReport back = run(-5, -5, 10);
+  EXPECT_EQ(back.status, KeyStatus::moved);
+  EXPECT_NEAR(back.shift.down_px, -5, 0.3);
   EXPECT_NE(run(0, 0, 10).status, KeyStatus::moved);
   run(4, 0, 1);
   EXPECT_NE(run(0, 0, 8).status, KeyStatus::moved);
