@@ -41,6 +41,9 @@ void ExposureFollower::follow(double exposure_s,
   const bool told = exposure_s > 0;
   if (told && calibrated_s_) {
     level_ = exposure_s / *calibrated_s_;
+    // Where a frame then tells none, it goes on from here.
+    timed_ = true;
+    per_second_ = level_ / exposure_s;
     note_ = fmt::format("the plate's {:.4g} s are {:.3f} of the calibrated exposure", exposure_s,
                         level_);
     return;

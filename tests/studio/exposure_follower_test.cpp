@@ -92,6 +92,19 @@ TEST(ExposureFollower, TakesToldTimesAtTheirWord) {
   EXPECT_THAT(follower.note(), HasSubstr("1.400 of the calibrated exposure"));
 }
 
+TEST(ExposureFollower, HoldsWhatWasToldWhereATimeIsMissing) {
+  made::Random random(7);
+  ExposureFollower follower(0.01);
+  follower.follow(0.02, 1, {});
+  follower.follow(0, 2, {});
+  EXPECT_DOUBLE_EQ(follower.level(), 2);
+  EXPECT_THAT(follower.note(), HasSubstr("held at 2.000"));
+  follower.follow(0, 2, made_pairs(1.7, 2, random));
+  EXPECT_NEAR(follower.level(), 1.7, 0.017);
+  follower.follow(0.03, 1.7, {});
+  EXPECT_DOUBLE_EQ(follower.level(), 3);
+}
+
 // The first measurement tells what the calibrated exposure must have been.
 TEST(ExposureFollower, GoesOnByTimesWhereTheOverlapEnds) {
   made::Random random(5);
