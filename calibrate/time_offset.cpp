@@ -27,6 +27,7 @@ constexpr double least_common = 0.99;
 constexpr double far_worse = 4;  // share that is not in common elsewhere, over that at the best
 constexpr double frames_apart = 2;
 constexpr double most_sigma_frames = 0.15;
+constexpr double longest_s = 3600;
 
 [[noreturn]] void refuse(const std::string& why) { throw std::runtime_error(why); }
 
@@ -50,6 +51,12 @@ void check(std::span<const Sample> signal, const char* name) {
   if (signal.size() < fewest_frames) {
     refuse("camera " + std::string(name) + " has only " + std::to_string(signal.size()) +
            " frames: take " + std::to_string(fewest_frames) + " or more, best ten seconds");
+  }
+  // Searched at even steps of all that lies between: a time stamp that is far off is not looked
+  // for.
+  if (signal.back().time_s - signal.front().time_s > longest_s) {
+    refuse("the times of camera " + std::string(name) +
+           " span more than an hour: is one of them wrong? Take ten seconds");
   }
 }
 

@@ -53,6 +53,8 @@ Watched watch(capture::Camera& camera,
   while (const std::optional<capture::Frame> frame = camera.next()) {
     const double time_s = Seconds(frame->time).count();
     if (!first_s) first_s = time_s;
+    // A live camera that went away loses frames for ever.
+    if (time_s - *first_s >= length_s || watched.pictures.size() == most_watched_pictures) break;
     if (frame->status == capture::FrameStatus::lost || frame->image == nullptr) {
       ++lost;
       why = frame->note;
@@ -66,8 +68,6 @@ Watched watch(capture::Camera& camera,
                                       frame->exposure_s > 0 ? frame->exposure_s : exposure_s});
       }
     }
-    // A live camera that went away loses frames for ever.
-    if (time_s - *first_s >= length_s || watched.pictures.size() == most_watched_pictures) break;
   }
   if (lost > 0 && seen < fewest_seen) {
     throw std::runtime_error(fmt::format("{} lost {} of {} frames{}{}: is it connected?", name,

@@ -386,6 +386,14 @@ TEST(FindTimeOffset, RefusesALampThatFlashesRegularly) {
   EXPECT_NEAR(near.offset_s, 0.1, 5e-3);
 }
 
+TEST(FindTimeOffset, RefusesATimeThatIsFarFromAllOthers) {
+  made::Random random(9);
+  const auto a = record(random_lamp(0.3, random), {}, 10, 0.005, random);
+  auto b = a;
+  b.back().time_s = 1e12;
+  EXPECT_THAT(refusal(a, b), HasSubstr("more than an hour"));
+}
+
 TEST(FindTimeOffset, RefusesNumbersThatAreNone) {
   made::Random random(8);
   const auto a = record(random_lamp(0.3, random), {}, 10, 0.005, random);

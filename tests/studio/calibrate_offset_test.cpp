@@ -158,7 +158,7 @@ TEST_F(CalibrateOffset, ComesFromAMovingBoardAtTwoRates) {
   const Outcome other = run(both + " --board 6x4 --charuco --seconds 1");
   EXPECT_EQ(other.status, 1);
   expect_one_line(other.err);
-  EXPECT_THAT(other.err, HasSubstr("found in 0 of 26 frames"));
+  EXPECT_THAT(other.err, HasSubstr("found in 0 of 25 frames"));
   EXPECT_EQ(run(both + " --square 0.04").status, 2);
 }
 
