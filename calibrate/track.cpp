@@ -115,6 +115,8 @@ Track read_track(const std::string& path) {
     const Quaternion q{v[4], v[5], v[6], v[7]};
     if (!(dot(q, q) > least_norm * least_norm))
       fail(path, line, "a quaternion of zeros is no rotation");
+    if (!std::isfinite(dot(q, q)))
+      fail(path, line, "a quaternion of such length is no rotation: its squares overflow");
     if (!track.keys.empty() && v[0] <= track.keys.back().time_s) {
       fail(path, line,
            "time " + to_text(v[0]) + " does not come after " + to_text(track.keys.back().time_s));
