@@ -133,13 +133,17 @@ std::vector<double> solve(const Places& places,
   std::vector<double> residuals = residuals_of(places, terms);
   for (int round = 0; round < rounds && !terms.empty(); ++round) {
     std::vector<double> sizes;
-    for (const double r : residuals) sizes.push_back(std::abs(r));
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      if (used[i]) sizes.push_back(std::abs(residuals[i]));
+    }
+    if (sizes.empty()) break;
     const double spread =
         std::max(1e-6, capture::sigma_by_median * capture::median_in_place(sizes));
     const double loss = loss_of(residuals, used, spread);
     Eigen::VectorXd step = step_from(places, terms, used, residuals, spread);
     bool better = false;
-    for (int halving = 0; halving < most_halvings && !better; ++halving, step *= 0.5) {
+    for (int halving = 0; halving < most_halvings && !better; ++halving) {
+      if (halving > 0) step *= 0.5;
       std::vector<double> next = terms;
       for (std::size_t t = 0; t < next.size(); ++t) next[t] += step[static_cast<Eigen::Index>(t)];
       std::vector<double> left = residuals_of(places, next);

@@ -227,8 +227,10 @@ Vec3f ProbeMapper::floor_of_light_from_above() const {
     unseen_weight += weight * (2 * rows - seen_in_row_[row]);
   }
   // What is filled in above the horizon lights the floor too.
+  // Between a floor that mirrors all and what it lights, hardly anything would be lost.
+  constexpr double most_returned = 0.999;
   const double reflectance = settings_.floor_albedo / pi;
-  const double scale = reflectance / (1 - reflectance * unseen_weight);
+  const double scale = reflectance / (1 - std::min(reflectance * unseen_weight, most_returned));
   return {static_cast<float>(irradiance[0] * scale), static_cast<float>(irradiance[1] * scale),
           static_cast<float>(irradiance[2] * scale)};
 }

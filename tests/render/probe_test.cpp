@@ -256,6 +256,18 @@ TEST(ProbeMapper, GivesTheSameBitsEachTimeAndKeepsItsBuffers) {
   EXPECT_EQ(env.radiance.pixels.data(), buffer);
 }
 
+TEST(ProbeMapper, FillsWithNothingBelowAndAboveWhereOnlyTheFloorIsSeenAndMirrorsAll) {
+  const Lens lens = fisheye(64, 80);
+  const Pose looking_down = calibrate::look_at({0, 0, 0}, {0, 0, -1}, 0);
+  ProbeMapper mapper(lens, looking_down,
+                     {.height = 32, .unseen = Unseen::floor, .floor_albedo = 1});
+  Environment env;
+  capture::Image picture = capture::make_image(64, 64);
+  std::fill(picture.pixels.begin(), picture.pixels.end(), 1.0F);
+  mapper.map(picture, {}, env);
+  for (const float value : env.radiance.pixels) ASSERT_TRUE(value >= 0 && value <= 1.01F) << value;
+}
+
 TEST(ProbeMapper, RefusesWhatCannotBe) {
   const Lens lens = fisheye(64);
   EXPECT_THROW(ProbeMapper(lens, looking_up(), {.height = 4}), std::invalid_argument);
