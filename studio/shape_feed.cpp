@@ -94,6 +94,7 @@ void ShapeFeed::go_on(Channel& channel, const ShapeFeed& before, SetScene& scene
   });
   if (same == before.channels_.end()) return;
   channel.start = same->start;
+  channel.told = same->told;
   if (same->shape == nullptr) return;
   auto shape = std::make_shared<ReadShape>();
   for (std::size_t i = 0; i < channel.meshes.size(); ++i) {

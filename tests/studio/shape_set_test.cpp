@@ -277,6 +277,18 @@ TEST_F(ShapeSetTest, WaitsForNoFileOfTheSetsBefore) {
   changes.get();
 }
 
+TEST_F(ShapeSetTest, TellsOfABadFileOnceAlsoWhenTheSetIsLoadedAnew) {
+  std::ofstream(file_of(1)) << "none";
+  const Set set = flag_set("loop = true\n");
+  SetScene scene = describe_scene(set), anew = describe_scene(set);
+  ShapeFeed feed(set, scene, pal, capture::Time{0}, false);
+  for (int n = 0; n < 3; ++n) feed.at(capture::time_of_frame(n, pal), scene);
+  EXPECT_THAT(feed.take_notes(), ElementsAre(HasSubstr(file_of(1).string())));
+  ShapeFeed after(set, anew, pal, std::nullopt, false, &feed);
+  for (int n = 3; n < 9; ++n) after.at(capture::time_of_frame(n, pal), anew);
+  EXPECT_THAT(after.take_notes(), IsEmpty());
+}
+
 // Of a live show that has long been past a last file that is bad.
 TEST_F(ShapeSetTest, StaysAtItsLastShapeForEver) {
   std::ofstream(file_of(5)) << "none";
