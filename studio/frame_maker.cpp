@@ -71,6 +71,7 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live
       for (const Diagnostic& d : error.diagnostics()) faults.add({d.line, d.column}, d.message);
     }
   };
+  response_times_ = file_times({set_.camera.response});
   collecting([&] { plate_ = open_plate(set_); });
   collecting([&] { track_ = track_of(set_); });
   collecting([&] { directions_ = directions_of(set_); });

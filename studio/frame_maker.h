@@ -20,6 +20,7 @@
 #include "render/bounced_light.h"
 #include "render/picture_stalls.h"
 #include "render/renderer.h"
+#include "studio/file_times.h"
 #include "studio/leaving.h"
 #include "studio/light_feed.h"
 #include "studio/person_feed.h"
@@ -215,6 +216,7 @@ class FrameMaker {
   capture::Rational rate_;
   bool live_;
   std::unique_ptr<Source> plate_;
+  FileTimes response_times_;  // of the plate's response, when it was opened
   std::unique_ptr<LightFeed> light_;
   std::unique_ptr<VideoFeed> videos_;
   std::unique_ptr<PersonFeed> persons_;

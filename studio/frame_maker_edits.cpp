@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "studio/file_times.h"
 #include "studio/frame_maker.h"
 #include "studio/set_scene.h"
 #include "studio/show_inputs.h"
@@ -258,6 +259,10 @@ void FrameMaker::check_change(const Set& set) const {
   }
   if (!same_plate(set, set_)) {
     throw std::invalid_argument("the plate's source cannot change on air: start anew");
+  }
+  if (file_times({set.camera.response}) != response_times_) {
+    throw std::invalid_argument("the plate's response " + set.camera.response +
+                                " was written anew, and cannot change on air: start anew");
   }
 }
 

@@ -97,6 +97,26 @@ TEST_F(SetChangeTest, APlateThatWasTakenAnewIsReadAnew) {
   EXPECT_EQ(opened, 1);
 }
 
+// The plate is decoded by the one that was there when it was opened.
+TEST_F(SetChangeTest, AResponseThatWasMeasuredAnewIsRefused) {
+  const std::string response = (dir_ / "plate.rsp").string();
+  std::ofstream(response) << "1 1 0\n1 1 0\n1 1 0\n";
+  Set set = made_set("grey:9,25,0", "");
+  set.camera.response = response;
+  FrameMaker maker(set);
+  ASSERT_TRUE(maker.make(0));
+  maker.change_set(set);
+  std::filesystem::last_write_time(
+      response, std::filesystem::last_write_time(response) + std::chrono::seconds(1));
+  try {
+    maker.change_set(set);
+    ADD_FAILURE() << "taken over";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("plate.rsp was written anew"));
+  }
+  EXPECT_TRUE(maker.make(1));
+}
+
 // Its feet are followed on while the dials of its key are turned.
 TEST_F(SetChangeTest, AWalkerStandsWhereItWouldHaveStood) {
   const auto walker = [&](const std::string& key) {
