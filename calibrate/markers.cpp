@@ -45,7 +45,7 @@ bool is_in_picture(const Lens& lens, Vec2 q) {
 }
 
 std::string named(const std::string& picture) {
-  return picture.empty() ? "no picture's name" : "picture " + in_quotes(picture);
+  return picture.empty() ? "no picture" : "picture " + in_quotes(picture);
 }
 
 }  // namespace
@@ -95,7 +95,7 @@ std::vector<Marker> markers_in(std::span<const Marker> markers, const std::strin
   for (const std::string& name : pictures) names += (names.empty() ? "" : ", ") + named(name);
   throw std::runtime_error(picture.empty()
                                ? "the markers are of several pictures (" + names + "): choose one"
-                               : "no marker is of " + named(picture) + "; there are " + names);
+                               : "no marker is of " + named(picture) + "; they are of " + names);
 }
 
 std::vector<Marker> markers_of(const Board& board,

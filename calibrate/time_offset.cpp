@@ -73,6 +73,13 @@ std::string repeated(const std::string& what, double every_s, const std::string&
          " at random, or look for smaller offsets";
 }
 
+// Refined, it may have gone beyond what was asked for.
+void check_largest(const TimeOffset& found, const TimeOffsetOptions& options) {
+  if (std::abs(found.offset_s) <= options.largest_s + found.sigma_s) return;
+  refuse("the offset is " + std::to_string(std::lround(1000 * found.offset_s)) +
+         " ms or so, which is more than was looked for: look for larger ones");
+}
+
 std::string only_to(const std::string& what, double sigma_s) {
   return "the " + what + " that both cameras saw tells the offset to no better than " +
          std::to_string(std::lround(1000 * std::min(sigma_s, 1.0))) + " ms";
@@ -300,6 +307,7 @@ TimeOffset find_time_offset(std::span<const SignalSample> a,
            ": switch one lamp before both, often and at random, so that nothing else changes as "
            "much");
   }
+  check_largest(result, options);
   return result;
 }
 
@@ -341,6 +349,7 @@ TimeOffset find_time_offset(std::span<const SeenPoint> a,
     refuse(only_to("motion", result.sigma_s) +
            ": move it faster, for longer, and so that both see it all the time");
   }
+  check_largest(result, options);
   return result;
 }
 

@@ -41,6 +41,7 @@ struct CameraStatistics {
   std::int64_t delivered = 0;  // all frames that next() gave; the following are among them
   std::int64_t lost = 0;
   std::int64_t damaged = 0;
+  std::string cut_short;  // of a file that has ended before it says that it does: how, in words
   // Of a camera that brackets (bracketed_camera.h):
   std::optional<int> exposure_lag;  // frames from a request to its effect, where it is known
   std::vector<double> exposures_s;  // that it is told in turn

@@ -105,6 +105,14 @@ std::vector<double> exposures_of(std::span<const std::string> paths,
       throw std::runtime_error(paths[i] +
                                ": tells no exposure time; state the exposures of all shots");
     }
+    const auto tells_as_first = [&](double ShotSettings::*value, const char* what) {
+      const bool here = files[i].settings.*value > 0, first = files[0].settings.*value > 0;
+      if (here == first) return;
+      throw std::runtime_error(paths[here ? 0 : i] + ": tells no " + what + ", but " +
+                               paths[here ? i : 0] + " does; state the exposures of all shots");
+    };
+    tells_as_first(&ShotSettings::f_number, "f-number");
+    tells_as_first(&ShotSettings::iso, "ISO");
     // Seconds, as long as f-number and ISO stay; else the seconds that would have given as much
     // light at the first shot's.
     const double gain_of_first =

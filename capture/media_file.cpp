@@ -13,6 +13,8 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libavutil/dict.h>
+#include <libavutil/parseutils.h>
 }
 
 namespace capture {
@@ -201,6 +203,8 @@ libav::PacketHandle MediaFile::read() {
   }
   if (track == Track::video && packet->pts != AV_NOPTS_VALUE) {
     latest_picture_ = std::max(latest_picture_.value_or(packet->pts), packet->pts);
+    if (is_sane(packet->pts) && is_sane(packet->duration))
+      pictures_end_ = std::max(pictures_end_, packet->pts + packet->duration);
   }
   return packet;
 }
@@ -275,6 +279,26 @@ std::optional<Time> MediaFile::length() const {
   constexpr std::int64_t longest = std::int64_t{AV_TIME_BASE} * 3600 * 24 * 365;
   if (length <= 0 || length > longest) return std::nullopt;
   return Time{length * (std::nano::den / AV_TIME_BASE)};
+}
+
+std::optional<Time> MediaFile::missing_pictures() const {
+  const std::optional<Time> whole = length();
+  if (!whole) return std::nullopt;
+  const AVRational ns{1, std::nano::den};
+  std::optional<Time> end;  // on the file's own clock
+  const AVDictionaryEntry* tag =
+      av_dict_get(video_->metadata, "DURATION", nullptr, 0);  // Matroska's
+  std::int64_t told_us = 0;
+  const std::int64_t start = video_->start_time == AV_NOPTS_VALUE ? 0 : video_->start_time;
+  if (tag != nullptr && av_parse_time(&told_us, tag->value, 1) >= 0) {
+    end = std::chrono::microseconds(told_us);
+  } else if (video_->nb_frames > 0 && is_sane(video_->duration) && is_sane(start)) {
+    end = Time{av_rescale_q(start + video_->duration, video_->time_base, ns)};
+  } else if (sound_ == nullptr && context_->nb_streams == 1) {
+    end = Time{av_rescale_q(start, video_->time_base, ns)} + *whole;
+  }
+  if (!end || *end > *whole + Time{av_rescale_q(start, video_->time_base, ns)}) return std::nullopt;
+  return *end - Time{av_rescale_q(pictures_end_, video_->time_base, ns)};
 }
 
 bool MediaFile::rewind() {

@@ -48,6 +48,10 @@ class MediaFile {
   // As the file tells it; nothing where it does not, or is only guessed at.
   std::optional<Time> length() const;
 
+  // After the end: the time of pictures that the file tells of and that were not there; nothing
+  // where it tells none, or is only guessed at.
+  std::optional<Time> missing_pictures() const;
+
   // From now on it is silent.
   void leave_sound_out();
 
@@ -79,6 +83,7 @@ class MediaFile {
   std::array<std::optional<Time>, 2> ends_;  // of the tracks' last packets, moved
   Time moved_by_{};
   std::optional<std::int64_t> latest_picture_;
+  std::int64_t pictures_end_ = 0;  // of all that were ever read, in the video's time base
 };
 
 }  // namespace capture

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <deque>
 #include <stdexcept>
@@ -82,6 +83,7 @@ class VideoFile : public Camera {
   std::optional<Frame> pass(bool makes_picture);
   Frame make_frame(const DecodedPicture& picture);
   void linearise(const DecodedPicture& picture, Frame& frame);
+  void judge_end();
   Time end_of_pass() const { return pass_start_ + clock_->end(); }
 
   std::string path_;
@@ -373,6 +375,7 @@ std::optional<Frame> VideoFile::pass(bool makes_picture) {
     ahead_.pop_front();
   } else {
     std::optional<DecodedPicture> picture = decoder_->next();
+    if (!picture) judge_end();
     if (!picture && loop_) picture = start_again();
     if (!picture) {
       ended_ = true;
@@ -390,6 +393,21 @@ std::optional<Frame> VideoFile::pass(bool makes_picture) {
   }
   last_time_ = frame->time;
   return frame;
+}
+
+// What ends early by two pictures or more is no rounding.
+void VideoFile::judge_end() {
+  const std::optional<Time> missing = file_->missing_pictures();
+  const Time least = 2 * time_of_frame(1, info_.rate.num > 0 ? info_.rate : Rational{25, 1});
+  if (!missing || *missing < least - std::chrono::milliseconds(1)) return;
+  const auto seconds = [](Time time) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.2f", std::chrono::duration<double>(time).count());
+    return std::string(text.data());
+  };
+  statistics_.cut_short = "the last " + seconds(*missing) + " s that it tells of are not there " +
+                          "(it ends at " + seconds(clock_->end()) +
+                          " s): it is cut short or damaged";
 }
 
 std::optional<Sound> VideoFile::take_sound(Time until) {

@@ -175,7 +175,12 @@ AreaLight sample_area_light(const SceneDescription& scene,
     }
   }
   if (light.samples.empty()) {
-    throw std::invalid_argument("no surface shows any of the picture: texture coordinates 0..1");
+    const bool any = std::ranges::any_of(parts, [](const Part& part) { return part.area > 0; });
+    throw std::invalid_argument(
+        any ? "what shows the picture faces all ways alike, so that its light has no direction: "
+              "name "
+              "one part or material of it, or take more samples"
+            : "no surface shows any of the picture: texture coordinates 0..1");
   }
   return light;
 }

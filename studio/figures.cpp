@@ -61,20 +61,21 @@ Json probe_json(const ShowStatus& s) {
 Json persons_json(const std::vector<PersonStatus>& persons) {
   Json rows = Json::array();
   for (const PersonStatus& p : persons) {
-    rows.push_back({{"name", p.name},
-                    {"confidence", p.confidence},
-                    {"key", p.key},
-                    {"feet", p.feet},
-                    {"held", p.held},
-                    {"position", {p.position.x, p.position.y, p.position.z}},
-                    {"sigma_m", p.sigma_m},
-                    {"view_angle_deg", p.view_angle_deg},
-                    {"shallow", p.shallow},
-                    {"shape", p.hull ? "hull" : "billboard"},
-                    {"camera", p.camera},
-                    {"error_m", p.error_m},
-                    {"holds", p.holds},
-                    {"left_out", p.left_out}});
+    rows.push_back(
+        {{"name", p.name},
+         {"confidence", p.confidence},
+         {"key", p.key},
+         {"feet", p.feet},
+         {"held", p.held},
+         {"position", p.stands ? Json{p.position.x, p.position.y, p.position.z} : Json()},
+         {"sigma_m", p.stands ? Json(p.sigma_m) : Json()},
+         {"view_angle_deg", p.view_angle_deg},
+         {"shallow", p.shallow},
+         {"shape", p.hull ? "hull" : "billboard"},
+         {"camera", p.camera},
+         {"error_m", p.error_m},
+         {"holds", p.holds},
+         {"left_out", p.left_out}});
   }
   return rows;
 }

@@ -272,6 +272,10 @@ void FrameMaker::note_plate(const capture::Frame& frame) {
                                  frame.note.empty() ? "" : ": ", frame.note));
   }
   plate_is_lost_ = lost;
+  if (plate_->is_live() || plate_is_cut_short_) return;
+  const std::string how = plate_->statistics().cut_short;
+  plate_is_cut_short_ = !how.empty();
+  if (plate_is_cut_short_) notes_.push_back("the plate: " + how);
 }
 
 calibrate::Pose FrameMaker::pose_at(capture::Time time) {

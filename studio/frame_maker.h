@@ -241,7 +241,7 @@ class FrameMaker {
   std::deque<VideoChange> openings_;  // of one video none twice but the first, which is on its way
   std::future<std::shared_ptr<VideoFeed::Player>> opening_;  // of the first
   std::vector<std::string> notes_;                           // for the next frame
-  bool plate_is_lost_ = false, is_off_track_ = false;
+  bool plate_is_lost_ = false, plate_is_cut_short_ = false, is_off_track_ = false;
   std::optional<capture::Frame> first_due_;  // of a live plate
   Due last_due_;
   capture::Time last_picture_{};  // stamp of its newest one that was due

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "capture/half.h"
 #include "capture/pool.h"
@@ -66,7 +67,7 @@ class PersonCameraFeed {
   // How old its picture is at the time that was asked for last, and how long a frame lasts.
   capture::Time age() const { return source_->age(); }
   capture::Time period() const { return period_; }
-  std::optional<std::string> take_note() { return source_->take_note(); }
+  std::vector<std::string> take_notes() { return source_->take_notes(); }
 
   // Keys the newest frame, unless it is already. True if it did.
   bool show();

@@ -46,6 +46,10 @@ std::string words_for(const compositing::ShapeChoice& choice) {
   return choice.hull ? "the hull" : fmt::format("the billboard of camera {}", choice.camera + 1);
 }
 
+std::string tenths(float value) {
+  return fmt::format("{:.1f}", std::round(10 * value) / 10 + 0.0F);  // none is -0
+}
+
 // Whether feet that are followed for one are those of the other.
 bool stands_alike(const PersonSettings& a, const PersonSettings& b) {
   return a.by_feet == b.by_feet && a.floor_z == b.floor_z && a.may_be_hull() == b.may_be_hull() &&
@@ -73,9 +77,10 @@ struct PersonFeed::Person {
   std::optional<compositing::ShapeChoice> choice;
   std::optional<compositing::PersonBox> box;  // of the hull that is chosen
   std::shared_ptr<const render::LivePicture> clear = clear_picture();
-  std::vector<bool> hidden;  // of its instances
-  bool told = false;         // what it is shown as
-  bool unplaced = false;     // told that it cannot be placed yet
+  std::vector<bool> hidden;   // of its instances
+  bool told = false;          // what it is shown as
+  bool unplaced = false;      // told that it cannot be placed yet
+  bool out_of_reach = false;  // told that its picture cannot be laid where it stands
   std::vector<std::string> notes;
   PersonFrame frame;
 
@@ -246,10 +251,9 @@ void PersonFeed::show(Person& person, std::size_t index) {
   const auto moved = camera.feed.moved_px();
   if (moved && !camera.moved) {
     person.notes.push_back(fmt::format(
-        "{}: its camera was moved: the picture is {:.1f} px further right and {:.1f} px further "
-        "down "
-        "than its clean plate. Take the plate anew (platelight key plate), and its pose",
-        person.name_of(index), (*moved)[0], (*moved)[1]));
+        "{}: its camera was moved: the picture is {} px further right and {} px further down than "
+        "its clean plate. Take the plate anew (platelight key plate), and its pose",
+        person.name_of(index), tenths((*moved)[0]), tenths((*moved)[1])));
   }
   camera.moved = moved.has_value();
   if (index == 0) stand(person);
@@ -289,10 +293,8 @@ void PersonFeed::update(Person& person, capture::Time time) {
   for (std::size_t i = 0; i < person.cameras.size(); ++i) {
     PersonCameraFeed& feed = person.cameras[i].feed;
     feed.advance(time);
-    if (const auto note = feed.take_note()) {
-      person.notes.push_back(
-          fmt::format("{} {}: its last picture stays", person.name_of(i), *note));
-    }
+    for (const std::string& note : feed.take_notes())
+      person.notes.push_back(person.name_of(i) + " " + note);
   }
   if (person.tracker || !person.has_several()) show(person, 0);
   // What has given no picture yet has no age.
@@ -407,9 +409,20 @@ void PersonFeed::place_billboard(Person& person, Vec3 viewer) {
   const double off_plane = s.by_feet ? compositing::off_foot_m : compositing::off_body_m;
   auto& place = person.frame.places[index];
   if (camera.lens) {
-    const auto placed = compositing::place_billboard(
-        *camera.lens, camera.cam_from_set, status.position, feed.person_box(), viewer, s.turn_rad);
-    if (!placed) return;  // as it was
+    const std::array<float, 4> box = feed.person_box();
+    const auto placed = compositing::place_billboard(*camera.lens, camera.cam_from_set,
+                                                     status.position, box, viewer, s.turn_rad);
+    const bool nobody = !(box[2] > box[0] && box[3] > box[1]);
+    if (!placed && nobody) return;  // there is nothing to be seen of it, wherever it is
+    if (!placed) person.hide(index);
+    if (!placed && !person.out_of_reach) {
+      person.notes.push_back(
+          fmt::format("{}: is not shown: from its own camera the picture meets nothing where it "
+                      "stands",
+                      status.name));
+    }
+    person.out_of_reach = !placed;
+    if (!placed) return;
     place = placed->set_from_object;
     status.view_angle_deg = placed->view_angle_rad / degree;
     status.shallow = placed->shallow;
@@ -455,6 +468,7 @@ void PersonFeed::place(Person& person, Vec3 viewer) {
   frame.hull_cameras.clear();
   std::ranges::fill(frame.pictures, person.clear);
   const bool known = !s.by_feet || person.standing;  // where it is
+  status.stands = known;
   const std::size_t cameras = person.cameras.size();
   const bool hull = person.choice && person.choice->hull;
   const std::size_t shown = hull ? cameras : person.choice ? person.choice->camera : 0;

@@ -22,7 +22,8 @@ struct PersonStatus {
   std::string key = "none";     // what lowers it most: compositing::name_of; "none" = no key
   std::string feet = "placed";  // compositing::name_of, or "placed" by the set
   bool held = false;            // stands where the feet were seen last
-  calibrate::Vec3 position;     // of the feet in the set
+  bool stands = true;           // it has a place: by the set, or once its feet were seen
+  calibrate::Vec3 position;     // of the feet in the set, if it has
   double sigma_m = 0;           // of it, by the matte
   double view_angle_deg = 0;    // between the show's camera and the person's, the nearest one's
   bool shallow = false;         // more than the billboard turns

@@ -234,6 +234,7 @@ Set read_set(const std::string& path) {
   for (const Section& section : root.tables("billboard")) {
     set.persons.push_back(read_billboard_section(section, context));
   }
+  refuse_same_names(set.persons, faults);
   context.has_scene = !set.objects.empty() || !set.stand_ins.empty() || !set.persons.empty();
 
   if (auto section = root.table("rig")) context.rig = read_rig_section(*section, context.base);

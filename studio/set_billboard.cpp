@@ -1,6 +1,8 @@
 // Set files: persons.
 #include <algorithm>
 #include <numeric>
+#include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -93,6 +95,14 @@ void read_standing(Section& section, PersonSettings& person) {
   if (calibrated && section.has("height")) {
     section.fault("height", "is told by the camera's lens and pose already");
   }
+  const PersonCamera& first = person.cameras.front();
+  if (section.has("position") && first.lens &&
+      !calibrate::project(*first.lens, first.cam_from_set * person.position)) {
+    section.fault("position",
+                  "is where the person's own camera does not see: behind it, or too far "
+                  "to the side for its lens");
+  }
+  section.of_use_only(person.by_feet, "floor", "feet = \"auto\"");
   section.number("height", person.height_m, {1e-3, 1e4});
   double yaw_deg = 0, turn_deg = 30;
   if (section.number("yaw", yaw_deg, {-3600, 3600}) && calibrated) {
@@ -178,6 +188,15 @@ PersonSettings read_billboard_section(Section section, const SetContext& context
   read_further_cameras(section, context, person);
   section.finish();
   return person;
+}
+
+void refuse_same_names(const std::vector<PersonSettings>& persons, Faults& faults) {
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < persons.size(); ++i) {
+    const std::string name = name_of(persons[i], i);
+    if (names.insert(name).second) continue;
+    faults.add(persons[i].first().place, fmt::format("there are two persons named \"{}\"", name));
+  }
 }
 
 void add_persons(const Set& set, SetScene& scene, Faults& faults) {

@@ -49,6 +49,8 @@ StandInSettings read_stand_in_section(Section section, const SetContext& context
 LampSettings read_lamp_section(Section section);
 VideoSettings read_video_section(Section section, const SetContext& context, bool lights);
 PersonSettings read_billboard_section(Section section, const SetContext& context);
+// Adds a fault for every person that is named as one before.
+void refuse_same_names(const std::vector<PersonSettings>& persons, Faults& faults);
 // Names those that have none, with faults for names that there are twice.
 void name_videos(std::vector<VideoSettings>& videos, Faults& faults);
 render::Effort read_effort_section(Section section);

@@ -15,12 +15,19 @@ using render::Instance;
 using render::Mesh;
 using render::SceneDescription;
 
-// "OBJECT", or "OBJECT/PART" with the beginning of the part's name.
-bool is_of(const std::string& instance, const std::string& object) {
-  if (object.empty()) return true;
-  if (!instance.starts_with(object)) return false;
-  const bool whole = object.find('/') == std::string::npos;
-  return !whole || instance.size() == object.size() || instance[object.size()] == '/';
+// Those of "OBJECT"; of "OBJECT/PART" those that are named so or, where none is, those whose names
+// begin so; all where none is asked for.
+std::vector<std::size_t> parts_of(const SetScene& scene, const std::string& object) {
+  std::vector<std::size_t> named, begin;
+  for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+    const std::string& name = scene.description.instances[i].name;
+    if (!name.starts_with(object)) continue;
+    const bool whole = object.find('/') == std::string::npos;
+    if (name == object) named.push_back(i);
+    if (object.empty() || !whole || name.size() == object.size() || name[object.size()] == '/')
+      begin.push_back(i);
+  }
+  return named.empty() ? begin : named;
 }
 
 std::uint32_t material_of(const Mesh& mesh, std::size_t triangle) {
@@ -74,6 +81,24 @@ bool cover(SceneDescription& scene,
   return true;
 }
 
+// Which of the videos any part shows.
+std::vector<bool> videos_seen(const SetScene& scene) {
+  const SceneDescription& description = scene.description;
+  std::vector<bool> used(description.materials.size()), seen(description.videos.size());
+  for (std::size_t i = 0; i < scene.parts.size(); ++i) {
+    for (const std::uint32_t material :
+         description.meshes[description.instances[i].mesh]->materials)
+      used[material] = true;
+  }
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (!used[i] || description.materials[i].shader != "standard") continue;
+    const auto p = render::standard_parameters(
+        description.materials[i], description.textures.size(), description.videos.size());
+    if (p.emission_video >= 0) seen[static_cast<std::size_t>(p.emission_video)] = true;
+  }
+  return seen;
+}
+
 }  // namespace
 
 VideoSettings read_video_section(Section section, const SetContext& context, bool lights) {
@@ -116,21 +141,29 @@ void name_videos(std::vector<VideoSettings>& videos, Faults& faults) {
 
 void show_videos(const Set& set, SetScene& scene, Faults& faults) {
   SceneDescription& description = scene.description;
+  std::vector<std::size_t> all;  // those that are on anything
   for (const VideoSettings& video : set.videos) {
     const auto index = static_cast<std::int32_t>(description.videos.size());
     description.videos.push_back(video.name);
     bool shown = false;
-    for (std::size_t i = 0; i < scene.parts.size(); ++i) {
-      Instance& instance = description.instances[i];
-      if (!is_of(instance.name, video.object)) continue;
-      shown = cover(description, instance, video, index) || shown;
-    }
-    if (!shown) {
+    for (const std::size_t i : parts_of(scene, video.object))
+      shown = cover(description, description.instances[i], video, index) || shown;
+    if (shown) {
+      all.push_back(static_cast<std::size_t>(index));
+    } else {
       faults.add(video.object_place,
                  fmt::format("video \"{}\" is shown nowhere: no object, part or material with "
                              "texture coordinates is named so",
                              video.name));
     }
+  }
+  const std::vector<bool> seen = videos_seen(scene);
+  for (const std::size_t i : all) {
+    if (seen[i]) continue;
+    faults.add(set.videos[i].object_place,
+               fmt::format("video \"{}\" is shown nowhere: those that come after it cover all that "
+                           "it is on",
+                           set.videos[i].name));
   }
 }
 

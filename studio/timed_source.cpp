@@ -60,10 +60,16 @@ std::optional<capture::Frame> TimedSource::at(capture::Time time) {
   const bool lost = frame && frame->status == capture::FrameStatus::lost;
   const bool holds = !frame || stalls || lost;
   if (holds && !holds_) {
-    note_ = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
-    if (lost && !frame->note.empty()) *note_ += " (" + frame->note + ")";
+    std::string note = !frame ? "has ended" : lost ? "lost a frame" : "stalls";
+    if (lost && !frame->note.empty()) note += " (" + frame->note + ")";
+    notes_.push_back(note + ": its last picture stays");
   }
   holds_ = holds;
+  if (!source_.is_live() && !told_cut_short_) {
+    const std::string how = source_.statistics().cut_short;
+    told_cut_short_ = !how.empty();
+    if (told_cut_short_) notes_.push_back("is not whole: " + how);
+  }
   if (frame && !lost) pictured_ = frame;
   // Asked for the first time, and after its end.
   if (!frame && !pictured_ && source_.current().image) pictured_ = source_.current();
@@ -72,6 +78,6 @@ std::optional<capture::Frame> TimedSource::at(capture::Time time) {
   return frame;
 }
 
-std::optional<std::string> TimedSource::take_note() { return std::exchange(note_, std::nullopt); }
+std::vector<std::string> TimedSource::take_notes() { return std::exchange(notes_, {}); }
 
 }  // namespace studio

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "capture/colour.h"
 #include "studio/source.h"
@@ -49,8 +50,9 @@ class TimedSource {
   capture::Time age() const { return age_; }
   const capture::CameraInfo& info() const { return source_.info(); }
 
-  // Once each time that the source stops giving frames: what to tell, after its name.
-  std::optional<std::string> take_note();
+  // What to tell, after its name: each time that it stops giving frames, and once that it is not
+  // whole.
+  std::vector<std::string> take_notes();
 
  private:
   Source source_;
@@ -59,7 +61,8 @@ class TimedSource {
   std::optional<capture::Frame> pictured_;  // the newest that was not lost
   capture::Time age_{};
   bool holds_ = false;  // its last frame, for it stalls or has ended
-  std::optional<std::string> note_;
+  bool told_cut_short_ = false;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace studio

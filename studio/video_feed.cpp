@@ -121,10 +121,8 @@ void VideoFeed::place(const Set& set, const SetScene& scene) {
 void VideoFeed::update(Player& player, capture::Time time) {
   TimedSource& source = *player.source;
   const std::optional<capture::Frame> frame = source.at(time);
-  if (const auto note = source.take_note()) {
-    notes_.push_back(
-        fmt::format("video {} {}: its last picture stays", player.settings.source, *note));
-  }
+  for (const std::string& note : source.take_notes())
+    notes_.push_back("video " + player.settings.source + " " + note);
   if (player.frame.texture != nullptr && (!frame || frame->image == player.image)) return;
   auto texture = player.textures.lend();
   const capture::Frame& shown = frame ? *frame : source.newest();

@@ -26,6 +26,7 @@
 #include "studio/commands/commands.h"
 #include "studio/commands/pose_report.h"
 #include "studio/json_text.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -301,7 +302,21 @@ void calibrate_lens(const LensOptions& options, Console& console) {
   adjusted.fisheye = options.model == "fisheye";
   const LensCalibrationOptions models = models_of(options);
   // Before all the work.
-  for (const std::string& file : {options.out, options.report}) check_directory_of(file);
+  const std::string report =
+      options.report.empty()
+          ? std::filesystem::path(options.out).replace_extension("report.html").string()
+          : options.report;
+  if (!report.ends_with(".html")) throw UsageError("--report names a .html file");
+  std::vector<ReadFile> read;
+  for (const std::string& image : options.images) {
+    std::vector<ReadFile> files = files_of(image, "one of the pictures");
+    files.push_back({"one of the pictures", image});
+    read.insert(read.end(), files.begin(), files.end());
+  }
+  for (const std::string& file : {options.out, report}) {
+    check_directory_of(file);
+    spare_files(read, file);
+  }
   const std::vector<Picture> pictures = read_pictures(options, console);
 
   const auto begin = std::chrono::steady_clock::now();
@@ -319,10 +334,6 @@ void calibrate_lens(const LensOptions& options, Console& console) {
 
   const LensCalibration& c = result.calibration;
   calibrate::write_lens(options.out, c.lens);
-  const std::string report =
-      options.report.empty()
-          ? std::filesystem::path(options.out).replace_extension("report.html").string()
-          : options.report;
   calibrate::write_text_file(
       report, calibration_report(result.problem, c,
                                  "Lens of " + std::filesystem::path(options.out).stem().string()));

@@ -19,6 +19,7 @@
 #include "studio/commands/commands.h"
 #include "studio/commands/exposure_list.h"
 #include "studio/json_text.h"
+#include "studio/set_files.h"
 
 namespace studio {
 namespace {
@@ -164,11 +165,11 @@ double difference_to(const capture::Response& other, const capture::Response& fo
 }
 
 void compare(const ResponseOptions& options,
+             const capture::Response& other,
              const capture::CalibrationShots& shots,
              const Calibrated& found,
              Json& figures,
              Console& console) {
-  const capture::Response other = capture::read_response(options.compare).curve;
   const capture::ResponseCheck check = capture::check_response(other, shots.coded_shots());
   const double difference = difference_to(other, found.response.curve);
   figures["compared"] = {{"file", options.compare},
@@ -209,6 +210,12 @@ void calibrate_response(const ResponseOptions& options, Console& console) {
   if (options.model != "auto" && options.model != "linear" && options.model != "curve") {
     throw UsageError("--model is auto, linear or curve");
   }
+  std::vector<ReadFile> read{{"the response to compare with", options.compare}};
+  for (const std::string& shot : options.shots) read.push_back({"one of the shots", shot});
+  for (const std::string& written : {options.out, console.figures_file()})
+    spare_files(read, written);
+  std::optional<capture::Response> other;
+  if (!options.compare.empty()) other = capture::read_response(options.compare).curve;
   capture::CalibrationShotOptions reading;
   reading.exposures_s = exposures_in(options.exposures);
   reading.pattern = pattern_of(options.mosaic);
@@ -239,7 +246,7 @@ void calibrate_response(const ResponseOptions& options, Console& console) {
   figures.update(found.fit ? curve_json(*found.fit) : linear_json(*found.transfer));
   if (found.transfer) say_linear(*found.transfer, console);
   if (found.fit) say_curve(*found.fit, console);
-  if (!options.compare.empty()) compare(options, shots, found, figures, console);
+  if (other) compare(options, *other, shots, found, figures, console);
   figures["warnings"] = found.warnings;
   figures["time_ms"] = time_ms;
   console.figures(json_text(figures));

@@ -112,22 +112,26 @@ void calibrate_vignetting(const VignettingOptions& options, Console& console) {
     candidates.push_back({{"terms", c.terms}, {"heldout_error", c.heldout_error}});
   }
   const double seen_deg = fit.max_angle_rad / degree;
+  const bool told = !fit.terms.empty() || fit.warnings.empty();
   console.figures(Json{
-      {"vignetting", fit.terms},
+      {"vignetting", told ? Json(fit.terms) : Json(nullptr)},
       {"heldout_error", fit.heldout_error},
       {"seen_deg", seen_deg},
       {"samples", samples.size()},
       {"candidates", candidates},
       {"warnings",
        fit.warnings}}.dump(2));
+  if (!told) {
+    std::string why;
+    for (const std::string& warning : fit.warnings) why += (why.empty() ? "" : "; ") + warning;
+    throw std::runtime_error("vignetting is not told: " + why);
+  }
   for (const std::string& warning : fit.warnings) console.warn(warning);
   if (fit.max_angle_rad < 0.95 * lens.max_angle_rad) {
     console.warn(fmt::format("no light was seen beyond {:.0f} degrees: there the terms are a guess",
                              seen_deg));
   }
-  if (fit.terms.empty() && !fit.warnings.empty()) {
-    console.say("vignetting is not told");
-  } else if (fit.terms.empty()) {
+  if (fit.terms.empty()) {
     console.say("even: a set needs no vignetting for it");
   } else {
     std::string terms;

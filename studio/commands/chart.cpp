@@ -63,6 +63,8 @@ void chart(const ChartOptions& options, Console& console) {
       wanted.push_back(&stage);
     }
   }
+  if (!all && std::ranges::find(options.stages, "all") != options.stages.end())
+    throw UsageError("all stands alone: it is every stage");
   for (const std::string& name : options.stages) {
     if (all || std::ranges::find(chart_stages(), name, &ChartStage::name) != chart_stages().end()) {
       continue;

@@ -32,8 +32,10 @@ std::vector<double> exposures_in(std::string_view list) {
     const std::size_t slash = word.find('/');
     const double over = slash == word.npos ? 1 : number_of(word.substr(slash + 1));
     const double exposure_s = number_of(word.substr(0, slash)) / over;
-    if (!(exposure_s >= 0) || !std::isfinite(exposure_s)) {
-      throw UsageError(fmt::format("--exposures: \"{}\" is no time of 0 s or more", word));
+    constexpr double least_s = 1e-9, most_s = 3600;
+    if (exposure_s != 0 && !(exposure_s >= least_s && exposure_s <= most_s)) {
+      throw UsageError(
+          fmt::format("--exposures: \"{}\" is neither 0 nor a time from 1e-9 to 3600 s", word));
     }
     exposures_s.push_back(exposure_s);
     begin = end + 1;

@@ -73,6 +73,11 @@ class PlateMaker {
   compositing::PlateFootage footage_;
 };
 
+void warn_if_cut_short(const VideoSource& source, const capture::Camera& camera, Console& console) {
+  const std::string how = camera.statistics().cut_short;
+  if (!how.empty()) console.warn(source.uri + ": " + how);
+}
+
 void make_plate(const KeyOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) {
     throw std::invalid_argument(options.out + ": plates are OpenEXR files, name it *.exr");
@@ -91,6 +96,7 @@ void make_plate(const KeyOptions& options, Console& console) {
     const bool good = frame->status == capture::FrameStatus::good;
     if (frame->image && good) maker.add(*frame->image);
   }
+  warn_if_cut_short(source, *camera, console);
   const std::size_t frames = maker.count();
   if (frames == 0) throw std::runtime_error(source.uri + " gives no picture");
   const std::int64_t bad = passed - static_cast<std::int64_t>(frames);
@@ -243,11 +249,11 @@ Json json_of(const KeyedClip& clip) {
 
 // `before`: frames that the directory had already.
 void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Console& console) {
-  console.say(
-      fmt::format("{}: {} frames before a {} screen, confidence {:.2f} in the mean, {:.2f} at "
-                  "least; {:.1f} ms a frame",
-                  out, clip.frames, clip.colour, clip.confidence(), clip.least_confidence,
-                  clip.key_ms / static_cast<double>(clip.keyed)));
+  console.say(fmt::format(
+      "{}: {} frames before {} screen, confidence {:.2f} in the mean, {:.2f} at "
+      "least; {:.1f} ms a frame",
+      out, clip.frames, clip.colour == "no" ? "no" : "a " + clip.colour, clip.confidence(),
+      clip.least_confidence, clip.key_ms / static_cast<double>(clip.keyed)));
   if (before > 0) {
     console.warn(fmt::format("{} had {} frames already: those with other numbers are still there",
                              out, before));
@@ -270,7 +276,9 @@ void key_clip(const KeyOptions& options, Console& console) {
   compositing::CleanPlate plate =
       read_clean_plate(options.plate, source, settings.method, {first, first + plate_footage - 1});
   KeyedClip clip;
-  clip.colour = compositing::name_of(plate.colour);
+  const bool by_screen = settings.method == compositing::KeyMethod::screen;
+  if (by_screen && compositing::screen_share(plate.light, plate.colour) > 0)
+    clip.colour = compositing::name_of(plate.colour);
   clip.known = plate.known;
   const auto camera = open_video(source);
   // Before the masks, which are for the video too.
@@ -290,6 +298,7 @@ void key_clip(const KeyOptions& options, Console& console) {
   const compositing::ExrSequence sequence(take);
   key_frames(options, *camera, keyer, sequence, clip);
   if (clip.keyed == 0) throw std::runtime_error(source.uri + " gives no picture");
+  warn_if_cut_short(source, *camera, console);
   console.figures(json_text(json_of(clip)));
   tell(clip, options.out, before, console);
 }

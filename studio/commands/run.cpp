@@ -226,6 +226,8 @@ void run(const RunOptions& options, Console& console) {
   ShowOptions show_options;
   show_options.live = options.live;
   show_options.frames = options.frames;
+  if (!options.view_png.empty() && !options.view_png.ends_with(".png"))
+    throw UsageError("--view-png names a .png file");
   if (!options.view_png.empty()) compositing::require_writable(options.view_png);
   for (const std::string& written : {options.view_png, console.figures_file()}) {
     spare_sources(set, written);

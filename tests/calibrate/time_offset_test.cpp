@@ -373,6 +373,15 @@ TEST(FindTimeOffset, RefusesWhatHasFewFramesInCommon) {
   EXPECT_NE(refusal(a, b, {.largest_s = 0.1}), "accepted");
 }
 
+TEST(FindTimeOffset, RefusesAnOffsetBeyondTheLargest) {
+  made::Random random(10);
+  const auto lamp = random_lamp(0.3, random);
+  const auto a = record(lamp, {0, 0}, 10, 0.002, random);
+  const auto b = record(lamp, {0, 0.06}, 10, 0.002, random);
+  EXPECT_NEAR(find_time_offset(a, b, {.largest_s = 0.1}).offset_s, 0.06, 0.005);
+  EXPECT_NE(refusal(a, b, {.largest_s = 0.03}), "accepted");
+}
+
 TEST(FindTimeOffset, RefusesALampThatFlashesRegularly) {
   made::Random random(7);
   const auto regular = [](double t) {

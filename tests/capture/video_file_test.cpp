@@ -72,6 +72,45 @@ TEST_F(VideoFile, CountsAndTimesEveryFrameInEveryContainer) {
   }
 }
 
+// One that is whole says nothing, whatever its sound is like.
+TEST_F(VideoFile, TellsThatAFileIsCutShort) {
+  const std::string sound = "-f lavfi -i sine=duration=1 -c:a aac -b:a 32k ";
+  for (const auto& [name, options] :
+       {std::pair{"a.mp4", "-c:v libx264 -bf 2 -movflags +faststart"},
+        std::pair{"a.mkv", "-c:v ffv1"}, std::pair{"b.mkv", "-c:v libx264 -bf 2"},
+        std::pair{"a.avi", "-c:v mpeg4"}, std::pair{"a.webm", "-c:v libvpx -deadline realtime"}}) {
+    for (const std::string& with : {std::string(), sound}) {
+      if (!with.empty() && std::string(name) == "a.webm") continue;  // has no AAC
+      const std::string clip = make_clip(name, with + options);
+      const auto whole = open_camera(clip);
+      all_frames(*whole);
+      EXPECT_EQ(whole->statistics().cut_short, "") << name << with;
+      std::filesystem::resize_file(clip, std::filesystem::file_size(clip) / 2);
+      if (std::string(name) == "a.avi") continue;  // its index is at the end
+      for (const bool loop : {false, true}) {
+        CameraOptions again;
+        again.loop = loop;
+        const auto cut = open_camera(clip, again);
+        for (int i = 0; i < 25; ++i) cut->next();
+        EXPECT_THAT(cut->statistics().cut_short, HasSubstr("s that it tells of are not there"))
+            << name << with;
+      }
+    }
+  }
+}
+
+// A picture that stands for long at the end is one of a whole file.
+TEST_F(VideoFile, TakesALastPictureThatStandsForTheFilesEnd) {
+  for (const char* name : {"a.mp4", "a.mkv"}) {
+    const std::string clip =
+        make(name, "testsrc2=size=64x48:rate=25:duration=0.4,setpts='if(lt(N,9),PTS,PTS+3/TB)'",
+             "-fps_mode vfr -c:v libx264 -bf 0");
+    const auto camera = open_camera(clip);
+    all_frames(*camera);
+    EXPECT_EQ(camera->statistics().cut_short, "") << name;
+  }
+}
+
 // What is passed over is not made, and all the rest is as without.
 TEST_F(VideoFile, PassesOverFrames) {
   const std::string clip = make_clip("clip.mp4", "-c:v libx264 -bf 2");

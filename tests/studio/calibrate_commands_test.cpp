@@ -241,6 +241,17 @@ TEST_F(CalibrateCommands, WhatWasReadIsNotWrittenOver) {
   const std::string lenses =
       " a=none b=none --lens a=" + path("lens.toml") + " --lens b=" + path("other.toml") + " -o ";
   calibrate::write_lens(path("other.toml"), made::fish_eye());
+  write("cam.rsp", "1 1 0\n1 1 0\n1 1 0\n");
+  for (const std::string& words :
+       {"calibrate response " + path("lens.toml") + " --compare " + path("cam.rsp") + " -o " +
+            path("cam.rsp"),
+        "calibrate lens " + path("shot.html") + " --board 9x6 --square 0.05 -o " +
+            path("lens.toml") + " --report " + path("shot.html")}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.status, 1) << words;
+    EXPECT_THAT(outcome.err, HasSubstr("would be lost")) << words;
+  }
+  EXPECT_EQ(content_of(path("cam.rsp")), "1 1 0\n1 1 0\n1 1 0\n");
   for (const std::string& words : {"calibrate pose" + of_both + path("lens.toml"),
                                    "calibrate probe" + of_both + path("lens.toml"),
                                    "calibrate probe" + of_both + path("markers.toml"),
@@ -379,6 +390,9 @@ TEST_F(CalibrateCommands, LensRefusesBeforeItsWorkWhatCannotBeWritten) {
   const Outcome form = run(command + "--model LENSMODEL_CAHVOR -o " + path("lens.yml"));
   EXPECT_EQ(form.status, 2);
   EXPECT_THAT(form.err, HasSubstr("OpenCV has no model for a lens of LENSMODEL_CAHVOR"));
+  const Outcome report = run(command + "-o " + path("lens.toml") + " --report " + path("a.png"));
+  EXPECT_EQ(report.status, 2);
+  EXPECT_THAT(report.err, HasSubstr("--report names a .html file"));
   const Outcome place = run(command + "-o " + path("nowhere/lens.toml"));
   EXPECT_EQ(place.status, 1);
   EXPECT_THAT(place.err, HasSubstr("no such directory"));

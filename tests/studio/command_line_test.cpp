@@ -339,6 +339,7 @@ TEST_F(CommandLine, CalibratesALinearSensorFromItsShots) {
 
   EXPECT_EQ(run(command + " --exposures 0.1,0.4").status, 2);
   EXPECT_EQ(run(command + " --exposures soon").status, 2);
+  EXPECT_EQ(run(command + " --exposures 0.1,0.1,0.4,0.4,1.5,1e-44").status, 2);
   EXPECT_EQ(run("calibrate response " + shots + "-o a.txt").status, 2);
   const Outcome untold = run(command);  // PNG files tell no exposures
   EXPECT_EQ(untold.status, 1);

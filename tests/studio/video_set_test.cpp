@@ -139,6 +139,40 @@ TEST_F(VideoSetTest, RefusesAVideoThatNothingShowsAtItsPlace) {
   }
 }
 
+// "room/tv" is the screen, not "room/tv set", "room/tv foot" and "room/tv light".
+TEST_F(VideoSetTest, IsOnThePartThatIsNamedSo) {
+  const std::string tv = "[[object]]\nname = \"room\"\nmade = \"tv\"\n";
+  const std::string video =
+      "[[video_light]]\nsource = \"grey:6,25,0\"\nsamples = [1, 1]\nobject = ";
+  const auto lights_on = [&](const char* object) {
+    Set set = made_set(tv + video + object);
+    SetScene scene = describe_scene(set);
+    return area_lights_of(scene, 0, {1, 1}).size();
+  };
+  EXPECT_EQ(lights_on("\"room/tv\"\n"), 1U);
+  EXPECT_EQ(lights_on("\"room\"\nmaterial = \"screen\"\n"), 1U);
+  try {
+    lights_on("\"room\"\n");
+    ADD_FAILURE() << "a case that is closed";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("faces all ways alike"));
+  }
+}
+
+TEST_F(VideoSetTest, RefusesAVideoThatAnotherCovers) {
+  const std::string first =
+      "[[video]]\nname = \"old\"\nsource = \"grey:6,25,0\"\nobject = \"tv\"\n";
+  const Set set = made_set(first + "[[video]]\nsource = \"grey:1,25,0\"\nmaterial = \"screen\"\n");
+  try {
+    FrameMaker maker(set);
+    FAIL();
+  } catch (const SetError& error) {
+    ASSERT_EQ(error.diagnostics().size(), 1U);
+    EXPECT_EQ(error.diagnostics()[0].line, set.videos[0].object_place.line);
+    EXPECT_THAT(error.what(), HasSubstr("\"old\" is shown nowhere: those that come after it"));
+  }
+}
+
 TEST_F(VideoSetTest, RefusesASourceThatCannotBeOpenedAtItsPlace) {
   const Set set = made_set("[[video]]\nsource = \"made.toml\"\nobject = \"tv\"\n");
   try {
