@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <vector>
 
@@ -16,19 +17,12 @@ namespace {
 
 constexpr int regions_across = 8, regions_down = 6;  // the best patch of each
 constexpr int stride = 6;                            // of places that are tried, in cells
+constexpr int cells_afar = 8;                        // along a coarse one, of those far away
 constexpr float most_sigma = 0.1F;                   // of a patch that is worth following, in cells
 constexpr float own_error = 0.004F;                  // of light: what is neither noise nor shift
 constexpr int fewest = 4;                            // patches that must agree
-constexpr float agreed = 0.5F;                       // cells: spread of patches that agree
-
-// One sigma, of two thirds of the values: where half of what is seen moves by itself, it is wide.
-float spread_about(float centre, std::vector<float>& values) {
-  constexpr float per_sigma = 0.967F;
-  for (float& value : values) value = std::abs(value - centre);
-  const auto third = values.begin() + static_cast<std::ptrdiff_t>(2 * values.size() / 3);
-  std::ranges::nth_element(values, third);
-  return *third / per_sigma;
-}
+constexpr float agreed = 0.5F;                       // cells: patches that agree with their middle
+constexpr float most_of_seen = 0.6F;                 // share that must
 
 }  // namespace
 
@@ -69,6 +63,21 @@ PlateWatch::PlateWatch(const CleanPlate& plate)
     }
   }
   choose_patches();
+  const int rows = fine.rows / cells_afar, columns = fine.columns / cells_afar;
+  std::vector<float> light;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      float sum = 0;
+      for (int y = 0; y < cells_afar; ++y) {
+        for (int x = 0; x < cells_afar; ++x)
+          sum += fine.at(row * cells_afar + y, column * cells_afar + x);
+      }
+      light.push_back(sum / (cells_afar * cells_afar));
+    }
+  }
+  if (!light.empty()) afar_.emplace(rows, columns, light);
+  seen_afar_.resize(light.size());
+  middle_.reserve(patches_.size());
   rights_.reserve(patches_.size());
   downs_.reserve(patches_.size());
 }
@@ -216,27 +225,96 @@ PlateWatch::Found PlateWatch::find(const Patch& patch) const {
   return found;
 }
 
+// The shift of all patches that are in sight of the frame, if it is no farther from `about` than
+// each is looked for.
 template <class Rows>
-PlateShift PlateWatch::look_at(const Rows& frame) {
+PlateShift PlateWatch::follow(const Rows& frame, About about) {
   PlateShift shift;
-  shift.patches = static_cast<int>(patches_.size());
   rights_.clear(), downs_.clear();
   for (const Patch& patch : patches_) {
-    sample(frame, patch);
+    Patch there = patch;
+    there.row += about.down, there.column += about.right;
+    if (there.row < 0 || there.column < 0 || there.row + side > plate_[0].rows ||
+        there.column + side > plate_[0].columns)
+      continue;
+    ++shift.patches;
+    sample(frame, there);
     const Found found = find(patch);
     if (!found.fits) continue;
     rights_.push_back(found.right), downs_.push_back(found.down);
   }
   shift.seen = static_cast<int>(rights_.size());
   if (shift.seen < fewest || 3 * shift.seen < shift.patches) return shift;
-  const auto count = static_cast<float>(shift.seen);
-  const float right = capture::median_in_place(rights_), down = capture::median_in_place(downs_);
-  const float spread = std::max(spread_about(right, rights_), spread_about(down, downs_));
+  middle_.assign(rights_.begin(), rights_.end());
+  const float right = capture::median_in_place(middle_);
+  middle_.assign(downs_.begin(), downs_.end());
+  const float down = capture::median_in_place(middle_);
+  // Half of what is seen may move by itself; more of it agrees if the camera did.
+  middle_.clear();
+  for (std::size_t i = 0; i < rights_.size(); ++i) {
+    const float off = std::max(std::abs(rights_[i] - right), std::abs(downs_[i] - down));
+    if (off <= agreed) middle_.push_back(off);
+  }
+  shift.agree = static_cast<int>(middle_.size());
+  shift.known = shift.agree >= fewest &&
+                static_cast<float>(shift.agree) >= most_of_seen * static_cast<float>(shift.seen);
   const auto pixels = static_cast<float>(pixels_);
-  shift.known = spread <= agreed;
-  shift.right_px = right * pixels, shift.down_px = down * pixels;
-  shift.sigma_px = (spread / std::sqrt(count) + 0.01F) * pixels;
+  shift.right_px = (static_cast<float>(about.right) + right) * pixels;
+  shift.down_px = (static_cast<float>(about.down) + down) * pixels;
+  const float spread = shift.agree == 0 ? agreed : 1.48F * capture::median_in_place(middle_);
+  shift.sigma_px = (spread / std::sqrt(static_cast<float>(shift.seen)) + 0.01F) * pixels;
   return shift;
+}
+
+// About where the edges of the whole frame may lie, by four rows of each coarse cell: that shift
+// which most patches agree on.
+template <class Rows>
+PlateShift PlateWatch::look_afar(const Rows& frame) {
+  PlateShift best;
+  if (!afar_) return best;
+  const int across = cells_afar * pixels_;
+  for (int row = 0; row < afar_->rows(); ++row) {
+    for (int column = 0; column < afar_->columns(); ++column) {
+      float sum = 0;
+      for (int i = 0; i < 4; ++i) {
+        const int y = row * across + (2 * i + 1) * across / 8;
+        for (int x = 0; x < across; x += key_lanes) {
+          std::array<F8, 3> c;
+          const int count = std::min(key_lanes, across - x);
+          frame.load(y, column * across + x, count, c);
+          const F8 light = c[0] + c[1] + c[2];
+          for (int k = 0; k < count; ++k) sum += light[k];
+        }
+      }
+      seen_afar_[static_cast<std::size_t>(row * afar_->columns() + column)] =
+          sum / static_cast<float>(4 * across);
+    }
+  }
+  std::array<CoarseShift::Shift, 6> shifts;
+  const std::size_t count = afar_->find(seen_afar_, shifts);
+  for (const CoarseShift::Shift& coarse : std::span(shifts).first(count)) {
+    const auto cells = [](float at) { return static_cast<int>(std::lround(at * cells_afar)); };
+    const About about{cells(coarse.right), cells(coarse.down)};
+    const PlateShift shift = follow(frame, about);
+    if (!shift.known || shift.agree <= best.agree) continue;
+    best = shift, about_ = about;
+  }
+  return best;
+}
+
+// Where it was seen last, where it was at first, and then anywhere.
+template <class Rows>
+PlateShift PlateWatch::look_at(const Rows& frame) {
+  const PlateShift near = follow(frame, {});
+  if (near.known || static_cast<int>(patches_.size()) < fewest) {
+    about_ = {};
+    return near;
+  }
+  if (about_ != About{}) {
+    if (const PlateShift again = follow(frame, about_); again.known) return again;
+  }
+  const PlateShift afar = look_afar(frame);
+  return afar.known ? afar : near;
 }
 
 template PlateShift PlateWatch::look_at(const LightRows& frame);

@@ -100,6 +100,29 @@ TEST(PlateWatch, MeasuresPushesToAQuarterOfAPixelBehindAPersonAndUnderOtherLight
   }
 }
 
+// Who knocks a tripod over does not do so by five pixels.
+TEST(PlateWatch, MeasuresPushesOfUpToAFifthOfThePicture) {
+  PlateWatch watch(plate_of_room());
+  std::uint64_t seed = 900;
+  for (const auto& [right, down] : std::vector<std::pair<float, float>>{{7, 7},
+                                                                        {-7, -7},
+                                                                        {8.5F, -8},
+                                                                        {-14, 10},
+                                                                        {20, 20},
+                                                                        {-33.5F, 12},
+                                                                        {60, -30},
+                                                                        {-90, 5},
+                                                                        {0, 0}}) {
+    Image light_there = room(right, down, 0.8F);
+    put_person(light_there, 250);
+    const PlateShift shift = look(watch, filmed(light_there, ++seed));
+    ASSERT_TRUE(shift.known) << right << ' ' << down << ": " << shift.seen << " of "
+                             << shift.patches;
+    EXPECT_NEAR(shift.right_px, right, 0.3) << down;
+    EXPECT_NEAR(shift.down_px, down, 0.3) << right;
+  }
+}
+
 TEST(PlateWatch, SaysThatItCannotTellBeforeABareScreenAndBehindACrowd) {
   const MadeClip even(made_scene("plain"), 5, height, width);
   std::vector<Image> shots;
