@@ -233,12 +233,20 @@ class CellBaker final : public RaySink {
     return is_further(slot) ? index_of_slot_[slot - cell_pixels] : 0;
   }
   float number_in_pixel(std::uint32_t pixel, std::uint32_t sample, std::uint32_t path) const;
+  float number_of_light(const ShadePoint& p, std::size_t place) const;
   float chance_of_picture_ray(float share) const;
   std::uint16_t add_picture_ray(const QueuedRay& ray, float far_m);
   float part_of_light(const PointLight& l, Vec3f open) const;
+  // How likely pictures are looked for in the way of a light, 0 where they cannot come into it; and
+  // whether they are.
+  struct MayDim {
+    float chance = 0;
+    bool looked_for = false;
+  };
   // `part`: of the point's light, if there is other light as well.
-  void add_light_past_pictures(
+  MayDim add_light_past_pictures(
       const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part = 1);
+  void settle_picture_lights(std::size_t first);
   Vec3f direction_through(std::size_t pixel) const;
   bool pictures_may_part(std::size_t k) const;
   float hidden_from(const Met& met) const;
@@ -406,6 +414,13 @@ class CellBaker final : public RaySink {
   std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<PointLight> tested_;
+  // By pixel, of the points at hand: what lights give that pictures may dim, and what that would be
+  // by those that these are looked for in; how many these are likely to be.
+  struct LookedFor {
+    float gives = 0, would_be = 0, number = 0;
+  };
+  std::array<LookedFor, cell_pixels> looked_for_;
+  std::vector<std::uint8_t> looked_for_by_;  // the pixels of the transport's last picture lights
   std::vector<PointLamp> reached_;
   std::vector<Doubt> doubts_;
   std::array<std::size_t, 2> doubtful_{};  // pixel and centre whose doubts these are

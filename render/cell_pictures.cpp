@@ -173,7 +173,7 @@ void CellBaker::add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Ve
     const auto lamps = static_cast<float>(frame_->planned_table->lamps.size());
     const float share = largest(p.throughput) * share_of_sample(p.slot);
     const float chance = std::min(share / lamps * lights_of_pixel, 1.0F);
-    if (number_in_pixel(p.pixel, index_of_sample(p.slot), p.path + number) < chance) {
+    if (number_of_light(p, lamp) < chance) {
       const WayTo<float> way = way_to(origin, frame_->planned_table->lamps[lamp].position);
       transport_->picture_lights.push_back({origin, way.direction, weight,
                                             way.distance_m * before_lamp, 1 / chance, slot, number,
@@ -298,22 +298,39 @@ std::uint16_t CellBaker::look_apart(
 }
 
 // Light that a point gets of the table.
-void CellBaker::add_light_past_pictures(
+CellBaker::MayDim CellBaker::add_light_past_pictures(
     const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part) {
   const auto slot = static_cast<std::uint16_t>(target_of(p));
   const auto number = static_cast<std::uint16_t>(light);
   const Vec3f origin = past_pictures_ ? offset_origin(p.hit, p.hit.geometric_normal) : Vec3f{};
   if (past_pictures_ && grid_ && !shades_ring_) transport_->reach.add_receiver(*grid_, origin);
+  MayDim may_dim;
   if (may_be_passed(origin, direction, ray_far)) {
     const float chance =
         std::min(largest(p.throughput) * share_of_sample(p.slot) * part * lights_of_pixel, 1.0F);
-    if (number_in_pixel(p.pixel, index_of_sample(p.slot), p.path + number) < chance) {
+    may_dim.chance = chance;
+    if (number_of_light(p, frame_->light_rows.place[light]) < chance) {
       transport_->picture_lights.push_back(
           {origin, direction, weight, ray_far, 1 / chance, slot, number, false});
-      return;
+      may_dim.looked_for = true;
+      return may_dim;
     }
   }
   lights_.add({slot, number, weight});
+  return may_dim;
+}
+
+// Those lights of a pixel, from the first-th on, that pictures are looked for in stand for all that
+// these may dim, and no more: what is lost is a share of what is there, and nothing gets darker
+// than without that. Where hardly one is looked for, there may be none: those of other pixels stand
+// for them too, as chance has it.
+void CellBaker::settle_picture_lights(std::size_t first) {
+  constexpr float enough = 2;
+  auto& lights = transport_->picture_lights;
+  for (std::size_t i = first; i < lights.size(); ++i) {
+    const LookedFor& of = looked_for_[looked_for_by_[i - first]];
+    if (of.number >= enough && of.would_be > 0) lights[i].stands_for *= of.gives / of.would_be;
+  }
 }
 
 // What a light gives a point, of all that this gets if nothing is in the way.
@@ -334,7 +351,7 @@ void CellBaker::note_picture_shadow(const ShadePoint& p,
   if (!may_be_passed(origin, direction, ray_far)) return;
   const float share = largest(p.throughput * p.plate_share) * share_of_sample(p.slot);
   const float chance = std::min(share * part_of_light(l, open) * lights_of_pixel, 1.0F);
-  if (!(number_in_pixel(p.pixel, index_of_sample(p.slot), p.path + l.light) < chance)) return;
+  if (!(number_of_light(p, frame_->light_rows.place[l.light]) < chance)) return;
   transport_->picture_shadows.push_back(
       {origin,
        direction,
@@ -358,6 +375,16 @@ float CellBaker::number_in_pixel(std::uint32_t pixel,
   const std::uint32_t x = static_cast<std::uint32_t>(x0_) + pixel % cell_size;
   const std::uint32_t y = static_cast<std::uint32_t>(y0_) + pixel / cell_size;
   return SampleSequence(path * 3 + 1, y << 16U | x, sample).next();
+}
+
+// The same of one of a point's lights, by its place among all. Of those that stand for others, one
+// lies every so many places, from a random first one on: pictures hide lights that are neighbours,
+// and chance for each by itself would make grain of their shadows, some of it blacker than black.
+float CellBaker::number_of_light(const ShadePoint& p, std::size_t place) const {
+  constexpr float golden_ratio = 0.6180340F;
+  const float number = number_in_pixel(p.pixel, index_of_sample(p.slot), p.path) +
+                       golden_ratio * static_cast<float>(place);
+  return number - std::floor(number);
 }
 
 // What pictures hide is looked at through a pixel's centre: where a further ray comes to a thing

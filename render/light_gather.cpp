@@ -207,6 +207,8 @@ LightRows::LightRows(std::span<const DirectionalLight> lights) : number(order_by
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (lights[i].compact != 0) number.push_back(static_cast<std::uint16_t>(i));
   }
+  place.resize(lights.size());
+  for (std::size_t i = 0; i < number.size(); ++i) place[number[i]] = static_cast<std::uint16_t>(i);
   for (const std::uint16_t i : number) {
     const DirectionalLight& light = lights[i];
     x.push_back(light.direction.x);

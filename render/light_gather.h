@@ -123,6 +123,7 @@ struct LightRows {
   LightRows() = default;
   explicit LightRows(std::span<const DirectionalLight> lights);
   std::vector<std::uint16_t> number;  // in the table
+  std::vector<std::uint16_t> place;   // and back: of each light of the table, where in these
   std::vector<float> x, y, z;         // of directions
   std::vector<float> sum;             // of the irradiance's colours
   std::vector<float> spread;          // DirectionalLight::spread
