@@ -284,21 +284,28 @@ std::optional<Time> MediaFile::length() const {
 std::optional<Time> MediaFile::missing_pictures() const {
   const std::optional<Time> whole = length();
   if (!whole) return std::nullopt;
-  const AVRational ns{1, std::nano::den};
-  std::optional<Time> end;  // on the file's own clock
-  const AVDictionaryEntry* tag =
-      av_dict_get(video_->metadata, "DURATION", nullptr, 0);  // Matroska's
+  const auto time_ns = [this](std::int64_t stamp) {
+    return av_rescale_q(stamp, video_->time_base, {1, std::nano::den});
+  };
+  const std::int64_t start = video_->start_time == AV_NOPTS_VALUE ? 0 : time_ns(video_->start_time);
+  const std::int64_t seen = time_ns(pictures_end_);
+  if (!is_sane(start) || !is_sane(seen)) return std::nullopt;
+  constexpr std::int64_t rounding_ns = 1'000'000;
+  const std::int64_t last = start + whole->count() + rounding_ns;
+  std::int64_t end = start + whole->count();  // on the file's own clock
   std::int64_t told_us = 0;
-  const std::int64_t start = video_->start_time == AV_NOPTS_VALUE ? 0 : video_->start_time;
-  if (tag != nullptr && av_parse_time(&told_us, tag->value, 1) >= 0) {
-    end = std::chrono::microseconds(told_us);
-  } else if (video_->nb_frames > 0 && is_sane(video_->duration) && is_sane(start)) {
-    end = Time{av_rescale_q(start + video_->duration, video_->time_base, ns)};
-  } else if (sound_ == nullptr && context_->nb_streams == 1) {
-    end = Time{av_rescale_q(start, video_->time_base, ns)} + *whole;
+  const AVDictionaryEntry* tag = av_dict_get(video_->metadata, "DURATION", nullptr, 0);
+  if (tag != nullptr && av_parse_time(&told_us, tag->value, 1) >= 0) {  // Matroska's
+    if (told_us < 0 || told_us > last / 1000) return std::nullopt;
+    end = told_us * 1000;
+  } else if (video_->nb_frames > 0) {
+    const std::int64_t lasts = time_ns(video_->duration);
+    if (lasts < 0 || lasts > last - start) return std::nullopt;
+    end = start + lasts;
+  } else if (sound_ != nullptr || context_->nb_streams != 1) {
+    return std::nullopt;
   }
-  if (!end || *end > *whole + Time{av_rescale_q(start, video_->time_base, ns)}) return std::nullopt;
-  return *end - Time{av_rescale_q(pictures_end_, video_->time_base, ns)};
+  return Time{end - seen};
 }
 
 bool MediaFile::rewind() {

@@ -412,17 +412,19 @@ void PersonFeed::place_billboard(Person& person, Vec3 viewer) {
     const std::array<float, 4> box = feed.person_box();
     const auto placed = compositing::place_billboard(*camera.lens, camera.cam_from_set,
                                                      status.position, box, viewer, s.turn_rad);
-    const bool nobody = !(box[2] > box[0] && box[3] > box[1]);
-    if (!placed && nobody) return;  // there is nothing to be seen of it, wherever it is
-    if (!placed) person.hide(index);
-    if (!placed && !person.out_of_reach) {
-      person.notes.push_back(
-          fmt::format("{}: is not shown: from its own camera the picture meets nothing where it "
-                      "stands",
-                      status.name));
+    if (!placed) {
+      const bool nobody = !(box[2] > box[0] && box[3] > box[1]);
+      if (nobody) return;  // nothing is to be seen of it, wherever it is
+      person.hide(index);
+      if (!std::exchange(person.out_of_reach, true)) {
+        person.notes.push_back(
+            fmt::format("{}: is not shown: from its own camera the picture meets nothing where it "
+                        "stands",
+                        status.name));
+      }
+      return;
     }
-    person.out_of_reach = !placed;
-    if (!placed) return;
+    person.out_of_reach = false;
     place = placed->set_from_object;
     status.view_angle_deg = placed->view_angle_rad / degree;
     status.shallow = placed->shallow;
