@@ -540,16 +540,7 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
     const Vec3f weight = p.throughput * p.diffuse * l.passed * l.weight;
     if (weight == Vec3f{}) continue;
     if (past_pictures_) {
-      const MayDim may_dim = add_light_past_pictures(
-          p, shadow_rays_.direction(receivers_, l.point, l.light), l.light, weight,
-          part_of_light(l, light_of_point_[point_at[l.point]].open));
-      if (may_dim.chance == 0) continue;
-      const float gives = largest(weight * frame_->planned_table->lights[l.light].irradiance);
-      LookedFor& of = looked_for_[p.pixel];
-      of.gives += gives, of.number += may_dim.chance;
-      if (!may_dim.looked_for) continue;
-      of.would_be += gives / may_dim.chance;
-      looked_for_by_.push_back(static_cast<std::uint8_t>(p.pixel));
+      add_tested_past_pictures(p, l, weight, light_of_point_[point_at[l.point]].open);
     } else {
       lights_.add({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
     }

@@ -246,6 +246,7 @@ class CellBaker final : public RaySink {
   // `part`: of the point's light, if there is other light as well.
   MayDim add_light_past_pictures(
       const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part = 1);
+  void add_tested_past_pictures(const ShadePoint& p, const PointLight& l, Vec3f weight, Vec3f open);
   void settle_picture_lights(std::size_t first);
   Vec3f direction_through(std::size_t pixel) const;
   bool pictures_may_part(std::size_t k) const;

@@ -320,6 +320,23 @@ CellBaker::MayDim CellBaker::add_light_past_pictures(
   return may_dim;
 }
 
+// A light of a point that is no centre: as above, and counted for its pixel.
+void CellBaker::add_tested_past_pictures(const ShadePoint& p,
+                                         const PointLight& l,
+                                         Vec3f weight,
+                                         Vec3f open) {
+  const MayDim may_dim =
+      add_light_past_pictures(p, shadow_rays_.direction(receivers_, l.point, l.light), l.light,
+                              weight, part_of_light(l, open));
+  if (may_dim.chance == 0) return;
+  const float gives = largest(weight * frame_->planned_table->lights[l.light].irradiance);
+  LookedFor& of = looked_for_[p.pixel];
+  of.gives += gives, of.number += may_dim.chance;
+  if (!may_dim.looked_for) return;
+  of.would_be += gives / may_dim.chance;
+  looked_for_by_.push_back(static_cast<std::uint8_t>(p.pixel));
+}
+
 // Those lights of a pixel, from the first-th on, that pictures are looked for in stand for all that
 // these may dim, and no more: what is lost is a share of what is there, and nothing gets darker
 // than without that. Where hardly one is looked for, there may be none: those of other pixels stand
@@ -381,7 +398,6 @@ float CellBaker::number_in_pixel(std::uint32_t pixel,
 // lies every so many places, from a random first one on: pictures hide lights that are neighbours,
 // and chance for each by itself would make grain of their shadows, some of it blacker than black.
 float CellBaker::number_of_light(const ShadePoint& p, std::size_t place) const {
-  constexpr float golden_ratio = 0.6180340F;
   const float number = number_in_pixel(p.pixel, index_of_sample(p.slot), p.path) +
                        golden_ratio * static_cast<float>(place);
   return number - std::floor(number);

@@ -70,7 +70,6 @@ void find_lit(const Receivers& r,
   }
 }
 
-constexpr float golden_ratio = 0.6180340F;
 constexpr float rough_accuracy = 0.5F;  // from here on, points that count little test half as many
 
 Scene::Bounds box_of(const Receivers& r) {

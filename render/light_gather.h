@@ -63,6 +63,9 @@ struct Receivers {
 // The least cosine between normals of one smooth surface, from pixel to pixel.
 inline constexpr float alike_normals = 0.93F;
 
+// The places i * this, less what is whole of them, lie evenly in 0..1 for any count of them.
+inline constexpr float golden_ratio = 0.6180340F;
+
 // A point that counts less of its pixel tests one light of four, or of eight.
 inline constexpr float few_lights_share = 0.2F;
 
