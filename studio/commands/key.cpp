@@ -167,8 +167,9 @@ void spare_what_is_read(const KeyOptions& options, const VideoSource& source, Co
 
 // What keying a clip came to.
 struct KeyedClip {
-  std::string colour;  // of the screen
-  double known = 0;    // share of the plate
+  bool by_screen = true;
+  std::string colour = "no";  // of the screen
+  double known = 0;           // share of the plate
   std::int64_t frames = 0, lost = 0, keyed = 0;
   double confidence_sum = 0, least_confidence = 1;
   std::string_view why = "good";  // of the least
@@ -249,11 +250,13 @@ Json json_of(const KeyedClip& clip) {
 
 // `before`: frames that the directory had already.
 void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Console& console) {
+  const std::string before_what = !clip.by_screen       ? "a still background"
+                                  : clip.colour == "no" ? "no screen"
+                                                        : "a " + clip.colour + " screen";
   console.say(fmt::format(
-      "{}: {} frames before {} screen, confidence {:.2f} in the mean, {:.2f} at "
-      "least; {:.1f} ms a frame",
-      out, clip.frames, clip.colour == "no" ? "no" : "a " + clip.colour, clip.confidence(),
-      clip.least_confidence, clip.key_ms / static_cast<double>(clip.keyed)));
+      "{}: {} frames before {}, confidence {:.2f} in the mean, {:.2f} at least; {:.1f} ms a frame",
+      out, clip.frames, before_what, clip.confidence(), clip.least_confidence,
+      clip.key_ms / static_cast<double>(clip.keyed)));
   if (before > 0) {
     console.warn(fmt::format("{} had {} frames already: those with other numbers are still there",
                              out, before));
@@ -276,8 +279,8 @@ void key_clip(const KeyOptions& options, Console& console) {
   compositing::CleanPlate plate =
       read_clean_plate(options.plate, source, settings.method, {first, first + plate_footage - 1});
   KeyedClip clip;
-  const bool by_screen = settings.method == compositing::KeyMethod::screen;
-  if (by_screen && compositing::screen_share(plate.light, plate.colour) > 0)
+  clip.by_screen = settings.method == compositing::KeyMethod::screen;
+  if (clip.by_screen && compositing::screen_share(plate.light, plate.colour) > 0)
     clip.colour = compositing::name_of(plate.colour);
   clip.known = plate.known;
   const auto camera = open_video(source);

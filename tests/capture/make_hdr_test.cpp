@@ -4,6 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 #include "capture/colour.h"
@@ -12,6 +15,8 @@
 #include "capture/png.h"
 #include "capture/rgbe.h"
 #include "tests/capture/made_bracket.h"
+#include "tests/capture/made_exif.h"
+#include "tests/independent_plate.h"
 #include "tests/made_files.h"
 
 namespace capture::make_hdr_test {
@@ -122,6 +127,33 @@ TEST(MakeHdr, RefusesShotsWithoutExposureTimes) {
   const std::string a = write_still(made::make_temporary_directory() / "a.png",
                                     {1, 1, 3, std::vector<std::uint8_t>(3)});
   EXPECT_NE(message_of({a}).find(a + ": tells no exposure time"), std::string::npos);
+}
+
+// A picture that tells its exposure of 1/100 s, f-number and ISO.
+std::string write_told(const std::string& path, std::uint32_t f_number_tenths, std::uint16_t iso) {
+  independent::ffmpeg("-f lavfi -i color=gray:size=16x16 -frames:v 1 '" + path + "'");
+  std::ifstream in(path, std::ios::binary);
+  const std::string jpeg((std::istreambuf_iterator<char>(in)), {});
+  const made::Bytes told = made::made_exif(1, 100, f_number_tenths, iso);
+  std::ofstream out(path, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(told.data()), std::ssize(told) - 2);  // but for its end
+  out << jpeg.substr(2);
+  return path;
+}
+
+TEST(MakeHdr, RefusesABracketOfWhichOnlySomeTellFNumberOrIso) {
+  const auto directory = made::make_temporary_directory();
+  const std::string all = write_told(directory / "all.jpg", 80, 200);
+  const std::string same = write_told(directory / "same.jpg", 80, 200);
+  const std::string no_f = write_told(directory / "no_f.jpg", 0, 200);
+  const std::string no_iso = write_told(directory / "no_iso.jpg", 80, 0);
+  EXPECT_EQ(message_of({all, same}), "");
+  EXPECT_EQ(message_of({all, no_f}),
+            no_f + ": tells no f-number, but " + all + " does; state the exposures of all shots");
+  EXPECT_EQ(message_of({no_iso, all}),
+            no_iso + ": tells no ISO, but " + all + " does; state the exposures of all shots");
+  EXPECT_EQ(message_of({no_f, no_f}), "");
+  EXPECT_EQ(message_of({all, no_f}, {.exposures_s = {1, 2}}), "");
 }
 
 TEST(MakeHdr, RefusesWhatIsNoBracket) {

@@ -173,6 +173,7 @@ TEST_F(CommandLine, RefusesWhatAChartOrABenchmarkWouldNotLookAt) {
        {std::pair{"chart hdr --quick --set /nonexistent.toml", "photograph"},
         {"chart photograph hdr --quick --set /nonexistent.toml", "photograph"},
         {"chart set a.toml --set b.toml", "photograph"},
+        {"chart all lights --quick", "all stands alone"},
         {"chart hdr --quick --samples 7", "chart set"},
         {"bench drag --scene nosuch", "headlight, glass_sphere, tv_room, car"},
         {"bench drag --scene billboards", "headlight, glass_sphere, tv_room, car"},
@@ -392,6 +393,21 @@ TEST_F(CommandLine, CalibratesVignettingFromAnEvenField) {
   ASSERT_GE(figures["vignetting"].size(), 1U);
   EXPECT_NEAR(figures["vignetting"][0], -0.2, 0.01);
   EXPECT_EQ(figures["candidates"].size(), 5U);
+
+  // A field of patches as bright as they please tells none.
+  for (int y = 0; y < 100; ++y) {
+    for (int x = 0; x < 100; ++x) {
+      const float light = 0.1F + 0.1F * static_cast<float>((x / 4 * 7 + y / 4 * 13) % 6);
+      for (int c = 0; c < 3; ++c) field.at(y, x, c) = light;
+    }
+  }
+  const std::string patches = (dir_ / "patches.exr").string();
+  capture::write_exr(patches, field);
+  const Outcome none =
+      run("calibrate vignetting " + patches + " --lens " + lens + " --json " + json);
+  EXPECT_EQ(none.status, 1) << none.out;
+  EXPECT_THAT(none.err, HasSubstr("vignetting is not told"));
+  EXPECT_TRUE(nlohmann::json::parse(content_of(json))["vignetting"].is_null());
 
   EXPECT_EQ(run(command + " --poses a.cameramodel").status, 2);
   const std::string small =

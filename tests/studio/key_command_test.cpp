@@ -173,6 +173,7 @@ TEST_F(KeyCommand, FindsAnyStillBackgroundInFootageAlone) {
       run("key " + in("wall_%04d.png") + " --colour sRGB --method difference -o " + in("wall") +
           " --json " + in("wall.json"));
   ASSERT_EQ(keyed.status, 0) << keyed.err;
+  EXPECT_THAT(keyed.out, HasSubstr("before a still background"));
   EXPECT_GT(nlohmann::json::parse(content_of(in("wall.json")))["plate_known"], 0.99);
   const capture::Image middle = capture::read_exr(in("wall/frame.000006.exr"));
   for (int y = 0; y < height; ++y) {
@@ -198,6 +199,13 @@ TEST_F(KeyCommand, SaysThatAGreyWallIsNoScreen) {
   const auto figures = nlohmann::json::parse(content_of(in("plate.json")));
   EXPECT_EQ(figures["colour"], "no");
   EXPECT_TRUE(figures["noise_floor"].is_null());
+  const Outcome keyed = run("key " + in("grey.png") + " --plate " + in("plate.exr") + " -o " +
+                            in("keyed") + " --json " + in("key.json"));
+  EXPECT_EQ(keyed.status, 0) << keyed.err;
+  EXPECT_THAT(keyed.out, HasSubstr("no screen"));
+  const auto clip = nlohmann::json::parse(content_of(in("key.json")));
+  EXPECT_EQ(clip["colour"], "no");
+  EXPECT_EQ(clip["confidence_mean"], 0);
 }
 
 TEST_F(KeyCommand, TakesAPlateOfAScreenWithSomebodyBeforeIt) {

@@ -17,15 +17,18 @@
 #include "studio/recording.h"
 #include "studio/show.h"
 #include "tests/capture/made_light_camera.h"
+#include "tests/independent_plate.h"
 #include "tests/studio/made_show.h"
 
 namespace studio::show_notes_test {
 namespace {
 
+using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
+using testing::StartsWith;
 
 using ShowNotes = MadeShowTest;
 
@@ -35,6 +38,35 @@ TEST_F(ShowNotes, NotesAPlateThatEndsEarly) {
   Show show(made_set("grey:4,25,0"), options);
   show.run();
   EXPECT_THAT(show.status()->notes, Contains(HasSubstr("ended after 4 of 9 frames")));
+}
+
+// Whatever is played from a file, and whether it loops or not: once.
+TEST_F(ShowNotes, NotesFilesThatAreCutShort) {
+  const std::string clip = (dir_ / "cut.mkv").string();
+  independent::ffmpeg("-f lavfi -i testsrc2=size=64x48:rate=25:duration=0.8 -c:v ffv1 '" + clip +
+                      "'");
+  std::filesystem::resize_file(clip, std::filesystem::file_size(clip) / 2);
+  const std::string person =
+      "[[billboard]]\nname = \"extra\"\nsource = \"cut.mkv\"\n"
+      "position = [2, 0, 0]\nheight = 1.8\n";
+  const std::string video =
+      "[[object]]\nname = \"set\"\nmade = \"tv\"\n"
+      "[[video]]\nobject = \"set\"\nsource = \"cut.mkv\"\n";
+  const auto notes_of = [&](const std::string& plate, const std::string& more) {
+    ShowOptions options;
+    options.frames = 30;
+    Show show(read_set(write_made_set(dir_, plate, more)), options);
+    show.run();
+    return show.status()->notes;
+  };
+  const auto told = HasSubstr("s that it tells of are not there");
+  EXPECT_THAT(notes_of("cut.mkv", ""), Contains(AllOf(StartsWith("the plate: "), told)).Times(1));
+  for (const std::string loop : {"", "loop = true\n"}) {
+    EXPECT_THAT(notes_of("grey:30,25,0", person + loop),
+                Contains(AllOf(StartsWith("extra is not whole: "), told)).Times(1));
+    EXPECT_THAT(notes_of("grey:30,25,0", video + loop),
+                Contains(AllOf(HasSubstr("is not whole: "), told)).Times(1));
+  }
 }
 
 TEST_F(ShowNotes, NotesLostFramesOfThePlateOnceInARow) {
