@@ -340,6 +340,8 @@ class CellBaker final : public RaySink {
   float chance_of(const ShadePoint& from, std::uint32_t path) const;
   void add_lobes(std::span<const std::uint16_t> receiver_of_point, bool grid);
   void find_compact_tints();
+  Vec3f passed_to_lobe(const Lobe& lobe, std::size_t light, Vec3f passed);
+  float share_straight_on(const Lobe& lobe, const DirectionalLight& light);
   void add_compact(const Lobe& lobe, std::size_t light, Vec3f passed);
   void mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share);
   bool mirrors_lamps(const ShadePoint& from, const NewRay& ray) const;

@@ -138,11 +138,11 @@ void CellBaker::settle_doubts(int count) {
     const auto i = index_of(*lobe.point);
     for (std::size_t a = first_of_point[i]; a < first_of_point[i + 1]; ++a) {
       const AskedAgain& asked = asked_[a];
-      const Vec3f more = asked.passed - asked.passed_centre;
       if (!asked.is_lamp) {
-        mirror_compact(lobe, asked.number, more);
+        const auto seen = [&](Vec3f passed) { return passed_to_lobe(lobe, asked.number, passed); };
+        mirror_compact(lobe, asked.number, seen(asked.passed) - seen(asked.passed_centre));
       } else if (lobe.lamps) {
-        add_lamp(lobe, asked.number, more);
+        add_lamp(lobe, asked.number, asked.passed - asked.passed_centre);
       }
     }
   }

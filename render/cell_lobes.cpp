@@ -369,8 +369,49 @@ void CellBaker::find_compact_tints() {
   }
 }
 
+// Of what passes to a point straight on, what a lobe mirrors of it.
+Vec3f CellBaker::passed_to_lobe(const Lobe& lobe, std::size_t light, Vec3f passed) {
+  if (passed == Vec3f{} || passed == Vec3f{1, 1, 1}) return passed;
+  if (!frame_->inputs.scene->has_glass()) return passed;
+  return passed * share_straight_on(lobe, frame_->job->lights.lights[light]);
+}
+
+// Less than all where clear bodies bend the way to a light by more than lobe and light are wide:
+// then the light shows in them elsewhere, and rays find it there.
+float CellBaker::share_straight_on(const Lobe& lobe, const DirectionalLight& light) {
+  const Scene& scene = *frame_->inputs.scene;
+  const ShadePoint& p = *lobe.point;
+  Media media = p.media;
+  Vec3f direction = light.direction;
+  Vec3f origin = offset_origin(p.hit, direction);
+  for (int surfaces = 0; surfaces < effort_.max_depth; ++surfaces) {
+    const auto met = closest_hit(scene, origin, direction, 0, mask_virtual, RayKind::reflection,
+                                 gather_.pictures);
+    ++statistics_->shadow_rays;
+    if (counting_) ++counting_[p.pixel].shadow_rays;
+    if (grid_)
+      grid_->mark_line(origin, direction, met ? met->distance : ray_far, transport_->reach.passed);
+    if (!met) break;
+    const HitPoint hit =
+        scene.hit_point(met->geom_id, met->prim_id, met->inst_id, met->u, met->v, direction);
+    if (scene.glass_of(hit.material) == nullptr) break;
+    const Crossing crossing = cross_surface(scene, media, {hit.instance, hit.material}, hit.back);
+    media = crossing.after;
+    if (crossing.seen) direction = refracted_into(hit, direction, crossing.ratio[1]);
+    if (direction == Vec3f{}) return 0;
+    origin = offset_origin(hit, direction);
+  }
+  const Vec3f bent = direction - light.direction;
+  const float lobe_rad = 2 * lobe.roughness * lobe.roughness;
+  const float width_rad =
+      calibrate::hypotenuse(lobe_rad, calibrate::hypotenuse(lobe.cone_rad, light.spread));
+  const float turns = length(bent) / std::max(width_rad, 1e-4F);
+  return std::exp(-turns * turns);
+}
+
 void CellBaker::add_compact(const Lobe& lobe, std::size_t light, Vec3f passed) {
-  mirror_compact(lobe, light, lobe.difference ? passed - Vec3f{1, 1, 1} : passed);
+  const Vec3f seen = passed_to_lobe(lobe, light, passed);
+  mirror_compact(lobe, light, lobe.difference ? seen - Vec3f{1, 1, 1} : seen);
 }
 
 void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share) {

@@ -317,6 +317,50 @@ TEST(Glass, DimsTheSunThatRoughThingsMirror) {
   }
 }
 
+// A sun that a ball of glass bends shows in metal behind it where it is bent to, not straight on.
+TEST(Glass, BendsTheSunThatMetalMirrors) {
+  for (const float roughness : {0.1F, 0.2F, 0.4F}) {
+    SCOPED_TRACE(roughness);
+    auto metal_ball = std::make_shared<render::Mesh>(*render::make_sphere(0.5F, 48));
+    for (Vec3f& p : metal_ball->positions) p += Vec3f{-1.2F, 0, -0.4F};
+    metal_ball->materials = {1};
+    render::SceneDescription scene = bodies({render::make_sphere(0.5F, 96)}, {{.index = 1.6F}});
+    render::StandardParameters metal;
+    metal.metallic = 1;
+    metal.roughness = roughness;
+    scene.meshes.push_back(metal_ball);
+    scene.materials.push_back(render::make_standard_material("metal", metal));
+    scene.instances.emplace_back().mesh = 1;
+    GlassShot shot =
+        glass_shot(std::move(scene), [](Vec3f) { return 0.0F; }, 64, 60, {-0.6, -2.6, 0});
+    shot.environment = render::make_sun_and_sky(
+        {.sun_radius_rad = 0.01F, .sun_azimuth_rad = 0, .sun_elevation_rad = 0.3F, .clouds = 0},
+        256);
+    render::LightFollower follower;
+    shot.job.lights = follower.follow(shot.environment, {});
+    render::smooth_for_reflections(shot.environment, follower.compact_texels());
+    ASSERT_TRUE(shot.environment.compact_apart);
+    shot.job.effort = {};
+    const capture::Image kernel = shot.kernel(), truth = shot.reference(256);
+    double squares = 0, errors = 0;
+    int fireflies = 0;
+    for (int y = 1; y + 1 < truth.height; ++y) {
+      for (int x = 1; x + 1 < truth.width; ++x) {
+        const double shown = std::min<double>(kernel.at(y, x, 1), 4);
+        const double is = std::min<double>(truth.at(y, x, 1), 4);
+        squares += is * is;
+        errors += (shown - is) * (shown - is);
+        float most = 0;
+        for (int i = 0; i < 9; ++i)
+          most = std::max(most, truth.at(y - 1 + i / 3, x - 1 + i % 3, 1));
+        fireflies += kernel.at(y, x, 1) > 4 * most + 2;
+      }
+    }
+    EXPECT_LT(std::sqrt(errors / squares), 0.22);  // straight on .22 to .45
+    EXPECT_EQ(fireflies, 0);
+  }
+}
+
 // Light that a rough thing gets through glass counts once.
 TEST(Glass, LeavesAWhiteRoughThingInAWhiteWorldWhite) {
   for (const float roughness : {0.2F, 0.5F, 1.0F}) {
