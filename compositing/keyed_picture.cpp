@@ -141,10 +141,15 @@ std::array<float, 4> KeyedPicture::look_up(float u, float v, float footprint_uv)
 
 TexelKeyedPicture::TexelKeyedPicture(std::shared_ptr<const KeyedTexture> texture,
                                      std::shared_ptr<const LitPlate> plate,
+                                     std::shared_ptr<const FilteredPlate> filtered,
                                      const KeyDials& dials)
-    : texture_(std::move(texture)), plate_(std::move(plate)), dials_(dials) {
+    : texture_(std::move(texture)),
+      plate_(std::move(plate)),
+      filtered_(std::move(filtered)),
+      dials_(dials) {
   check_frame(texture_);
-  if (!plate_ || texture_->width() != plate_->width || texture_->height() != plate_->height) {
+  if (!plate_ || !filtered_ || texture_->width() != plate_->width ||
+      texture_->height() != plate_->height) {
     throw std::invalid_argument("a frame that is keyed by its texels must be of its plate's size");
   }
   aspect_ = aspect_of(*texture_);
@@ -155,14 +160,18 @@ KeyPlace TexelKeyedPicture::place_of(const render::PicturePlace& at) const {
     return std::clamp(static_cast<int>(place * static_cast<float>(size)), 0, size - 1);
   };
   const std::array<float, 4> light = texture_->filtered(at.u, at.v, at.footprint_uv);
-  return {texel(at.v, plate_->height), texel(at.u, plate_->width), {light[0], light[1], light[2]}};
+  const int y = texel(at.v, plate_->height), x = texel(at.u, plate_->width);
+  const float* const nearest = plate_->cell(y / plate_->step, x / plate_->step);
+  return {y,
+          x,
+          {light[0], light[1], light[2]},
+          filtered_->at(*plate_, nearest, at.u, at.v, at.footprint_uv)};
 }
 
 std::array<float, 4> TexelKeyedPicture::look_up(float u, float v, float footprint_uv) const {
   const float inside = inside_of(u, v, footprint_uv, aspect_);
   if (!(inside > 0)) return {};
-  const KeyPlace place = place_of({u, v, footprint_uv});
-  std::array<float, 4> rgba = key_texel(*plate_, dials_, place.y, place.x, place.light);
+  std::array<float, 4> rgba = key_texel(*plate_, dials_, place_of({u, v, footprint_uv}));
   for (float& value : rgba) value *= inside;
   return rgba;
 }

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "compositing/filtered_plate.h"
 #include "compositing/keyed_texture.h"
 #include "compositing/keyer.h"
 #include "render/live_picture.h"
@@ -45,11 +46,12 @@ class KeyedPicture final : public render::LivePicture {
 // rays see; their alpha is not smoothed over frames.
 class TexelKeyedPicture final : public render::LivePicture {
  public:
-  // `plate` and `dials` as the keyer has them for this frame (Keyer::shared_lit, Keyer::dials);
-  // what the dials point to must outlive the picture. Throws std::invalid_argument if there is no
-  // texture or plate, or its size is not the plate's.
+  // Plates and dials as the keyer has them for this frame (Keyer::shared_lit, shared_filtered,
+  // dials); what the dials point to must outlive the picture. Throws std::invalid_argument if there
+  // is no texture or plate, or its size is not the plate's.
   TexelKeyedPicture(std::shared_ptr<const KeyedTexture> texture,
                     std::shared_ptr<const LitPlate> plate,
+                    std::shared_ptr<const FilteredPlate> filtered,
                     const KeyDials& dials);
 
   std::array<float, 4> look_up(float u, float v, float footprint_uv) const override;
@@ -62,6 +64,7 @@ class TexelKeyedPicture final : public render::LivePicture {
 
   std::shared_ptr<const KeyedTexture> texture_;
   std::shared_ptr<const LitPlate> plate_;
+  std::shared_ptr<const FilteredPlate> filtered_;
   KeyDials dials_;
   float aspect_ = 0;  // height over width
 };

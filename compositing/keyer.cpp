@@ -247,6 +247,11 @@ bool Keyer::glances() const {
          !has_two_primaries(light_.lit().colour);
 }
 
+std::shared_ptr<const FilteredPlate> Keyer::shared_filtered() {
+  if (!filtered_) filtered_ = std::make_shared<const FilteredPlate>(light_.bare());
+  return filtered_;
+}
+
 KeyReport Keyer::follow(const capture::Image& frame) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   watch(LightRows(frame, channels_of(light_.plate().colour)));
@@ -341,6 +346,13 @@ KeyedTexel<V> key_before(const LitPlate& plate,
 std::array<float, 4> key_texel(
     const LitPlate& plate, const KeyDials& dials, int y, int x, const std::array<float, 3>& light) {
   const float* cell = plate.cell(y / plate.step, x / plate.step);
+  return key_texel(plate, dials, {y, x, light, {cell[0], cell[1], cell[2], cell[3]}});
+}
+
+std::array<float, 4> key_texel(const LitPlate& plate,
+                               const KeyDials& dials,
+                               const KeyPlace& place) {
+  const auto& [y, x, light, cell] = place;
   const auto order = channels_of(plate.colour);
   const auto at = [&](std::size_t i) { return static_cast<std::size_t>(order[i]); };
   std::array<float, 3> c{};
@@ -366,8 +378,7 @@ void key_texels(const LitPlate& plate,
   std::array<std::array<float, key_lanes>, 4> cells{};
   std::array<float, key_lanes> near{};
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const auto& [y, x, seen] = places[k];
-    const float* cell = plate.cell(y / plate.step, x / plate.step);
+    const auto& [y, x, seen, cell] = places[k];
     for (std::size_t i = 0; i < 4; ++i) cells[i][k] = cell[i];
     for (std::size_t i = 0; i < 3; ++i) light[i][k] = seen[at(i)];
     if (plate.use == PlateUse::screen) near[k] = plate.near.at(y, x);

@@ -11,6 +11,7 @@
 
 #include "capture/image.h"
 #include "compositing/clean_plate.h"
+#include "compositing/filtered_plate.h"
 #include "compositing/key_scratch.h"
 #include "compositing/key_texel.h"
 #include "compositing/keyed_frame.h"
@@ -93,6 +94,8 @@ class Keyer {
   // frames are keyed quickly, in the last one that was followed; one that is held stays as it is.
   const LitPlate& lit() const { return light_.lit(); }
   std::shared_ptr<const LitPlate> shared_lit() const { return light_.shared_lit(); }
+  // The same plate, to be seen small; made when it is asked for first.
+  std::shared_ptr<const FilteredPlate> shared_filtered();
   const KeyDials& dials() const { return dials_; }
 
   // Follows the light without keying, for those who key texel by texel.
@@ -125,6 +128,7 @@ class Keyer {
   KeyReport report(const PlateSight& sight, float soft) const;
 
   PlateLight light_;
+  std::shared_ptr<const FilteredPlate> filtered_;
   std::optional<QuickLight> quick_;   // of quick keying
   std::vector<std::uint8_t> masked_;  // of quick keying: 8x8 pixels that a mask covers some of
   PlateWatch watch_;
@@ -144,10 +148,14 @@ std::array<float, 4> key_texel(
 struct KeyPlace {
   int y, x;  // pixel of the plate
   std::array<float, 3> light;
+  std::array<float, 4> cell;  // of the plate, the nearest one or filtered
 };
 
-// The same of up to eight at once, to the bit, in a fraction of the time. `rgba` has room for
-// eight.
+// The same against a cell of one's own.
+std::array<float, 4> key_texel(const LitPlate& plate, const KeyDials& dials, const KeyPlace& place);
+
+// And of up to eight at once, each against its own cell; to the bit, in a fraction of the
+// time. `rgba` has room for eight.
 void key_texels(const LitPlate& plate,
                 const KeyDials& dials,
                 std::span<const KeyPlace> places,

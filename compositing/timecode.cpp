@@ -8,7 +8,7 @@
 namespace compositing {
 namespace {
 
-constexpr int most_frames = 99;  // two digits
+constexpr int most_frames_a_second = 99;  // two digits
 
 std::int64_t rounded(capture::Rational rate) {
   const std::int64_t rest = rate.num % rate.den;
@@ -40,7 +40,7 @@ int timecode_base(capture::Rational rate) {
     throw std::invalid_argument("a frame rate must be positive, not " + rate_text(rate));
   }
   const std::int64_t base = rounded(rate);
-  if (base < 1 || base > most_frames) {
+  if (base < 1 || base > most_frames_a_second) {
     throw std::invalid_argument("timecode counts 1 to 99 frames per second, not " +
                                 rate_text(rate));
   }
@@ -48,7 +48,8 @@ int timecode_base(capture::Rational rate) {
 }
 
 bool allows_timecode(capture::Rational rate) {
-  return rate.num > 0 && rate.den > 0 && rounded(rate) >= 1 && rounded(rate) <= most_frames;
+  return rate.num > 0 && rate.den > 0 && rounded(rate) >= 1 &&
+         rounded(rate) <= most_frames_a_second;
 }
 
 bool allows_drop_frame(capture::Rational rate) {

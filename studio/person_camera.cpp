@@ -215,8 +215,8 @@ void PersonCameraFeed::key_frame() {
   if (report.moved) moved_px_ = {report.shift.right_px, report.shift.down_px};
   if (by_texel_) {
     texture->take(image);
-    picture_ = std::make_shared<compositing::TexelKeyedPicture>(texture, keyer_->shared_lit(),
-                                                                keyer_->dials());
+    picture_ = std::make_shared<compositing::TexelKeyedPicture>(
+        texture, keyer_->shared_lit(), keyer_->shared_filtered(), keyer_->dials());
     return;
   }
   texture->finish();

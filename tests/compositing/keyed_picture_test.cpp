@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -24,7 +25,7 @@ std::shared_ptr<const TexelKeyedPicture> picture_of(const char* scene,
   const capture::Image frame = light_of(clip.frame(8).seen);
   keyer.follow(frame);
   return std::make_shared<TexelKeyedPicture>(make_keyed_texture(frame), keyer.shared_lit(),
-                                             keyer.dials());
+                                             keyer.shared_filtered(), keyer.dials());
 }
 
 // Inside, at the rim, beyond it and nowhere; as wide as a texel, and much wider.
@@ -67,6 +68,54 @@ TEST(TexelKeyedPicture, IsTheSameToTheBitHoweverManyAreLookedUp) {
   KeySettings plain;
   plain.learned = false;
   expect_alike(*picture_of("plain", plain));
+}
+
+// A room of patches with a disc of a person in it, seen in its own size down to 1/24 of it: keyed
+// texel by texel it looks as the frame that is keyed first.
+TEST(TexelKeyedPicture, IsAsClearBeforeAPatternHoweverSmallItIsSeen) {
+  constexpr int height = 144, width = 192;
+  const auto light = [](int y, int x, int c) {
+    return 0.05F + 0.6F * static_cast<float>((x * 37 + y * 59 + c * 11 + x * y) % 17) / 17;
+  };
+  capture::Image room = capture::make_image(height, width, 3);
+  capture::Image frame = room;
+  const auto is_person = [](int y, int x) { return std::hypot(y - 72, x - 96) < 40; };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        room.at(y, x, c) = light(y, x, c);
+        frame.at(y, x, c) = is_person(y, x) ? (c == 0 ? 0.9F : 0.7F) : light(y, x, c);
+      }
+    }
+  }
+  KeySettings settings;
+  settings.method = KeyMethod::difference;
+  Keyer keyer(average_plate(std::vector(4, room)), settings);
+  KeyedTexture first;
+  keyer.key(frame, first.frame());
+  first.finish();
+  const KeyedPicture by_frame(std::make_shared<KeyedTexture>(std::move(first)));
+  const TexelKeyedPicture by_texel(make_keyed_texture(frame), keyer.shared_lit(),
+                                   keyer.shared_filtered(), keyer.dials());
+  const float texel = 1 / std::sqrt(static_cast<float>(width) * static_cast<float>(height));
+  for (const float wide : {0.5F, 1.0F, 3.0F, 8.0F, 24.0F}) {
+    SCOPED_TRACE(wide);
+    double worst_clear = 0, worst_person = 1;
+    for (int i = 0; i < 400; ++i) {
+      const float u = std::fmod(static_cast<float>(i) * 0.618034F, 1.0F);
+      const float v = std::fmod(static_cast<float>(i) * 0.754878F, 1.0F);
+      const float away =
+          std::hypot(v * static_cast<float>(height) - 72, u * static_cast<float>(width) - 96);
+      const float seen = by_texel.look_up(u, v, wide * texel)[3];
+      const float is = by_frame.look_up(u, v, wide * texel)[3];
+      const bool inside = u > 0.15F && u < 0.85F && v > 0.15F && v < 0.85F;
+      if (!inside) continue;
+      if (away > 42 + wide) worst_clear = std::max<double>(worst_clear, seen - is);
+      if (away < 38 - wide) worst_person = std::min<double>(worst_person, seen);
+    }
+    EXPECT_LT(worst_clear, 0.05);
+    EXPECT_GT(worst_person, 0.9);
+  }
 }
 
 TEST(TexelKeyedPicture, LooksUpNothingOfNowhere) {
