@@ -163,6 +163,19 @@ std::int64_t OutputFile::seek(void* file, std::int64_t offset, int whence) {
 
 std::int64_t OutputFile::place() const { return avio_tell(context_); }
 
+void OutputFile::require_there(bool by_name) const {
+  struct stat written {
+  }, named{};
+  if (::fstat(descriptor_, &written) != 0 || !S_ISREG(written.st_mode)) return;
+  if (written.st_nlink == 0)
+    throw std::runtime_error(path_ + ": was removed while it was written: what was in it is lost");
+  if (!by_name || !begun_) return;
+  const bool is_there = ::stat(path_.c_str(), &named) == 0 && named.st_ino == written.st_ino &&
+                        named.st_dev == written.st_dev;
+  if (!is_there)
+    throw std::runtime_error(path_ + ": was moved while it was written: it is whole, elsewhere");
+}
+
 void OutputFile::mark(std::int64_t pictures) {
   const std::int64_t here = place();
   if (!marks_.empty() && marks_.back().place == here) return;

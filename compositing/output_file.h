@@ -56,6 +56,10 @@ class OutputFile {
   // Bytes so far.
   std::int64_t place() const;
 
+  // Throws std::runtime_error if the file was removed, and what is written is lost: with
+  // `by_name`, also if it is no longer found by its path. Of pipes and devices it says nothing.
+  void require_there(bool by_name) const;
+
   // Clears a failed write. While discarding, writes seem to succeed and go nowhere.
   void discard(bool discarding) noexcept;
 

@@ -249,6 +249,7 @@ void VideoWriter::State::write_packet(AVPacket* ready,
   // The muxer gathers a cluster, and writes it at once when the next one starts: now, perhaps.
   file.mark(pictures);
   if (stream == picture_stream) ++pictures;
+  file.require_there(false);
 }
 
 void VideoWriter::State::encode(const AVFrame* picture_or_end) {
@@ -379,6 +380,7 @@ void VideoWriter::close() {
     state.file.cut_back(0);
     state.fail("the index cannot be written, the rest is there", error);
   }
+  state.file.require_there(true);
 }
 
 void VideoWriter::salvage() noexcept {

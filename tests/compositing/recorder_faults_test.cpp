@@ -167,6 +167,28 @@ TEST_F(RecorderFaultsTest, ClosesTheVideoWholeWhenItIsTheExrFramesThatFail) {
   EXPECT_NEAR(std::stod(probe(settings.file, "format=duration", "")), 0.24, 0.001);
 }
 
+TEST_F(RecorderFaultsTest, TellsThatItsFileWasRemovedOrMovedMeanwhile) {
+  for (const bool moved : {false, true}) {
+    const std::string take = path("take.mkv"), elsewhere = path("elsewhere.mkv");
+    Recorder recorder(small_take(take));
+    const auto push = [&](int n) { EXPECT_TRUE(recorder.push(picture(n, textured(64, 48, n)))); };
+    for (int n = 0; n < 3; ++n) push(n);
+    while (recorder.status().written < 3) std::this_thread::yield();
+    moved ? fs::rename(take, elsewhere) : static_cast<void>(fs::remove(take));
+    push(3);
+    recorder.wait_for_room();
+    recorder.close();
+    const RecorderStatus status = recorder.status();
+    EXPECT_NE(status.error.find(take + (moved ? ": was moved" : ": was removed")),
+              std::string::npos)
+        << status.error;
+    if (moved) {
+      EXPECT_EQ(status.written, 4);
+      EXPECT_EQ(picture_times_s(elsewhere).size(), 4U);
+    }
+  }
+}
+
 TEST_F(RecorderFaultsTest, RefusesWhatCannotBeWrittenAtOnceWithPathAndReason) {
   const auto reason = [](const RecorderSettings& settings) -> std::string {
     try {
