@@ -16,6 +16,8 @@ constexpr std::string_view header = "time_s,px,py,pz,qw,qx,qy,qz";
 constexpr std::size_t columns = 8;
 // Shorter quaternions than this have lost their direction.
 constexpr double least_norm = 1e-6;
+// Metres: as far as anything of a set may be from its origin.
+constexpr double farthest = 1e6;
 
 double dot(Quaternion a, Quaternion b) { return a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z; }
 
@@ -117,6 +119,10 @@ Track read_track(const std::string& path) {
       fail(path, line, "a quaternion of zeros is no rotation");
     if (!std::isfinite(dot(q, q)))
       fail(path, line, "a quaternion of such length is no rotation: its squares overflow");
+    for (std::size_t i = 1; i < 4; ++i) {
+      if (std::abs(v[i]) <= farthest) continue;
+      fail(path, line, "a place of " + to_text(v[i]) + " m is beyond 1e6 m");
+    }
     if (!track.keys.empty() && v[0] <= track.keys.back().time_s) {
       fail(path, line,
            "time " + to_text(v[0]) + " does not come after " + to_text(track.keys.back().time_s));

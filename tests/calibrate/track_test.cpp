@@ -127,6 +127,7 @@ TEST(ReadTrack, RefusesEveryBadFileWithLineAndReason) {
                          {"track_word.csv", ":2: high is no finite number"},
                          {"track_nan.csv", ":2: nan is no finite number"},
                          {"track_zero_quaternion.csv", ":2: a quaternion of zeros"},
+                         {"track_far_away.csv", ":3: a place of -1e+300 m is beyond 1e6 m"},
                          {"track_huge_quaternion.csv", ":2: a quaternion of such length"},
                          {"track_time_stands_still.csv", ":3: time 0 does not come after 0"}},
                         read_track);
