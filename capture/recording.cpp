@@ -132,6 +132,11 @@ void FrameRecording::write_all() {
     }
     lock.lock();
     failure_ = failure;
+    if (!failure_.empty()) {  // what is queued will not be written either
+      statistics_.frames = kept_;
+      continue;
+    }
+    ++kept_;
     if (frame.coded) statistics_.bytes += static_cast<std::int64_t>(frame.coded->bytes.size());
   }
 }

@@ -40,6 +40,7 @@ class FrameRecording {
   void add(const Frame& frame);
   // Waits until all is written. Throws as add().
   void finish();
+  // Once a file could not be written, `frames` are those before it: they play.
   RecordingStatistics statistics() const;
 
  private:
@@ -55,6 +56,7 @@ class FrameRecording {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Frame> queue_;
+  std::int64_t kept_ = 0;  // frames that were written whole
   bool finishing_ = false;
   std::string failure_;
   RecordingStatistics statistics_;

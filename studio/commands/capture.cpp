@@ -4,6 +4,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -31,6 +32,7 @@ struct Taken {
   capture::RecordingStatistics written;
   capture::CameraStatistics camera;
   double seconds = 0;  // from the first frame to the last
+  std::string error;   // why it ended early
 };
 
 // Until so many frames or seconds are recorded, the camera ends, or somebody presses Ctrl-C.
@@ -49,13 +51,22 @@ Taken record(const CaptureOptions& options,
     if (!first) first = frame->time;
     const double seconds = std::chrono::duration<double>(frame->time - *first).count();
     if (seconds >= most_s) break;
-    recording.add(*frame);
+    try {
+      recording.add(*frame);
+    } catch (const std::runtime_error& error) {
+      taken.error = error.what();
+      break;
+    }
     taken.seconds = seconds;
     const double share = std::max((frames + 1) / most_frames, seconds / most_s);
     console.progress(share, fmt::format("{:.0f} frames", frames + 1));
     frame = camera.next();
   }
-  recording.finish();
+  try {
+    recording.finish();
+  } catch (const std::runtime_error& error) {
+    if (taken.error.empty()) taken.error = error.what();
+  }
   taken.written = recording.statistics();
   taken.camera = camera.statistics();
   return taken;
@@ -84,6 +95,8 @@ void record_camera(const CaptureOptions& o, Console& console) {
                              {"skipped", taken.written.skipped},
                              {"damaged", taken.camera.damaged},
                              {"seconds", taken.seconds},
+                             {"error", taken.error.empty() ? nlohmann::ordered_json(nullptr)
+                                                           : nlohmann::ordered_json(taken.error)},
                              {"megabytes", static_cast<double>(taken.written.bytes) * 1e-6}}));
   console.say(fmt::format("{}: {} frames of {}, {} lost, {:.1f} s; play it as replay:{}", o.folder,
                           taken.written.frames, info.description, taken.written.lost, taken.seconds,
@@ -92,6 +105,7 @@ void record_camera(const CaptureOptions& o, Console& console) {
     console.warn(fmt::format("the disk was too slow for {} frames: they are recorded as lost",
                              taken.written.skipped));
   }
+  if (!taken.error.empty()) throw std::runtime_error(taken.error);
 }
 
 }  // namespace

@@ -145,6 +145,21 @@ TEST_F(RecordingTest, PlaysUpToWhereItWasCutOff) {
   EXPECT_THAT(cut->note, HasSubstr("000009.coded: it should hold 6144 bytes"));
 }
 
+TEST_F(RecordingTest, CountsWhatIsThereOnceAFileCannotBeWritten) {
+  const std::vector<Frame> live = live_frames(V4L2_PIX_FMT_Y12, 64 * 48 * 2);
+  FrameRecording recording(take());
+  std::filesystem::create_directory(take() / "000005.coded");  // in its way
+  EXPECT_THAT(refusal([&] {
+                for (const Frame& frame : live) recording.add(frame);
+                recording.finish();
+              }),
+              HasSubstr("000005.coded"));
+  EXPECT_EQ(recording.statistics().frames, 5);
+  const auto replay = open_replay(take(), {}, {});
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(replay->next());
+  EXPECT_FALSE(replay->next());
+}
+
 TEST_F(RecordingTest, RefusesAFolderWithARecording) {
   { FrameRecording recording(take()); }
   EXPECT_THAT(refusal([&] { FrameRecording again(take()); }), HasSubstr("holds a recording"));
