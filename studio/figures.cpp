@@ -3,6 +3,7 @@
 #include "studio/json_text.h"
 
 #include <sys/resource.h>
+#include <algorithm>
 
 #include <nlohmann/json.hpp>
 
@@ -91,6 +92,12 @@ Json record_json(const Set& set, const compositing::RecorderStatus& recorder) {
   return json;
 }
 
+// None where no patch was looked at.
+Json told_albedo(const render::MatchResult& match) {
+  const bool any = std::ranges::any_of(match.implied_albedo, [](float a) { return a > 0; });
+  return any ? Json(match.implied_albedo) : Json(nullptr);
+}
+
 }  // namespace
 
 double peak_memory_mb() {
@@ -129,8 +136,8 @@ std::string show_figures(const Set& set,
             {"match_exposure", s.match.exposure},
             {"match_note", s.match.note},
             {"match_pixels", s.match.pixels},
-            {"match_spread", s.match.spread},
-            {"implied_albedo", s.match.implied_albedo},
+            {"match_spread", s.match.pixels > 0 ? Json(s.match.spread) : Json(nullptr)},
+            {"implied_albedo", told_albedo(s.match)},
             {"lights", s.lights},
             {"light_error_estimate", s.light_error_estimate},
             {"unseen_share", s.unseen_share},
