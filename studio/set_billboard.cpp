@@ -83,6 +83,10 @@ void read_standing(Section& section, PersonSettings& person) {
   }
   std::string feet;
   person.by_feet = section.word("feet", feet, {"auto"});
+  const auto& key = person.cameras.front().key;
+  if (person.by_feet && key && key->by_texel) {
+    section.fault("key", "by: feet = \"auto\" needs whole frames keyed: \"frame\"");
+  }
   section.number("floor", person.floor_z, metres);
   if (person.by_feet && !calibrated) {
     section.fault("feet", "needs lens and pose of the person's camera");

@@ -428,6 +428,7 @@ TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
   expect_refusal("key = {", "key = { garbage = \"broken.exr\", ", "no number at column 31, row 7");
   expect_refusal("key = {", "key = { core_mask = \"turned.exr\", ", "core mask ");
   capture::write_exr((dir_ / "drawn.exr").string(), capture::make_image(360, 480));
+  expect_refusal("key = {", "key = { by = \"texel\", ", "by: feet = \"auto\" needs whole frames");
   expect_refusal("key = {", "key = { by = \"texel\", core_mask = \"drawn.exr\", ",
                  "knows no masks");
   expect_refusal("feet = \"auto\"", "feet = \"auto\"\nlit = true\ntranslucency = 0.5",
