@@ -22,6 +22,7 @@
 #include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfTimeCode.h>
 #include <OpenEXR/ImfVecAttribute.h>
 
@@ -124,6 +125,10 @@ Imf::Header make_header(int width, int height, const ExrOptions& options) {
   if (options.noise) {
     header.insert(wire::noise_attribute,
                   Imf::V2fAttribute(Imath::V2f(options.noise->gain, options.noise->floor)));
+  }
+  if (options.transfer) {
+    header.insert(wire::transfer_attribute,
+                  Imf::StringAttribute(std::string(name_of(*options.transfer))));
   }
   return header;
 }
@@ -376,6 +381,18 @@ std::optional<LightNoise> read_exr_noise(const std::string& path, const ExrLimit
     const auto is_variance = [](float value) { return std::isfinite(value) && value >= 0; };
     if (header.has_noise == 0 || !std::ranges::all_of(header.noise, is_variance)) return {};
     return LightNoise{header.noise[0], header.noise[1]};
+  });
+}
+
+std::optional<Transfer> read_exr_transfer(const std::string& path, const ExrLimits& limits) {
+  return decode(path, limits, [](SandboxedChild& child) -> std::optional<Transfer> {
+    const wire::Header header = receive_header(child);
+    const std::string told(header.transfer.begin(), std::ranges::find(header.transfer, '\0'));
+    try {
+      return transfer_from_name(told);
+    } catch (const std::invalid_argument&) {
+      return {};
+    }
   });
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/colour.h"
 #include "capture/frame.h"
 #include "capture/image.h"
 
@@ -46,6 +47,8 @@ struct ExrOptions {
   Rational pixel_aspect{1, 1};  // a pixel's width over its height
   // Of the frames that the picture is a mean of: attribute "frameNoise", V2f of gain and floor.
   std::optional<LightNoise> noise{};
+  // By which their codes became light: attribute "frameTransfer", its name.
+  std::optional<Transfer> transfer{};
 };
 
 // An image's channels under these names, in its order.
@@ -98,5 +101,8 @@ void limit_infinite(Image& image);
 // What a file tells of its frames' noise (ExrOptions::noise), if it does and both are finite and
 // not negative. Throws as read_exr, of what comes before the pixels.
 std::optional<LightNoise> read_exr_noise(const std::string& path, const ExrLimits& limits = {});
+
+// The same of ExrOptions::transfer, if it is one of ours.
+std::optional<Transfer> read_exr_transfer(const std::string& path, const ExrLimits& limits = {});
 
 }  // namespace capture

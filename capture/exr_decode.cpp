@@ -20,6 +20,7 @@
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfRgbaFile.h>
 #include <OpenEXR/ImfStandardAttributes.h>
+#include <OpenEXR/ImfStringAttribute.h>
 #include <OpenEXR/ImfTestFile.h>
 #include <OpenEXR/ImfVecAttribute.h>
 
@@ -183,6 +184,11 @@ void send_header(const Imf::Header& header, const Window& display, std::size_t c
   if (const auto* noise = header.findTypedAttribute<Imf::V2fAttribute>(wire::noise_attribute)) {
     out.has_noise = 1;
     out.noise = {noise->value().x, noise->value().y};
+  }
+  if (const auto* told =
+          header.findTypedAttribute<Imf::StringAttribute>(wire::transfer_attribute)) {
+    std::copy_n(told->value().begin(), std::min(told->value().size(), out.transfer.size()),
+                out.transfer.begin());
   }
   tell(wire::Kind::header, std::as_bytes(std::span(&out, 1)));
 }

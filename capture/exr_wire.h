@@ -25,9 +25,11 @@ struct Header {
   std::int32_t has_noise = 0;
   std::array<float, 2> noise{};  // gain, floor
   float pixel_aspect = 1;
+  std::array<char, 32> transfer{};  // a name, and zeros behind it
 };
 
 inline constexpr const char* noise_attribute = "frameNoise";
+inline constexpr const char* transfer_attribute = "frameTransfer";
 
 // Larger pictures are refused by both ends.
 inline constexpr int max_side = 16384;

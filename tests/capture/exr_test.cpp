@@ -151,6 +151,18 @@ TEST(WriteExr, PassesAnIndependentReaderWithItsAttributes) {
   EXPECT_EQ(info.find("FAILED"), std::string::npos) << info;
 }
 
+TEST(WriteExr, KeepsHowCodesBecameLight) {
+  const std::string path = made::make_temporary_directory() / "a.exr";
+  write_exr(path, make_image(3, 4));
+  EXPECT_EQ(read_exr_transfer(path), std::nullopt);
+  for (const Transfer transfer :
+       {Transfer::rec1886, Transfer::srgb, Transfer::rec709_camera, Transfer::linear}) {
+    write_exr(path, make_image(3, 4), {.transfer = transfer});
+    EXPECT_EQ(read_exr_transfer(path), transfer);
+    EXPECT_EQ(read_exr_noise(path), std::nullopt);
+  }
+}
+
 TEST(WriteExr, KeepsWhatIsKnownOfNoise) {
   const std::string path = made::make_temporary_directory() / "a.exr";
   const Image image = make_image(3, 4);
