@@ -38,6 +38,8 @@ class CalibrateOffset : public CommandLine {
   }
 };
 
+constexpr int lamp_frames = 170;
+
 // A folder of frames that see a lamp, switched at these times of a clock that is `offset_s` behind.
 void write_lamp(const fs::path& folder,
                 const std::vector<double>& switched_s,
@@ -47,7 +49,7 @@ void write_lamp(const fs::path& folder,
   fs::create_directories(folder);
   std::ofstream list(folder / "frames.csv");
   list << "file,time_s,exposure_s,status\n";
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < lamp_frames; ++i) {
     const double t = begin_s + 0.04 * i;
     double on_s = 0;
     for (std::size_t k = 0; k + 1 < switched_s.size(); k += 2) {
@@ -79,7 +81,7 @@ TEST_F(CalibrateOffset, OfTwoRecordingsIsThatOfTheirFirstFrames) {
   EXPECT_NEAR(figures()["offset_ms"], -713, 1);
   EXPECT_LT(figures()["sigma_ms"], 1);
   EXPECT_GT(figures()["edges"], 10);
-  EXPECT_EQ(figures()["frames"], (Json{300, 300}));
+  EXPECT_EQ(figures()["frames"], (Json{lamp_frames, lamp_frames}));
 
   write_lamp(dir_ / "dark", {}, 0, 0);
   const Outcome dark = run("calibrate offset replay:" + path("a") + " replay:" + path("dark"));
