@@ -44,6 +44,7 @@ constexpr std::array quiet_extensions{
     "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_sheen",
     "KHR_materials_volume",

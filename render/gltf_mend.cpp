@@ -49,6 +49,7 @@ class Mender {
 
   std::optional<MendedGltf> mend() {
     mend_texture_coordinates();
+    mend_emission();
     hide_nodes();
     if (!is_plain()) {
       if (!values_->read_buffers(read_)) return std::nullopt;
@@ -109,6 +110,20 @@ class Mender {
       if (!set.is_number_unsigned()) continue;
       at["texCoord"] = set;
       changed_ = true;
+    }
+  }
+
+  // What glows, times its strength: assimp knows the factor alone.
+  void mend_emission() {
+    constexpr const char* name = "KHR_materials_emissive_strength";
+    for (json& material : array("materials")) {
+      const json& strength = gltf_member(extension(material, name), "emissiveStrength");
+      if (strength.is_null()) continue;
+      const double gain = std::max(strength.get<double>(), 0.0);
+      material["extensions"].erase(name);
+      changed_ = true;
+      if (!material.contains("emissiveFactor")) continue;
+      for (json& factor : material["emissiveFactor"]) factor = factor.get<double>() * gain;
     }
   }
 

@@ -26,7 +26,8 @@ inline constexpr const char* mended_vertices = "mended-vertices.bin";
 //   the joints as their nodes stand; no animation is left;
 // - instances of EXT_mesh_gpu_instancing are nodes;
 // - nodes that KHR_node_visibility hides, and those below them, show nothing;
-// - the texCoord of a KHR_texture_transform is that of its texture.
+// - the texCoord of a KHR_texture_transform is that of its texture;
+// - emission is times its KHR_materials_emissive_strength.
 // The file must have passed check_gltf. Throws std::runtime_error, naming the place in the file, if
 // its buffers hold less than it says, or a part of it has the wrong type.
 //

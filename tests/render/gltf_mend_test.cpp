@@ -2,12 +2,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
 #include "render/load_mesh.h"
+#include "render/standard.h"
 #include "render/transform.h"
 #include "tests/made_files.h"
 #include "tests/made_gltf.h"
@@ -134,6 +136,29 @@ TEST_F(GltfMendTest, TakesTheCoordinatesThatATextureTransformNames) {
   ASSERT_EQ(model.scene.meshes[0]->uvs.size(), 3U);
   EXPECT_EQ(model.scene.meshes[0]->uvs[2][0], 0.25F);
   EXPECT_EQ(model.scene.meshes[0]->uvs[2][1], 0.5F);
+}
+
+TEST_F(GltfMendTest, GlowsByFactorTimesStrength) {
+  GltfMaker maker;
+  const int position = maker.values<float>(3, corners);
+  const auto emission = [&](const std::string& factor, const std::string& strength) {
+    const LoadedModel model = load(maker.glb(
+        of_mesh("\"POSITION\":" + text(position), ",\"material\":0") +
+        R"(,"extensionsUsed":["KHR_materials_emissive_strength"],
+"extensionsRequired":["KHR_materials_emissive_strength"],"materials":[{)" +
+        factor + R"("extensions":{"KHR_materials_emissive_strength":{)" + strength + "}}}]"));
+    EXPECT_THAT(model.report.notes, IsEmpty());
+    const StandardParameters p = standard_parameters(model.scene.materials.at(0), 0);
+    return std::array{p.emission[0] * p.emission_gain, p.emission[1] * p.emission_gain,
+                      p.emission[2] * p.emission_gain};
+  };
+  const std::string orange = R"("emissiveFactor":[1,0.5,0],)";
+  EXPECT_THAT(emission(orange, ""), ElementsAre(1, 0.5F, 0));
+  EXPECT_THAT(emission(orange, "\"emissiveStrength\":1"), ElementsAre(1, 0.5F, 0));
+  EXPECT_THAT(emission(orange, "\"emissiveStrength\":20"), ElementsAre(20, 10, 0));
+  EXPECT_THAT(emission(orange, "\"emissiveStrength\":-1"), ElementsAre(0, 0, 0));
+  EXPECT_THAT(emission("", "\"emissiveStrength\":20"), ElementsAre(0, 0, 0));
+  EXPECT_THROW(emission(orange, "\"emissiveStrength\":\"20\""), std::runtime_error);
 }
 
 TEST_F(GltfMendTest, MorphsByTheWeightsOfMeshAndNode) {
