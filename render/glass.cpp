@@ -25,7 +25,8 @@ GlassParameters glass_parameters(const Material& material) {
   for (const float s : p.shadow) {
     if (!(s >= 0 && s <= 1)) refuse("shadow must be 0 to 1");
   }
-  if (!(p.abbe == 0 || (p.abbe >= 5 && p.abbe <= 1e4F))) refuse("abbe must be 0, or 5 to 10000");
+  if (!(p.abbe == 0 || (p.abbe >= least_abbe && p.abbe <= most_abbe)))
+    refuse("abbe must be 0, or 5 to 10000");
   return p;
 }
 

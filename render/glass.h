@@ -30,6 +30,8 @@ struct GlassParameters {
   float shadow[3] = {0.92F, 0.92F, 0.92F};
 };
 
+inline constexpr float least_abbe = 5, most_abbe = 1e4F;
+
 // The block in a material of the shader "glass", and back. Throws std::invalid_argument, naming the
 // material, if the block is not one, or a number is out of range.
 GlassParameters glass_parameters(const Material& material);

@@ -24,6 +24,7 @@ constexpr std::array understood_extensions{
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_sheen",
     "KHR_materials_transmission",
@@ -44,6 +45,7 @@ constexpr std::array quiet_extensions{
     "KHR_animation_pointer",
     "KHR_draco_mesh_compression",
     "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_sheen",
@@ -161,18 +163,22 @@ class Checker {
       const auto text = name.get<std::string>();
       if (!is_in(quiet_extensions, text)) facts_.notes.push_back(text + " is left out");
     }
-    for (const json& material : array("materials")) note_index(material);
+    for (const json& material : array("materials")) note_refraction(material);
   }
 
-  // The index of refraction is only known to solid glass.
-  void note_index(const json& material) {
+  // The index of refraction and dispersion are only known to solid glass.
+  void note_refraction(const json& material) {
     const json extensions = material.value("extensions", json::object());
     const bool solid = extensions.contains("KHR_materials_volume") &&
                        extensions.contains("KHR_materials_transmission");
-    if (solid || !extensions.contains("KHR_materials_ior")) return;
-    if (extensions["KHR_materials_ior"].value("ior", 1.5) == 1.5) return;
-    const std::string note = "KHR_materials_ior is left out, but for solid glass";
-    if (facts_.notes.empty() || facts_.notes.back() != note) facts_.notes.push_back(note);
+    if (solid) return;
+    const auto leave_out = [&](const std::string& name, const char* value, double plain) {
+      if (!extensions.contains(name) || extensions[name].value(value, plain) == plain) return;
+      const std::string note = name + " is left out, but for solid glass";
+      if (std::ranges::find(facts_.notes, note) == facts_.notes.end()) facts_.notes.push_back(note);
+    };
+    leave_out("KHR_materials_ior", "ior", 1.5);
+    leave_out("KHR_materials_dispersion", "dispersion", 0);
   }
 
   void check_buffers() const {

@@ -50,6 +50,7 @@ class Mender {
   std::optional<MendedGltf> mend() {
     mend_texture_coordinates();
     mend_emission();
+    mend_dispersion();
     hide_nodes();
     if (!is_plain()) {
       if (!values_->read_buffers(read_)) return std::nullopt;
@@ -59,7 +60,7 @@ class Mender {
       changed_ = true;
     }
     if (!changed_) return std::nullopt;
-    return MendedGltf{write(), std::move(vertices_), std::move(notes_)};
+    return MendedGltf{write(), std::move(vertices_), std::move(materials_), std::move(notes_)};
   }
 
  private:
@@ -124,6 +125,21 @@ class Mender {
       changed_ = true;
       if (!material.contains("emissiveFactor")) continue;
       for (json& factor : material["emissiveFactor"]) factor = factor.get<double>() * gain;
+    }
+  }
+
+  void mend_dispersion() {
+    json& materials = array("materials");
+    for (std::size_t i = 0; i < materials.size(); ++i) {
+      const json& value =
+          gltf_member(extension(materials[i], "KHR_materials_dispersion"), "dispersion");
+      if (value.is_null() || !(value.get<double>() > 0)) continue;
+      constexpr double strongest = 1e6;
+      const auto dispersion = static_cast<float>(std::min(value.get<double>(), strongest));
+      materials_.push_back({"mended-material-" + std::to_string(i),
+                            materials[i].value("name", std::string()), dispersion});
+      materials[i]["name"] = materials_.back().mended;
+      changed_ = true;
     }
   }
 
@@ -437,6 +453,7 @@ class Mender {
   std::optional<GltfValues> values_;
   std::vector<std::size_t> parents_;  // of nodes; at the roots their number
   std::vector<std::byte> vertices_;
+  std::vector<MendedMaterial> materials_;
   std::vector<std::string> notes_;
 };
 

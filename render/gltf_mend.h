@@ -11,10 +11,17 @@
 
 namespace render {
 
+// What assimp does not know of a material, which it finds under the name `mended`.
+struct MendedMaterial {
+  std::string mended, name;  // ... in place of its own
+  float dispersion = 0;      // KHR_materials_dispersion: 20 / Abbe's number
+};
+
 struct MendedGltf {
   std::vector<std::byte> file;      // .gltf or .glb, as before
   std::vector<std::byte> vertices;  // what stands in the buffer `mended_vertices` that it names now
-  std::vector<std::string> notes;   // what of it could not be mended, and is left out
+  std::vector<MendedMaterial> materials;
+  std::vector<std::string> notes;  // what of it could not be mended, and is left out
 };
 
 inline constexpr const char* mended_vertices = "mended-vertices.bin";
@@ -27,7 +34,8 @@ inline constexpr const char* mended_vertices = "mended-vertices.bin";
 // - instances of EXT_mesh_gpu_instancing are nodes;
 // - nodes that KHR_node_visibility hides, and those below them, show nothing;
 // - the texCoord of a KHR_texture_transform is that of its texture;
-// - emission is times its KHR_materials_emissive_strength.
+// - emission is times its KHR_materials_emissive_strength;
+// - materials with a KHR_materials_dispersion have names of their own, to be found by.
 // The file must have passed check_gltf. Throws std::runtime_error, naming the place in the file, if
 // its buffers hold less than it says, or a part of it has the wrong type.
 //

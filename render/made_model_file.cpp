@@ -109,12 +109,13 @@ json glass_of(const Material& material) {
   }
   volume["attenuationDistance"] = distance_m;
   volume["attenuationColor"] = colour;
+  json extensions{{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                  {"KHR_materials_ior", {{"ior", glass.index}}},
+                  {"KHR_materials_volume", volume}};
+  if (glass.abbe > 0) extensions["KHR_materials_dispersion"] = {{"dispersion", 20 / glass.abbe}};
   return {{"name", material.name},
           {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 0}}},
-          {"extensions",
-           {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
-            {"KHR_materials_ior", {{"ior", glass.index}}},
-            {"KHR_materials_volume", volume}}}};
+          {"extensions", extensions}};
 }
 
 json material_of(const Material& material, const SceneDescription& scene) {
@@ -167,7 +168,8 @@ void write_glb(const std::string& path, const SceneDescription& scene) {
   }
   document["scenes"] = json::array({{{"nodes", shown}}});
   document["extensionsUsed"] = {"KHR_materials_transmission", "KHR_materials_volume",
-                                "KHR_materials_ior", "KHR_materials_emissive_strength"};
+                                "KHR_materials_ior", "KHR_materials_dispersion",
+                                "KHR_materials_emissive_strength"};
   buffer.describe(document);
   std::string text = document.dump();
   text.resize((text.size() + 3) / 4 * 4, ' ');

@@ -171,6 +171,20 @@ void apply_libraries(const aiScene& scene, const MtlFacts& libraries) {
   }
 }
 
+// What assimp drops of a glTF file's materials, and their names.
+void apply_materials(const aiScene& scene, std::span<const MendedMaterial> materials) {
+  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
+    aiMaterial& material = *scene.mMaterials[i];
+    aiString name;
+    if (material.Get(AI_MATKEY_NAME, name) != aiReturn_SUCCESS) continue;
+    const auto found = std::ranges::find(materials, name.C_Str(), &MendedMaterial::mended);
+    if (found == materials.end()) continue;
+    const aiString own(found->name);
+    material.AddProperty(&own, AI_MATKEY_NAME);
+    material.AddProperty(&found->dispersion, 1, dispersion_key, 0, 0);
+  }
+}
+
 // Notes of what an OBJ file's libraries say and do not say of the materials that it shows.
 void note_libraries(const MtlFacts& libraries, RawModel& model) {
   std::vector<std::string>& notes = model.report.notes;
@@ -501,6 +515,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
   }
   if (format.gltf) check_faces(*scene, facts);
   apply_libraries(*scene, libraries);
+  if (mended) apply_materials(*scene, mended->materials);
   RawModel model = ModelBuilder(*scene, options, format).build(set_from_root);
   auto& notes = model.report.notes;
   std::vector<std::string> more = facts.notes;

@@ -81,12 +81,18 @@ std::string map_name(unsigned type, unsigned slot) {
 // Above this, glass scatters light so much that it is taken for a thin, clear sheet.
 constexpr float rough_glass = 0.3F;
 
-// glTF's volume, of KHR_materials_volume and _ior: the attenuation colour is what is left of white
-// light after the attenuation distance. Base colour tints each surface once, which glass.h does not
-// know: it goes into shadows.
+float dispersion_of(const aiMaterial& material) {
+  return number(material, dispersion_key, 0, 0, 0);
+}
+
+// glTF's volume, of KHR_materials_volume, _ior and _dispersion: the attenuation colour is what is
+// left of white light after the attenuation distance. Base colour tints each surface once, which
+// glass.h does not know: it goes into shadows.
 GlassParameters glass_of(const aiMaterial& material, const StandardParameters& p) {
   GlassParameters glass;
   glass.index = std::clamp(number(material, AI_MATKEY_REFRACTI, 1.5F), 1.0F, 4.0F);
+  const float dispersion = dispersion_of(material);
+  if (dispersion > 0) glass.abbe = std::clamp(20 / dispersion, least_abbe, most_abbe);
   float left[3] = {1, 1, 1};
   colour(material, AI_MATKEY_VOLUME_ATTENUATION_COLOR, left);
   const float distance_m = number(material, AI_MATKEY_VOLUME_ATTENUATION_DISTANCE, 0);
@@ -275,6 +281,8 @@ void MaterialImport::take_volume(const aiMaterial& material,
     return;
   }
   result.glass = glass_of(material, p);
+  if (20 / least_abbe < dispersion_of(material))
+    note("material '" + name + "': it disperses by Abbe's number 5, the strongest that is shown");
   std::string lost;
   const auto lose = [&lost](bool has, const char* what) {
     if (has) lost += (lost.empty() ? "" : ", ") + std::string(what);

@@ -29,6 +29,9 @@ struct UvTransform {
   friend bool operator==(const UvTransform&, const UvTransform&) = default;
 };
 
+// Where an aiMaterial keeps KHR_materials_dispersion (gltf_mend.h), type and slot 0.
+inline constexpr const char* dispersion_key = "$mat.dispersion";
+
 struct ImportedMaterial {
   StandardParameters parameters;
   std::optional<GlassParameters> glass;  // a volume that light passes: this, in place of those

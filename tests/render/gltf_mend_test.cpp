@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "render/glass.h"
 #include "render/load_mesh.h"
 #include "render/standard.h"
 #include "render/transform.h"
@@ -161,6 +162,43 @@ TEST_F(GltfMendTest, GlowsByFactorTimesStrength) {
   EXPECT_THROW(emission(orange, "\"emissiveStrength\":\"20\""), std::runtime_error);
 }
 
+TEST_F(GltfMendTest, DispersesByAbbesNumberInSolidGlass) {
+  GltfMaker maker;
+  const int position = maker.values<float>(3, corners);
+  const auto load_glass = [&](const std::string& dispersion) {
+    const std::string glass = R"("pbrMetallicRoughness":{"roughnessFactor":0},"extensions":{
+"KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_volume":{"thicknessFactor":1})";
+    // Of two, so that it tells whose it is.
+    return load(maker.glb(R"("nodes":[{"mesh":0,"children":[1]},{"mesh":1}],)"
+                          R"("meshes":[{"primitives":[{"material":1,"attributes":{"POSITION":)" +
+                          text(position) +
+                          R"(}}]},{"primitives":[{"material":0,"attributes":{"POSITION":)" +
+                          text(position) + R"(}}]}],
+"extensionsUsed":["KHR_materials_transmission","KHR_materials_volume","KHR_materials_dispersion"],
+"materials":[{"name":"plain",)" +
+                          glass + R"(}},{"name":"prism",)" + glass +
+                          R"(,"KHR_materials_dispersion":{"dispersion":)" + dispersion + "}}}]"));
+  };
+  const auto abbe = [&](const std::string& dispersion) {
+    for (const Material& material : load_glass(dispersion).scene.materials) {
+      const float own = glass_parameters(material).abbe;
+      if (material.name == "prism") return own;
+      EXPECT_EQ(material.name, "plain");
+      EXPECT_EQ(own, 0);
+    }
+    return -1.0F;
+  };
+  EXPECT_EQ(abbe("0"), 0);
+  EXPECT_EQ(abbe("-0.5"), 0);
+  EXPECT_NEAR(abbe("0.33"), 60.6, 0.01);
+  EXPECT_EQ(abbe("2"), 10);
+  EXPECT_THAT(load_glass("4").report.notes, IsEmpty());
+  EXPECT_EQ(abbe("1e300"), 5);
+  EXPECT_THAT(load_glass("5").report.notes, ElementsAre(HasSubstr("'prism': it disperses")));
+  EXPECT_EQ(abbe("1e-9"), 10000);
+  EXPECT_THROW(abbe("\"strong\""), std::runtime_error);
+}
+
 TEST_F(GltfMendTest, MorphsByTheWeightsOfMeshAndNode) {
   GltfMaker maker;
   const int position = maker.values<float>(3, corners),
@@ -261,6 +299,9 @@ TEST_F(GltfMendTest, NotesEveryExtensionThatIsNotShown) {
             "{}"),
       ElementsAre("KHR_materials_diffuse_transmission is left out", "X_of_tomorrow is left out"));
   const std::string index = R"("KHR_materials_ior":{"ior":1.3})";
+  EXPECT_THAT(notes(R"("KHR_materials_dispersion")",
+                    R"({"extensions":{"KHR_materials_dispersion":{"dispersion":0.4}}})"),
+              ElementsAre(HasSubstr("KHR_materials_dispersion is left out")));
   EXPECT_THAT(notes(R"("KHR_materials_ior")", "{\"extensions\":{" + index + "}}"),
               ElementsAre(HasSubstr("KHR_materials_ior is left out")));
   EXPECT_THAT(notes(R"("KHR_materials_ior","KHR_materials_volume","KHR_materials_transmission")",
