@@ -25,6 +25,9 @@ GlassParameters glass_parameters(const Material& material) {
   for (const float s : p.shadow) {
     if (!(s >= 0 && s <= 1)) refuse("shadow must be 0 to 1");
   }
+  for (const float t : p.tint) {
+    if (!(t >= 0 && t <= 1)) refuse("tint must be 0 to 1");
+  }
   if (!(p.abbe == 0 || (p.abbe >= least_abbe && p.abbe <= most_abbe)))
     refuse("abbe must be 0, or 5 to 10000");
   return p;
@@ -39,7 +42,10 @@ Material make_glass_material(std::string name, const GlassParameters& parameters
 
 Glass make_glass(const Material& material) {
   const GlassParameters p = glass_parameters(material);
-  return {indices_of(p), {p.absorption[0], p.absorption[1], p.absorption[2]}, p.priority};
+  return {indices_of(p),
+          {p.absorption[0], p.absorption[1], p.absorption[2]},
+          p.priority,
+          {p.tint[0], p.tint[1], p.tint[2]}};
 }
 
 namespace {
@@ -74,6 +80,7 @@ Crossing cross_surface(const Scene& scene, const Media& media, Media::Body body,
   const Glass* from = present(scene, before);
   const Glass* to = present(scene, after);
   if (from == to) return crossing;
+  if (const Glass* own = scene.glass_of(body.material)) crossing.tint = own->tint;
   for (std::size_t c = 0; c < 3; ++c) {
     crossing.ratio[c] = (from ? from->index[c] : 1.0F) / (to ? to->index[c] : 1.0F);
     crossing.seen = crossing.seen || std::abs(crossing.ratio[c] - 1) > 1e-6F;

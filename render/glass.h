@@ -1,10 +1,11 @@
 // Solid glass and other clear bodies: the shader "glass".
 //
 // At each surface both rays are followed, mirrored and refracted, with the exact shares of
-// Fresnel's equations for unpolarised light; beyond the critical angle all is mirrored. Inside,
-// light is absorbed by Beer's law. Bodies may be nested (a bulb in glass in air), or overlap a
-// little where they touch: of two at the same place, the one of higher priority is the one that is
-// there (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", JGT 7(2), 2002).
+// Fresnel's equations for unpolarised light; beyond the critical angle all is mirrored. What passes
+// a surface takes its tint, as by a coloured foil; inside, light is absorbed by Beer's law. Bodies
+// may be nested (a bulb in glass in air), or overlap a little where they touch: of two at the same
+// place, the one of higher priority is the one that is there (Schmidt and Budge, "Simple Nested
+// Dielectrics in Ray Traced Images", JGT 7(2), 2002).
 #pragma once
 
 #include <array>
@@ -26,8 +27,9 @@ struct GlassParameters {
   float abbe = 0;                   // (n_d - 1) / (n_F - n_C); 0 = no dispersion, else 5 or more
   std::int32_t priority = 0;        // of overlapping bodies, the higher is there
   // Share of light that goes straight through one surface to what lies behind, for shadows of
-  // lights whose caustics are not followed (caustics.h).
+  // lights whose caustics are not followed (caustics.h), before its tint.
   float shadow[3] = {0.92F, 0.92F, 0.92F};
+  float tint[3] = {1, 1, 1};  // share, 0 to 1, of what a surface does not mirror that passes it
 };
 
 inline constexpr float least_abbe = 5, most_abbe = 1e4F;
@@ -42,6 +44,7 @@ struct Glass {
   std::array<float, 3> index;
   Vec3f absorption;
   std::int32_t priority;
+  Vec3f tint;
 };
 Glass make_glass(const Material& material);
 
@@ -62,6 +65,7 @@ struct Crossing {
   Media after;                          // once it has passed
   std::array<float, 3> ratio{1, 1, 1};  // of the index before to that after, per colour
   bool seen = false;                    // false: both sides are the same body, or as good as that
+  Vec3f tint{1, 1, 1};                  // of what passes, seen or not
 };
 
 // `back`: the ray meets the body from inside. Of a body that the ray is not known to be in, it is

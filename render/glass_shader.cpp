@@ -28,7 +28,7 @@ class GlassShader final : public Shader {
 
   std::optional<Vec3f> shadow_everywhere(const Material& material) const override {
     const GlassParameters p = glass_parameters(material);
-    return Vec3f{p.shadow[0], p.shadow[1], p.shadow[2]};
+    return Vec3f{p.shadow[0] * p.tint[0], p.shadow[1] * p.tint[1], p.shadow[2] * p.tint[2]};
   }
 
  private:
@@ -38,7 +38,7 @@ class GlassShader final : public Shader {
     if (!crossing.seen) {
       rays.push(p, {offset_origin(p.hit, p.incoming),
                     p.incoming,
-                    p.throughput,
+                    p.throughput * crossing.tint,
                     {},
                     0,
                     {},
@@ -83,7 +83,7 @@ class GlassShader final : public Shader {
     if (direction == Vec3f{}) return;
     rays.push(p, {offset_origin(p.hit, direction),
                   direction,
-                  throughput * (1 - share),
+                  throughput * (1 - share) * crossing.tint,
                   {},
                   0,
                   refracted_spread(p, direction, ratio),

@@ -114,7 +114,10 @@ json glass_of(const Material& material) {
                   {"KHR_materials_volume", volume}};
   if (glass.abbe > 0) extensions["KHR_materials_dispersion"] = {{"dispersion", 20 / glass.abbe}};
   return {{"name", material.name},
-          {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 0}}},
+          {"pbrMetallicRoughness",
+           {{"baseColorFactor", {glass.tint[0], glass.tint[1], glass.tint[2], 1}},
+            {"metallicFactor", 0},
+            {"roughnessFactor", 0}}},
           {"extensions", extensions}};
 }
 

@@ -86,8 +86,7 @@ float dispersion_of(const aiMaterial& material) {
 }
 
 // glTF's volume, of KHR_materials_volume, _ior and _dispersion: the attenuation colour is what is
-// left of white light after the attenuation distance. Base colour tints each surface once, which
-// glass.h does not know: it goes into shadows.
+// left of white light after the attenuation distance; base colour tints what passes a surface.
 GlassParameters glass_of(const aiMaterial& material, const StandardParameters& p) {
   GlassParameters glass;
   glass.index = std::clamp(number(material, AI_MATKEY_REFRACTI, 1.5F), 1.0F, 4.0F);
@@ -99,7 +98,8 @@ GlassParameters glass_of(const aiMaterial& material, const StandardParameters& p
   for (int c = 0; c < 3; ++c) {
     const float share = std::clamp(left[c], 1e-4F, 1.0F);
     if (distance_m > 1e-4F) glass.absorption[c] = -std::log(share) / distance_m;
-    glass.shadow[c] *= std::sqrt(share) * p.base_color[c];
+    glass.shadow[c] *= std::sqrt(share);
+    glass.tint[c] = p.base_color[c];
   }
   return glass;
 }
@@ -287,7 +287,6 @@ void MaterialImport::take_volume(const aiMaterial& material,
   const auto lose = [&lost](bool has, const char* what) {
     if (has) lost += (lost.empty() ? "" : ", ") + std::string(what);
   };
-  lose(std::min({p.base_color[0], p.base_color[1], p.base_color[2]}) < 1, "base colour");
   lose(p.base_color_texture >= 0, "base colour map");
   lose(p.alpha_cutoff > 0, "cut-outs");
   lose(p.metallic_roughness_texture >= 0, "roughness map");

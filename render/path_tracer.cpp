@@ -345,9 +345,14 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
     w.direction = direction;
     w.origin = offset_origin(hit, direction);
   };
-  if (!crossing.seen) {
+  const auto pass = [&](Vec3f direction) {
+    w.share = times(w.share, crossing.tint);
+    w.glow_share = times(w.glow_share, crossing.tint);
     w.media = crossing.after;
-    leave(w.direction);
+    leave(direction);
+  };
+  if (!crossing.seen) {
+    pass(w.direction);
     return;
   }
   std::size_t channel = 0;
@@ -373,9 +378,7 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
     leave(mirrored_off(hit, w.direction));
     return;
   }
-  const Vec3f direction = refracted_into(hit, w.direction, ratio);
-  w.media = crossing.after;
-  leave(direction);
+  pass(refracted_into(hit, w.direction, ratio));
 }
 
 // What a picture shows; nothing of other surfaces.

@@ -179,22 +179,25 @@ class PhotonTracer {
     if (!crossing.seen) {
       Photon on = photon;
       on.media = crossing.after;
-      go_on(on, hit, {1, 1, 1});
+      go_on(on, hit, crossing.tint);
       return;
     }
     const auto& ratio = crossing.ratio;
     if (ratio[0] == ratio[1] && ratio[1] == ratio[2]) {
-      split(photon, hit, crossing.after, ratio[0], photon.share);
+      split(photon, hit, crossing, ratio[0], photon.share);
       return;
     }
     for (std::size_t c = 0; c < 3; ++c) {
-      split(photon, hit, crossing.after, ratio[c], only_colour(photon.share, c));
+      split(photon, hit, crossing, ratio[c], only_colour(photon.share, c));
     }
   }
 
   // As the shader does.
-  void split(
-      const Photon& photon, const HitPoint& hit, const Media& after, float ratio, Vec3f share) {
+  void split(const Photon& photon,
+             const HitPoint& hit,
+             const Crossing& crossing,
+             float ratio,
+             Vec3f share) {
     const Vec3f incoming = photon.direction, normal = hit.normal;
     const float mirrors = fresnel(-dot(normal, incoming), ratio);
     if (largest(share) * mirrors > least_) {
@@ -202,15 +205,16 @@ class PhotonTracer {
       for (RayDifferential& d : back.neighbours) d.turn = mirrored_turn(hit, normal, incoming, d);
       push(back, hit, mirrored_off(hit, incoming), share * mirrors);
     }
-    if (!(largest(share) * (1 - mirrors) > least_)) return;
+    const Vec3f passes = share * (1 - mirrors) * crossing.tint;
+    if (!(largest(passes) > least_)) return;
     const Vec3f direction = refracted_into(hit, incoming, ratio);
     if (direction == Vec3f{}) return;
     Photon on = photon;
-    on.media = after;
+    on.media = crossing.after;
     for (RayDifferential& d : on.neighbours) {
       d.turn = refracted_turn(hit, incoming, direction, ratio, d);
     }
-    push(on, hit, direction, share * (1 - mirrors));
+    push(on, hit, direction, passes);
   }
 
   void push(Photon& photon, const HitPoint& hit, Vec3f direction, Vec3f share) {

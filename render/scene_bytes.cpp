@@ -5,7 +5,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x36435350;  // "PSC6"
+constexpr std::uint32_t scene_magic = 0x37435350;  // "PSC7"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);

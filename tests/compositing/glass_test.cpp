@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <functional>
@@ -12,6 +13,7 @@
 #include "render/kept_transport.h"
 #include "render/light_follower.h"
 #include "render/reference.h"
+#include "render/trace.h"
 #include "tests/compositing/made_glass.h"
 #include "tests/render/plain_shapes.h"
 #include "tests/render/sun_and_sky.h"
@@ -125,6 +127,8 @@ TEST(GlassParameters, AreRefusedByNameWhenOutOfRange) {
   refuses([](auto& p) { p.absorption[1] = -1; });
   refuses([](auto& p) { p.shadow[2] = 2; });
   refuses([](auto& p) { p.abbe = 2; });
+  refuses([](auto& p) { p.tint[1] = 1.01F; });
+  refuses([](auto& p) { p.tint[2] = -0.1F; });
   render::Material short_block = render::make_glass_material("cover", {});
   short_block.parameters.pop_back();
   EXPECT_THROW(render::glass_parameters(short_block), std::invalid_argument);
@@ -196,6 +200,64 @@ TEST(Glass, IsWhiteInAWhiteFurnace) {
       }
     }
   }
+}
+
+// A foil on either side: what passes a surface takes its tint, what is mirrored takes none.
+TEST(Glass, TintsLightAtEachSurfaceThatItPasses) {
+  constexpr std::array<float, 3> tint{0.8F, 0.3F, 0};
+  for (const float index : {1.0F, 1.5F, 2.4F}) {
+    const double f = std::pow((index - 1) / (index + 1), 2);
+    // Light 1 before the camera, 3 behind it.
+    const GlassShot shot =
+        glass_shot(bodies({render::make_box({-5, -0.05F, -5}, {5, 0.05F, 5})},
+                          {{.index = index, .tint = {tint[0], tint[1], tint[2]}}}),
+                   [](Vec3f d) { return d.y > 0 ? 1.0F : 3.0F; }, 16, 400, {0, -3, 0});
+    const capture::Image kernel = shot.kernel(), reference = shot.reference(4000);
+    for (int c = 0; c < 3; ++c) {
+      const double t = tint[static_cast<std::size_t>(c)];
+      const double through = t * t * (1 - f) * (1 - f) / (1 - f * f);
+      const double back = f + t * t * f * (1 - f) * (1 - f) / (1 - f * f);
+      EXPECT_NEAR(kernel.at(8, 8, c), through + 3 * back, 1e-3) << index << " " << c;
+      double mean = 0;
+      for (int i = 0; i < 256; ++i) mean += reference.at(i / 16, i % 16, c) / 256;
+      EXPECT_NEAR(mean, through + 3 * back, 0.01) << index << " " << c;
+    }
+  }
+}
+
+TEST(Glass, OfATintKeepsAWhiteWorldWhiteInWhiteAndDarkensItElse) {
+  const auto white = [](Vec3f) { return 1.0F; };
+  for (const float abbe : {0.0F, 20.0F}) {
+    const GlassShot shot =
+        glass_shot(bodies({render::make_sphere(1, 48)}, {{.abbe = abbe, .tint = {1, 0.5F, 0}}}),
+                   white, 24, 40, {0, -4, 1});
+    const capture::Image kernel = shot.kernel(), reference = shot.reference(256);
+    for (const capture::Image* picture : {&kernel, &reference}) {
+      for (int y = 8; y < 16; ++y) {
+        for (int x = 8; x < 16; ++x) {
+          EXPECT_LT(picture->at(y, x, 2), picture->at(y, x, 1) + 0.02);
+          EXPECT_LT(picture->at(y, x, 1), 0.5);
+        }
+      }
+    }
+    for (int y = 0; y < 24; ++y) {
+      for (int x = 0; x < 24; ++x) {
+        EXPECT_NEAR(kernel.at(y, x, 0), 1, 0.01);
+        EXPECT_LT(kernel.at(y, x, 1), 1.01);
+      }
+    }
+  }
+}
+
+TEST(Glass, TintsItsShadowTwice) {
+  const Vec3f shadow = [] {
+    const render::Scene scene(bodies({render::make_box({-1, -1, -1}, {1, 1, 1})},
+                                     {{.shadow = {0.5F, 1, 1}, .tint = {0.5F, 0.5F, 0}}}));
+    return transmittance(scene, {0, 0, 5}, {0, 0, -1}, 0, 10, render::mask_virtual);
+  }();
+  EXPECT_NEAR(shadow.x, 0.0625, 1e-6);
+  EXPECT_NEAR(shadow.y, 0.25, 1e-6);
+  EXPECT_EQ(shadow.z, 0);
 }
 
 TEST(Glass, OfIndexOneIsNotThere) {

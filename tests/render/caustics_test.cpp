@@ -119,6 +119,15 @@ TEST(Caustics, UnderABallAreThoseOfGeometricalOptics) {
   }
 }
 
+TEST(Caustics, TakeTheTintOfBothSurfaces) {
+  const Scene scene(over_floor(make_sphere(1, 64), {.tint = {1, 0.5F, 0}}, {0, 0, 1.3F}));
+  const Caustics caustics = find(scene, sun({0, 0, 1}), photons(10'000));
+  const Vec3f light = caustics.at(0, {0, 0, 0}, {0, 0, 1});
+  EXPECT_GT(light.x, 1);
+  EXPECT_NEAR(light.y, 0.25 * light.x, 1e-3 * light.x);
+  EXPECT_EQ(light.z, 0);
+}
+
 TEST(Caustics, LetThroughASlabWhatItsSurfacesDo) {
   for (const float index : {1.0F, 1.33F, 1.5F, 2.0F}) {
     const Scene scene(

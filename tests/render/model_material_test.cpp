@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/glass.h"
 #include "render/load_mesh.h"
 #include "render/standard.h"
 #include "tests/made_files.h"
@@ -294,10 +295,21 @@ TEST(ModelMaterial, NotesWhatSolidGlassGoesWithout) {
   EXPECT_THAT(
       lost(R"(,"alphaMode":"MASK","pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0,
 "baseColorFactor":[1,0.5,1,1],"baseColorTexture":{"index":0}})"),
-      HasSubstr("base colour, base colour map, cut-outs"));
+      HasSubstr("without its base colour map, cut-outs"));
   const LoadedModel by_map = load_clear(R"(+,"transmissionTexture":{"index":0})", 0, true);
   EXPECT_EQ(by_map.scene.materials.at(0).shader, "standard");
   EXPECT_THAT(notes_of(by_map), Contains(HasSubstr("the volume (thickness")));
+}
+
+TEST(ModelMaterial, TintsSolidGlassByItsBaseColour) {
+  const LoadedModel model = load_clear(
+      R"(,"pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0,
+"baseColorFactor":[0.75,0.25,0,1]})",
+      0, true);
+  const GlassParameters glass = glass_parameters(model.scene.materials.at(0));
+  EXPECT_THAT(glass.tint, ElementsAre(0.75F, 0.25F, 0));
+  EXPECT_THAT(glass.shadow, ElementsAre(0.92F, 0.92F, 0.92F)) << "its tint comes on top";
+  EXPECT_THAT(notes_of(model), testing::IsEmpty());
 }
 
 TEST(ModelMaterial, NotesThatFrostedGlassIsClear) {
