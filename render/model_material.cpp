@@ -104,6 +104,29 @@ GlassParameters glass_of(const aiMaterial& material, const StandardParameters& p
   return glass;
 }
 
+// A transform that all textures share is the mesh's.
+void share_transform(ImportedMaterial& material) {
+  StandardParameters& p = material.parameters;
+  const std::array<std::pair<std::int32_t, UvTransform*>, 8> places{
+      {{p.base_color_texture, &p.base_color_uv},
+       {p.metallic_roughness_texture, &p.metallic_roughness_uv},
+       {p.normal_texture, &p.normal_uv},
+       {p.clearcoat_texture, &p.clearcoat_uv},
+       {p.transmission_texture, &p.transmission_uv},
+       {p.emission_texture, &p.emission_uv},
+       {p.clearcoat_roughness_texture, &p.clearcoat_roughness_uv},
+       {p.alpha_texture, &p.alpha_uv}}};
+  std::optional<UvTransform> shared;
+  for (const auto& [texture, uv] : places) {
+    if (texture < 0) continue;
+    if (!shared) shared = *uv;
+    if (*shared != *uv) return;
+  }
+  if (!shared) return;
+  material.uv = *shared;
+  for (const auto& [texture, uv] : places) *uv = {};
+}
+
 }  // namespace
 
 void MaterialImport::note(const std::string& text) {
@@ -156,12 +179,36 @@ int MaterialImport::embedded_index(const std::string& path) const {
   return alike == 1 ? found : -1;
 }
 
-std::int32_t MaterialImport::texture(const aiMaterial& material,
-                                     unsigned type,
-                                     unsigned slot,
-                                     bool srgb,
-                                     ImportedMaterial& result,
-                                     bool& uv_known) {
+// assimp counts v upwards and turns about a picture's middle. glTF turns about its upper left
+// corner, after scaling; assimp's translation makes up for that.
+UvTransform MaterialImport::transform_of(const aiMaterial& material, unsigned type, unsigned slot) {
+  aiUVTransform t;
+  if (material.Get(AI_MATKEY_UVTRANSFORM(static_cast<aiTextureType>(type), slot), t) !=
+      aiReturn_SUCCESS)
+    return {};
+  const auto say = [&](const std::string& text) {
+    note("material '" + name_of(material) + "': " + text);
+  };
+  if (t.mRotation != 0 && !format_.gltf) {
+    say("the rotation of a texture is left out");
+    t.mRotation = 0;
+  }
+  const double angle = -t.mRotation, c = std::cos(angle), s = std::sin(angle);
+  const double width = t.mScaling.x, height = t.mScaling.y;
+  const double right = t.mTranslation.x - 0.5 * width * (1 - c + s);
+  const double down = 1 - height - t.mTranslation.y - 0.5 * height * (1 - c - s);
+  UvTransform uv;
+  uv.u = {static_cast<float>(c * width), static_cast<float>(s * height), static_cast<float>(right)};
+  uv.v = {static_cast<float>(-s * width), static_cast<float>(c * height), static_cast<float>(down)};
+  constexpr float most = 1e6F;
+  const auto sound = [](float x) { return std::abs(x) <= most; };
+  if (std::ranges::all_of(uv.u, sound) && std::ranges::all_of(uv.v, sound)) return uv;
+  say("the transform of a texture, which goes beyond a million, is left out");
+  return {};
+}
+
+std::int32_t MaterialImport::texture(
+    const aiMaterial& material, unsigned type, unsigned slot, bool srgb, UvTransform& uv) {
   const auto ai_type = static_cast<aiTextureType>(type);
   const auto say = [&](const std::string& text) {
     note("material '" + name_of(material) + "': " + text);
@@ -174,20 +221,10 @@ std::int32_t MaterialImport::texture(const aiMaterial& material,
     say("a texture whose picture is neither a file nor base64 is left out");
     return -1;
   }
-  UvTransform uv{.channel = channel};
-  aiUVTransform transform;
-  if (material.Get(AI_MATKEY_UVTRANSFORM(ai_type, slot), transform) == aiReturn_SUCCESS) {
-    uv.scale = {transform.mScaling.x, transform.mScaling.y};
-    // assimp counts v upwards: v_up' = s v_up + t, so v' = s v + 1 - s - t.
-    uv.offset = {transform.mTranslation.x, 1 - transform.mScaling.y - transform.mTranslation.y};
-    if (transform.mRotation != 0) say("the rotation of a texture is left out");
-  }
-  if (!uv_known) {
-    result.uv = uv;
-    uv_known = true;
-  } else if (result.uv != uv) {
-    say("its textures have coordinates of their own; all take those of the first");
-  }
+  uv = transform_of(material, type, slot);
+  if (!uv_set_) uv_set_ = channel;
+  if (uv_set_ != channel)
+    say("its textures name several sets of coordinates; all take that of the first");
   int filter = 0;
   constexpr int nearest = 9728;  // glTF's
   if (material.Get(AI_MATKEY_GLTF_MAPPINGFILTER_MAG(ai_type, slot), filter) == aiReturn_SUCCESS &&
@@ -302,14 +339,14 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   ImportedMaterial result;
   StandardParameters& p = result.parameters;
   const std::string name = name_of(material);
-  bool uv_known = false;
   taken_.clear();
-  const auto textured = [&](unsigned type, unsigned slot, bool srgb) {
-    return texture(material, type, slot, srgb, result, uv_known);
+  uv_set_.reset();
+  const auto textured = [&](unsigned type, unsigned slot, bool srgb, UvTransform& uv) {
+    return texture(material, type, slot, srgb, uv);
   };
-  const auto either = [&](unsigned type, unsigned other, bool srgb) {
-    const std::int32_t index = textured(type, 0, srgb);
-    return index >= 0 ? index : textured(other, 0, srgb);
+  const auto either = [&](unsigned type, unsigned other, bool srgb, UvTransform& uv) {
+    const std::int32_t index = textured(type, 0, srgb, uv);
+    return index >= 0 ? index : textured(other, 0, srgb, uv);
   };
   aiColor4D base;
   const bool metallic_roughness = material.Get(AI_MATKEY_BASE_COLOR, base) == aiReturn_SUCCESS;
@@ -318,13 +355,15 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
       format_.gltf && material.Get(AI_MATKEY_GLOSSINESS_FACTOR, gloss) == aiReturn_SUCCESS;
   take_base(material, p);
   if (specular_glossiness) {
-    p.base_color_texture = textured(aiTextureType_DIFFUSE, 0, true);
+    p.base_color_texture = textured(aiTextureType_DIFFUSE, 0, true, p.base_color_uv);
     taken_.emplace_back(aiTextureType_BASE_COLOR, 0);  // this and the next are for other readers
     taken_.emplace_back(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE);
   } else {
-    p.base_color_texture = either(aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, true);
+    p.base_color_texture =
+        either(aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, true, p.base_color_uv);
     p.metallic_roughness_texture =
-        textured(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE, false);
+        textured(AI_MATKEY_GLTF_PBRMETALLICROUGHNESS_METALLICROUGHNESS_TEXTURE, false,
+                 p.metallic_roughness_uv);
   }
   if (format_.gltf) {
     // assimp has maps of glTF under other names too.
@@ -333,14 +372,16 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
       taken_.emplace_back(twin, 0);
     }
   }
-  p.normal_texture = either(aiTextureType_NORMALS, aiTextureType_NORMAL_CAMERA, false);
-  p.emission_texture = either(aiTextureType_EMISSIVE, aiTextureType_EMISSION_COLOR, true);
-  p.clearcoat_texture = textured(AI_MATKEY_CLEARCOAT_TEXTURE, false);
-  p.clearcoat_roughness_texture = textured(AI_MATKEY_CLEARCOAT_ROUGHNESS_TEXTURE, false);
-  p.transmission_texture = textured(AI_MATKEY_TRANSMISSION_TEXTURE, false);
+  p.normal_texture = either(aiTextureType_NORMALS, aiTextureType_NORMAL_CAMERA, false, p.normal_uv);
+  p.emission_texture =
+      either(aiTextureType_EMISSIVE, aiTextureType_EMISSION_COLOR, true, p.emission_uv);
+  p.clearcoat_texture = textured(AI_MATKEY_CLEARCOAT_TEXTURE, false, p.clearcoat_uv);
+  p.clearcoat_roughness_texture =
+      textured(AI_MATKEY_CLEARCOAT_ROUGHNESS_TEXTURE, false, p.clearcoat_roughness_uv);
+  p.transmission_texture = textured(AI_MATKEY_TRANSMISSION_TEXTURE, false, p.transmission_uv);
   taken_.emplace_back(AI_MATKEY_VOLUME_THICKNESS_TEXTURE);  // the shape tells it
   if (format_.obj) {
-    p.alpha_texture = textured(aiTextureType_OPACITY, 0, false);
+    p.alpha_texture = textured(aiTextureType_OPACITY, 0, false, p.alpha_uv);
     if (p.alpha_texture >= 0) {
       p.alpha_cutoff = 0.5F;
       note("material '" + name + "': its opacity map is cut at a half");
@@ -382,6 +423,8 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
       note("material '" + name + "': blended alpha is cut at a half");
     }
   }
+  result.uv_set = uv_set_.value_or(0);
+  share_transform(result);
   take_volume(material, name, result);
   constexpr float frosted = 0.1F;
   if (p.transmission > 0 && p.metallic < 1 && p.roughness > frosted)

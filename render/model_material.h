@@ -21,21 +21,16 @@ struct aiTexture;
 
 namespace render {
 
-// How a material wants its mesh's texture coordinates: u' = scale u + offset, v down.
-struct UvTransform {
-  std::array<float, 2> scale{1, 1};
-  std::array<float, 2> offset{0, 0};
-  unsigned channel = 0;
-  friend bool operator==(const UvTransform&, const UvTransform&) = default;
-};
-
 // Where an aiMaterial keeps KHR_materials_dispersion (gltf_mend.h), type and slot 0.
 inline constexpr const char* dispersion_key = "$mat.dispersion";
 
 struct ImportedMaterial {
   StandardParameters parameters;
   std::optional<GlassParameters> glass;  // a volume that light passes: this, in place of those
+  // What its mesh's coordinates are: those of one of the file's sets, transformed as all textures
+  // want it, or, where they do not agree, as they are.
   UvTransform uv;
+  unsigned uv_set = 0;
 };
 
 // Takes materials, and collects the textures that they ask for.
@@ -59,12 +54,11 @@ class MaterialImport {
     friend auto operator<=>(const TextureKey&, const TextureKey&) = default;
   };
 
-  std::int32_t texture(const aiMaterial& material,
-                       unsigned type,
-                       unsigned slot,
-                       bool srgb,
-                       ImportedMaterial& result,
-                       bool& uv_known);
+  // `uv`: where the material looks it up.
+  std::int32_t texture(
+      const aiMaterial& material, unsigned type, unsigned slot, bool srgb, UvTransform& uv);
+  // Notes what of a texture's place is not taken.
+  UvTransform transform_of(const aiMaterial& material, unsigned type, unsigned slot);
   Wrap wrap_of(const aiMaterial& material, const char* key, unsigned type, unsigned slot) const;
   int embedded_index(const std::string& path) const;
   void take_base(const aiMaterial& material, StandardParameters& p);
@@ -79,6 +73,7 @@ class MaterialImport {
   ModelFormat format_;
   std::vector<std::string>& notes_;
   std::vector<std::pair<unsigned, unsigned>> taken_;  // types and slots of the material's maps
+  std::optional<unsigned> uv_set_;                    // of the material's first texture
   std::map<TextureKey, std::int32_t> indices_;
   std::vector<RawTexture> textures_;
   std::vector<const aiTexture*> embedded_;  // of each, or null

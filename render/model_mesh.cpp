@@ -93,8 +93,13 @@ void part_mirrored(Mesh& mesh) {
   }
 }
 
-// Tangents along u, with the sign that makes cross(normal, tangent) * sign point up the texture.
-void compute_tangents(Mesh& mesh) {
+// Tangents along u of a normal map, with the sign that makes cross(normal, tangent) * sign point up
+// in it.
+void compute_tangents(Mesh& mesh, const UvTransform& of_map) {
+  // Whether the map is mirrored by its transform; one that has no area is taken for none.
+  const float map_determinant = of_map.u[0] * of_map.v[1] - of_map.u[1] * of_map.v[0];
+  const UvTransform map_from_mesh = map_determinant != 0 ? of_map : UvTransform{};
+  const bool mirrors = map_determinant < 0;
   part_mirrored(mesh);
   std::vector<Vec3f> along_u(mesh.positions.size());
   std::vector<Vec3f> along_v(mesh.positions.size());
@@ -104,11 +109,12 @@ void compute_tangents(Mesh& mesh) {
     const auto [a, b, c] = triangle;
     const Vec3f e1 = mesh.positions[b] - mesh.positions[a];
     const Vec3f e2 = mesh.positions[c] - mesh.positions[a];
-    const float u1 = mesh.uvs[b][0] - mesh.uvs[a][0];
-    const float v1 = mesh.uvs[b][1] - mesh.uvs[a][1];
-    const float u2 = mesh.uvs[c][0] - mesh.uvs[a][0];
-    const float v2 = mesh.uvs[c][1] - mesh.uvs[a][1];
-    const float sign = determinant > 0 ? 1.0F : -1.0F;
+    const auto step_to = [&, &from = mesh.uvs[a]](std::uint32_t corner) {
+      return map_from_mesh.of_step({mesh.uvs[corner][0] - from[0], mesh.uvs[corner][1] - from[1]});
+    };
+    const auto [u1, v1] = step_to(b);
+    const auto [u2, v2] = step_to(c);
+    const float sign = (determinant > 0) != mirrors ? 1.0F : -1.0F;
     const Vec3f u = normalize((e1 * v2 - e2 * v1) * sign);
     const Vec3f v = normalize((e2 * u1 - e1 * u2) * sign);
     const float area = length(cross(e1, e2));
@@ -197,17 +203,15 @@ Mesh convert_mesh(const aiMesh& source,
   Mesh mesh = convert_shape(source, left_out);
   if (source.HasNormals()) copy_normals(source, mesh);
   if (source.HasNormals() && facets) mend_facets(mesh);
-  const unsigned channel = material.uv.channel < AI_MAX_NUMBER_OF_TEXTURECOORDS &&
-                                   source.HasTextureCoords(material.uv.channel)
-                               ? material.uv.channel
-                               : 0;
-  if (source.HasTextureCoords(channel)) {
-    const UvTransform& uv = material.uv;
+  const unsigned set =
+      material.uv_set < AI_MAX_NUMBER_OF_TEXTURECOORDS && source.HasTextureCoords(material.uv_set)
+          ? material.uv_set
+          : 0;
+  if (source.HasTextureCoords(set)) {
     mesh.uvs.reserve(source.mNumVertices);
     for (unsigned i = 0; i < source.mNumVertices; ++i) {
-      const aiVector3D& t = source.mTextureCoords[channel][i];
-      const float u = uv.scale[0] * t.x + uv.offset[0];
-      const float v = uv.scale[1] * (1 - t.y) + uv.offset[1];
+      const aiVector3D& t = source.mTextureCoords[set][i];
+      const auto [u, v] = material.uv.of_place({t.x, 1 - t.y});
       constexpr float most = 1e6F;
       const bool sound = std::abs(u) <= most && std::abs(v) <= most;
       mesh.uvs.push_back(sound ? std::array<float, 2>{u, v} : std::array<float, 2>{});
@@ -219,7 +223,7 @@ Mesh convert_mesh(const aiMesh& source,
     if (source.HasNormals() && source.HasTangentsAndBitangents() && !join)
       copy_tangents(source, mesh);
     else if (!mesh.uvs.empty() && !mesh.normals.empty())
-      compute_tangents(mesh);
+      compute_tangents(mesh, material.parameters.normal_uv);
   }
   return mesh;
 }

@@ -5,7 +5,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x37435350;  // "PSC7"
+constexpr std::uint32_t scene_magic = 0x38435350;  // "PSC8"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);

@@ -16,10 +16,21 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 104, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 296, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
+}
+
+// A texture at a hit, over the footprint in the mesh's coordinates.
+std::array<float, 4> sample_at(const Texture& texture,
+                               const UvTransform& uv,
+                               const HitPoint& hit,
+                               const UvFootprint& footprint,
+                               TextureFilter filter) {
+  if (uv == UvTransform{}) return sample(texture, hit.u, hit.v, footprint, filter);
+  const auto [u, v] = uv.of_place({hit.u, hit.v});
+  return sample(texture, u, v, {uv.of_step(footprint.a), uv.of_step(footprint.b)}, filter);
 }
 
 // Of what sample() gives of a texture that is nothing but alpha.
@@ -76,7 +87,7 @@ MappedNormal mapped_normal(const StandardParameters& parameters,
   const Texture* map = texture_at(scene, parameters.normal_texture);
   if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return {hit.normal};
   const auto in_tangents = [&](const UvFootprint& over) {
-    const auto texel = sample(*map, hit.u, hit.v, over, filter);
+    const auto texel = sample_at(*map, parameters.normal_uv, hit, over, filter);
     return Vec3f{2 * texel[0] - 1, 2 * texel[1] - 1, 2 * texel[2] - 1};
   };
   const Vec3f mean = in_tangents(footprint);
@@ -125,6 +136,14 @@ StandardParameters standard_parameters(const Material& material,
         parameters.alpha_texture})
     if (index < -1 || (index >= 0 && static_cast<std::size_t>(index) >= texture_count))
       refuse("it names texture " + std::to_string(index) + " of " + std::to_string(texture_count));
+  for (const UvTransform& uv :
+       {parameters.base_color_uv, parameters.metallic_roughness_uv, parameters.normal_uv,
+        parameters.clearcoat_uv, parameters.transmission_uv, parameters.emission_uv,
+        parameters.clearcoat_roughness_uv, parameters.alpha_uv}) {
+    const auto finite = [](float x) { return std::isfinite(x); };
+    if (!std::ranges::all_of(uv.u, finite) || !std::ranges::all_of(uv.v, finite))
+      refuse("a place of its textures is not finite");
+  }
   const std::int32_t video = parameters.emission_video;
   if (video < -1 || (video >= 0 && static_cast<std::size_t>(video) >= video_count))
     refuse("it names video " + std::to_string(video) + " of " + std::to_string(video_count));
@@ -144,38 +163,42 @@ StandardSurface standard_surface(const StandardParameters& parameters,
                                  const Spread& footprint,
                                  TextureFilter filter) {
   const UvFootprint area{uv_of_step(hit, footprint.a), uv_of_step(hit, footprint.b)};
-  const auto look_up = [&](std::int32_t index) -> std::array<float, 4> {
+  const auto look_up = [&](std::int32_t index, const UvTransform& uv) -> std::array<float, 4> {
     const Texture* texture = texture_at(scene, index);
     return texture == nullptr ? std::array<float, 4>{1, 1, 1, 1}
-                              : sample(*texture, hit.u, hit.v, area, filter);
+                              : sample_at(*texture, uv, hit, area, filter);
   };
   const auto alpha_of = [&](std::int32_t index) {
-    return look_up(index)[alpha_channel(*texture_at(scene, index))];
+    return look_up(index, parameters.alpha_uv)[alpha_channel(*texture_at(scene, index))];
   };
   StandardSurface surface;
-  const auto base = look_up(parameters.base_color_texture);
+  const auto base = look_up(parameters.base_color_texture, parameters.base_color_uv);
   surface.base = {unit(parameters.base_color[0] * base[0]),
                   unit(parameters.base_color[1] * base[1]),
                   unit(parameters.base_color[2] * base[2])};
   surface.alpha = parameters.base_color_alpha *
                   (parameters.alpha_texture < 0 ? base[3] : alpha_of(parameters.alpha_texture));
-  const auto metallic_roughness = look_up(parameters.metallic_roughness_texture);
+  const auto metallic_roughness =
+      look_up(parameters.metallic_roughness_texture, parameters.metallic_roughness_uv);
   surface.metallic = unit(parameters.metallic * metallic_roughness[2]);
   surface.roughness = unit(parameters.roughness * metallic_roughness[1]);
   surface.clearcoat = unit(parameters.clearcoat);
-  if (surface.clearcoat > 0) surface.clearcoat *= look_up(parameters.clearcoat_texture)[0];
+  if (surface.clearcoat > 0)
+    surface.clearcoat *= look_up(parameters.clearcoat_texture, parameters.clearcoat_uv)[0];
   surface.clearcoat_roughness = unit(parameters.clearcoat_roughness);
   if (surface.clearcoat > 0) {
-    surface.clearcoat_roughness *= look_up(parameters.clearcoat_roughness_texture)[1];
+    surface.clearcoat_roughness *=
+        look_up(parameters.clearcoat_roughness_texture, parameters.clearcoat_roughness_uv)[1];
   }
   surface.specular = unit(parameters.specular);
   surface.opacity = unit(parameters.opacity);
   surface.transmission = unit(parameters.transmission);
-  if (surface.transmission > 0) surface.transmission *= look_up(parameters.transmission_texture)[0];
+  if (surface.transmission > 0)
+    surface.transmission *= look_up(parameters.transmission_texture, parameters.transmission_uv)[0];
   surface.emission = Vec3f{parameters.emission[0], parameters.emission[1], parameters.emission[2]} *
                      parameters.emission_gain;
   if (surface.emission != Vec3f{}) {
-    const auto emission = look_up(parameters.emission_texture);
+    const auto emission = look_up(parameters.emission_texture, parameters.emission_uv);
     surface.emission = {surface.emission.x * emission[0], surface.emission.y * emission[1],
                         surface.emission.z * emission[2]};
   }
@@ -197,7 +220,9 @@ float standard_alpha(const StandardParameters& parameters,
   const Texture* texture = own ? own : texture_at(scene, parameters.base_color_texture);
   if (texture == nullptr) return parameters.base_color_alpha;
   const std::size_t channel = own ? alpha_channel(*own) : 3;
-  return parameters.base_color_alpha * sample(*texture, hit.u, hit.v, {})[channel];
+  const UvTransform& uv = own ? parameters.alpha_uv : parameters.base_color_uv;
+  return parameters.base_color_alpha *
+         sample_at(*texture, uv, hit, {}, TextureFilter::dense)[channel];
 }
 
 Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random) {

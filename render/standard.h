@@ -28,6 +28,20 @@
 
 namespace render {
 
+// Where a texture is looked up, of a mesh's coordinates (u, v), v down: u' = u[0] u + u[1] v +
+// u[2], and v' as well.
+struct UvTransform {
+  std::array<float, 3> u{1, 0, 0}, v{0, 1, 0};
+  friend bool operator==(const UvTransform&, const UvTransform&) = default;
+  std::array<float, 2> of_place(std::array<float, 2> uv) const {
+    const auto [du, dv] = of_step(uv);
+    return {du + u[2], dv + v[2]};
+  }
+  std::array<float, 2> of_step(std::array<float, 2> uv) const {
+    return {u[0] * uv[0] + u[1] * uv[1], v[0] * uv[0] + v[1] * uv[1]};
+  }
+};
+
 // Parameter block of the shader "standard". Texture indices are into SceneDescription::textures,
 // -1 = none; factors multiply texels as glTF says.
 struct StandardParameters {
@@ -54,6 +68,10 @@ struct StandardParameters {
   std::int32_t clearcoat_roughness_texture = -1;  // green
   // In the place of the base texture's alpha: its alpha if it has one, else red.
   std::int32_t alpha_texture = -1;
+  // Where each of these is looked up; live video is at the mesh's own coordinates. A mesh's
+  // tangents are those of its normal map, as that is looked up.
+  UvTransform base_color_uv, metallic_roughness_uv, normal_uv, clearcoat_uv, transmission_uv,
+      emission_uv, clearcoat_roughness_uv, alpha_uv;
 };
 
 // The block in a material of the shader "standard", and back. Throws std::invalid_argument, naming

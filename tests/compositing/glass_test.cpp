@@ -212,7 +212,7 @@ TEST(Glass, TintsLightAtEachSurfaceThatItPasses) {
         glass_shot(bodies({render::make_box({-5, -0.05F, -5}, {5, 0.05F, 5})},
                           {{.index = index, .tint = {tint[0], tint[1], tint[2]}}}),
                    [](Vec3f d) { return d.y > 0 ? 1.0F : 3.0F; }, 16, 400, {0, -3, 0});
-    const capture::Image kernel = shot.kernel(), reference = shot.reference(4000);
+    const capture::Image kernel = shot.kernel(), reference = shot.reference(1000);
     for (int c = 0; c < 3; ++c) {
       const double t = tint[static_cast<std::size_t>(c)];
       const double through = t * t * (1 - f) * (1 - f) / (1 - f * f);

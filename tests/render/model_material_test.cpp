@@ -47,7 +47,8 @@ LoadedModel load_glb(const std::string& material, const std::string& samplers = 
   GlbParts parts;
   parts.material = material;
   parts.more = R"(,"extensionsUsed":["KHR_materials_pbrSpecularGlossiness",
-"KHR_materials_transmission","KHR_materials_volume"],
+"KHR_materials_transmission","KHR_materials_volume","KHR_texture_transform",
+"KHR_materials_clearcoat"],
 "images":[{"uri":"a.png"},{"uri":"b.png"},{"uri":"c.png"},{"uri":"d.png"}],
 "textures":[{"source":0)" +
                (samplers.empty() ? ""s : R"(,"sampler":0)") +
@@ -211,6 +212,120 @@ TEST(ModelMaterial, NotesWhatTexturesAskForAndDoNotGet) {
   };
   EXPECT_THAT(notes_of(load_fbx(clamping("1"))), Contains(HasSubstr("clamps at their edges")));
   EXPECT_THAT(notes_of(load_fbx(clamping("0"))), testing::IsEmpty());
+}
+
+// A texture of glTF with members of its KHR_texture_transform.
+std::string placed(int texture, const std::string& transform) {
+  return R"({"index":)" + std::to_string(texture) + R"(,"extensions":{"KHR_texture_transform":{)" +
+         transform + "}}}";
+}
+std::string base_map(const std::string& texture) {
+  return R"("pbrMetallicRoughness":{"baseColorTexture":)" + texture + "}";
+}
+
+TEST(ModelMaterial, GivesEachTextureItsOwnTransform) {
+  // The second is the extension's own example: the lower left quarter, turned by a right angle.
+  const LoadedModel model =
+      load_glb("{" + base_map(R"({"index":0})") + R"(,"normalTexture":)" +
+               placed(1, "\"scale\":[40,20]") + R"(,"emissiveFactor":[1,1,1],"emissiveTexture":)" +
+               placed(2, R"("offset":[0,1],"rotation":1.57079632679,"scale":[0.5,0.5])") + "}");
+  EXPECT_THAT(notes_of(model), testing::IsEmpty());
+  const StandardParameters p = parameters_of(model);
+  EXPECT_EQ(p.base_color_uv, UvTransform{});
+  EXPECT_EQ(p.normal_uv, (UvTransform{{40, 0, 0}, {0, 20, 0}}));
+  const auto is_at = [](std::array<float, 2> place, float u, float v) {
+    EXPECT_NEAR(place[0], u, 1e-6);
+    EXPECT_NEAR(place[1], v, 1e-6);
+  };
+  is_at(p.emission_uv.of_place({0, 0}), 0, 1);
+  is_at(p.emission_uv.of_place({1, 0}), 0, 0.5F);
+  is_at(p.emission_uv.of_place({0, 1}), 0.5F, 1);
+  is_at(p.emission_uv.of_place({1, 1}), 0.5F, 0.5F);
+  const auto& uvs = model.scene.meshes.at(0)->uvs;
+  EXPECT_THAT(uvs, ElementsAre(ElementsAre(0, 0), ElementsAre(1, 0), ElementsAre(0, 1)));
+}
+
+// Turned, and wider one way than the other: first scaled, then turned about the upper left corner.
+TEST(ModelMaterial, TransformsAllMapsOfGltf) {
+  const auto map = [](int k) {
+    return placed(k % 4,
+                  R"("rotation":0.5,"offset":[3,0.25],"scale":[2,)" + std::to_string(k) + "]");
+  };
+  const LoadedModel model = load_glb(
+      R"({"pbrMetallicRoughness":{"baseColorTexture":)" + map(1) +
+      R"(,"metallicRoughnessTexture":)" + map(2) + R"(},"normalTexture":)" + map(3) +
+      R"(,"emissiveFactor":[1,1,1],"emissiveTexture":)" + map(4) +
+      R"(,"extensions":{"KHR_materials_clearcoat":{"clearcoatFactor":1,"clearcoatTexture":)" +
+      map(5) + R"(,"clearcoatRoughnessTexture":)" + map(6) +
+      R"(},"KHR_materials_transmission":{"transmissionFactor":1,"transmissionTexture":)" + map(7) +
+      "}}}");
+  EXPECT_THAT(notes_of(model), testing::IsEmpty());
+  const StandardParameters p = parameters_of(model);
+  const std::vector<UvTransform> found{
+      p.base_color_uv, p.metallic_roughness_uv,  p.normal_uv,      p.emission_uv,
+      p.clearcoat_uv,  p.clearcoat_roughness_uv, p.transmission_uv};
+  const float c = std::cos(0.5F), s = std::sin(0.5F);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto k = static_cast<float>(i + 1);
+    const std::array<float, 6> expected{2 * c, k * s, 3, -2 * s, k * c, 0.25F};
+    for (std::size_t n = 0; n < 3; ++n) {
+      EXPECT_NEAR(found[i].u[n], expected[n], 2e-6) << i;
+      EXPECT_NEAR(found[i].v[n], expected[n + 3], 2e-6) << i;
+    }
+  }
+}
+
+TEST(ModelMaterial, GivesTheMeshATransformThatAllTexturesShare) {
+  const std::string shift = R"("offset":[0.25,0.5],"scale":[2,4])";
+  const LoadedModel model =
+      load_glb("{" + base_map(placed(0, shift)) + R"(,"normalTexture":)" + placed(1, shift) + "}");
+  const StandardParameters p = parameters_of(model);
+  EXPECT_EQ(p.base_color_uv, UvTransform{});
+  EXPECT_EQ(p.normal_uv, UvTransform{});
+  EXPECT_THAT(
+      model.scene.meshes.at(0)->uvs,
+      ElementsAre(ElementsAre(0.25F, 0.5F), ElementsAre(2.25F, 0.5F), ElementsAre(0.25F, 4.5F)));
+}
+
+// The mesh has u along x and v along y, where z looks to the viewer.
+TEST(ModelMaterial, TurnsTheFrameOfNormalMapsWithThem) {
+  const auto tangent = [](const std::string& transform, bool shared) {
+    const std::string base = shared ? placed(0, transform) : R"({"index":0})";
+    const LoadedModel model =
+        load_glb("{" + base_map(base) + R"(,"normalTexture":)" + placed(1, transform) + "}");
+    return model.scene.meshes.at(0)->tangents.at(0);
+  };
+  const auto near = [](float x) { return testing::FloatNear(x, 1e-6F); };
+  for (const bool shared : {false, true}) {
+    EXPECT_THAT(tangent(R"("scale":[3,3])", shared), ElementsAre(near(1), near(0), near(0), -1));
+    EXPECT_THAT(tangent(R"("rotation":1.5707963)", shared),
+                ElementsAre(near(0), near(1), near(0), -1));
+    EXPECT_THAT(tangent(R"("scale":[-2,2])", shared), ElementsAre(near(-1), near(0), near(0), 1));
+    // Of no width: as if it had no transform.
+    if (!shared) {
+      EXPECT_THAT(tangent(R"("scale":[0,2])", shared), ElementsAre(near(1), near(0), near(0), -1));
+    }
+  }
+}
+
+TEST(ModelMaterial, NotesTransformsAndSetsOfCoordinatesThatItDoesNotTake) {
+  const LoadedModel far = load_glb(R"({"name":"m",)" + base_map(R"({"index":0})") +
+                                   R"(,"normalTexture":)" + placed(1, "\"scale\":[1e39,1]") + "}");
+  EXPECT_THAT(notes_of(far), ElementsAre(HasSubstr("the transform of a texture")));
+  EXPECT_EQ(parameters_of(far).normal_uv, UvTransform{});
+  const LoadedModel two = load_glb(R"({"name":"m",)" + base_map(R"({"index":0})") +
+                                   R"(,"normalTexture":{"index":1,"texCoord":1}})");
+  EXPECT_THAT(notes_of(two), ElementsAre(HasSubstr("several sets of coordinates")));
+}
+
+TEST(ModelMaterial, PlacesEachMapOfMaterialLibraries) {
+  const LoadedModel model =
+      load_obj("newmtl m\nKe 1 1 1\nmap_Kd a.png\nmap_Ke -s 2 3 1 -o .5 0 0 b.png\n");
+  const StandardParameters p = parameters_of(model);
+  EXPECT_EQ(p.base_color_uv, UvTransform{});
+  // v runs down here, and up there.
+  EXPECT_EQ(p.emission_uv, (UvTransform{{2, 0, 0.5F}, {0, 3, -2}}));
+  EXPECT_THAT(notes_of(model), testing::IsEmpty());
 }
 
 TEST(ModelMaterial, NotesEveryMapThatIsLeftOut) {

@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <numbers>
 #include <random>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "render/scene.h"
 #include "render/texture.h"
@@ -224,6 +227,13 @@ TEST(StandardParameters, RefuseAVideoThatIsNotThere) {
                std::invalid_argument);
 }
 
+TEST(StandardParameters, RefuseTransformsThatAreNotFinite) {
+  render::StandardParameters p;
+  p.alpha_uv.v[2] = std::nanf("");
+  EXPECT_THROW(render::standard_parameters(render::make_standard_material("leaf", p), 0),
+               std::invalid_argument);
+}
+
 TEST(StandardParameters, RefuseAnotherShaderAWrongSizeAndNaN) {
   render::StandardParameters p;
   auto material = render::make_standard_material("paint", p);
@@ -274,6 +284,58 @@ TEST(StandardSurface, TakesTheCoatsRoughnessTimesTheGreenOfItsMap) {
   parameters.clearcoat_roughness_texture = 1;
   EXPECT_THROW(standard_parameters(render::make_standard_material("paint", parameters), 1),
                std::invalid_argument);
+}
+
+TEST(StandardSurface, LooksEachTextureUpByItsOwnTransform) {
+  Random random(7);
+  std::vector<std::uint8_t> texels(4 * 32 * 32);
+  for (auto& texel : texels) texel = static_cast<std::uint8_t>(255 * random());
+  SceneDescription scene;
+  scene.textures = {
+      std::make_shared<render::Texture>(render::make_texture(32, 32, 4, false, texels))};
+  using P = StandardParameters;
+  const std::vector<std::pair<std::int32_t P::*, render::UvTransform P::*>> maps{
+      {&P::base_color_texture, &P::base_color_uv},
+      {&P::metallic_roughness_texture, &P::metallic_roughness_uv},
+      {&P::normal_texture, &P::normal_uv},
+      {&P::clearcoat_texture, &P::clearcoat_uv},
+      {&P::transmission_texture, &P::transmission_uv},
+      {&P::emission_texture, &P::emission_uv},
+      {&P::clearcoat_roughness_texture, &P::clearcoat_roughness_uv},
+      {&P::alpha_texture, &P::alpha_uv}};
+  const auto all_of = [](const StandardSurface& s) {
+    return std::array{s.base.x,     s.metallic, s.roughness,           s.clearcoat,
+                      s.normal.x,   s.normal.y, s.clearcoat_roughness, s.transmission,
+                      s.emission.x, s.alpha};
+  };
+  for (int trial = 0; trial < 200; ++trial) {
+    const auto turn = [&] { return 8 * random() - 4; };
+    const render::UvTransform uv{{turn(), turn(), random()}, {turn(), turn(), random()}};
+    HitPoint hit = hit_at(random());
+    hit.v = random();
+    HitPoint there = hit;  // where the mesh's coordinates are those of the transform
+    there.u = uv.u[0] * hit.u + uv.u[1] * hit.v + uv.u[2];
+    there.v = uv.v[0] * hit.u + uv.v[1] * hit.v + uv.v[2];
+    there.u_slope = hit.u_slope * uv.u[0] + hit.v_slope * uv.u[1];
+    there.v_slope = hit.u_slope * uv.v[0] + hit.v_slope * uv.v[1];
+    const float wide = trial % 2 == 0 ? 0 : 0.05F;
+    const render::Spread footprint{{wide, 0.1F * wide, 0}, {0, wide * random(), 0}};
+    for (const auto& [texture, place] : maps) {
+      P p;
+      p.metallic = p.roughness = p.clearcoat = p.clearcoat_roughness = p.transmission = 1;
+      p.emission[0] = 1;
+      p.*texture = 0;
+      const auto expected = all_of(standard_surface(p, scene, there, footprint));
+      const float expected_alpha = standard_alpha(p, scene, there);
+      p.*place = uv;
+      const auto found = all_of(standard_surface(p, scene, hit, footprint));
+      // Of wide ones the number of look-ups may go by rounding.
+      for (std::size_t k = 0; k < found.size(); ++k) {
+        EXPECT_NEAR(found[k], expected[k], wide > 0 ? 0.03 : 2e-4) << trial << " " << k;
+      }
+      EXPECT_NEAR(standard_alpha(p, scene, hit), expected_alpha, 2e-4);
+    }
+  }
 }
 
 TEST(StandardSurface, IsRougherTheMoreNormalsAFootprintHolds) {
