@@ -5,9 +5,15 @@
 #include <vector>
 
 #include "capture/png.h"
-#include "compositing/display.h"
 
 namespace studio {
+
+compositing::DisplaySettings display_settings(const Set& set) {
+  compositing::DisplaySettings settings;
+  if (!set.display.display.empty()) settings.display = set.display.display;
+  if (!set.display.view.empty()) settings.view = set.display.view;
+  return settings;
+}
 
 void write_display_png(const std::string& path, const capture::Image& rgba) {
   const compositing::Display display;

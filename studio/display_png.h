@@ -4,8 +4,13 @@
 #include <string>
 
 #include "capture/image.h"
+#include "compositing/display.h"
+#include "studio/set.h"
 
 namespace studio {
+
+// Of a set's [display].
+compositing::DisplaySettings display_settings(const Set& set);
 
 // `rgba` (scene-linear, 4 channels) through the display transform. Throws std::runtime_error if the
 // file cannot be written.

@@ -89,6 +89,7 @@ class FrameMaker {
 
   const Set& set() const { return set_; }
   capture::Rational rate() const { return rate_; }
+  const SetScene& set_scene() const { return set_scene_; }
   const Source& plate() const { return *plate_; }
   // Whether the plate is a single picture, so that frames never end by themselves.
   bool is_endless() const;

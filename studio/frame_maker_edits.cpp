@@ -145,19 +145,13 @@ void FrameMaker::tell_failure(const VideoChange& change, const std::string& why)
 
 void FrameMaker::apply(const Move& move) {
   const auto& [name, pose] = move;
-  const auto index_of = [&](std::string_view wanted) {
-    const auto found = std::ranges::find(set_.objects, wanted, &ObjectSettings::name);
-    return static_cast<std::size_t>(found - set_.objects.begin());
-  };
-  const std::size_t slash = name.find('/');
-  if (const std::size_t whole = index_of(name); whole < set_.objects.size()) {
-    set_.objects[whole].pose = pose;
-    place_object(set_, whole, set_scene_);
-  } else if (const std::size_t of_part = index_of(std::string_view(name).substr(0, slash));
-             slash != std::string::npos && of_part < set_.objects.size()) {
-    move_parts(set_, of_part, std::string_view(name).substr(slash + 1), pose, set_scene_);
+  const std::optional<NamedParts> named = parts_named(set_, name);
+  if (!named) throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
+  if (named->part) {
+    move_parts(set_, named->object, *named->part, pose, set_scene_);
   } else {
-    throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
+    set_.objects[named->object].pose = pose;
+    place_object(set_, named->object, set_scene_);
   }
   videos_->place(set_, set_scene_);
   renew_scene(scene_->pictures());
@@ -252,14 +246,7 @@ std::optional<FrameMaker::Moment> FrameMaker::moment() const {
 }
 
 void FrameMaker::check_change(const Set& set) const {
-  const bool same_picture = set.show.width == set_.show.width &&
-                            set.show.height == set_.show.height && set.show.fps == set_.show.fps;
-  if (!same_picture) {
-    throw std::invalid_argument("the picture's size and rate cannot change on air: start anew");
-  }
-  if (!same_plate(set, set_)) {
-    throw std::invalid_argument("the plate's source cannot change on air: start anew");
-  }
+  require_same_plate(set_, set);
   if (file_times({set.camera.response}) != response_times_) {
     throw std::invalid_argument("the plate's response " + set.camera.response +
                                 " was written anew, and cannot change on air: start anew");

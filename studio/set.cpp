@@ -106,6 +106,8 @@ void check_timecode(Section& section, const RecordSettings& record, const ShowSe
   section.fault("timecode", fmt::format("cannot be: {}", why));
 }
 
+}  // namespace
+
 RecordSettings read_record_section(Section section,
                                    const std::filesystem::path& base,
                                    const ShowSettings& show) {
@@ -135,8 +137,6 @@ RecordSettings read_record_section(Section section,
   return record;
 }
 
-}  // namespace
-
 void read_fps(Section& section, std::optional<capture::Rational>& fps) {
   const TomlValue* value = section.value("fps");
   if (value == nullptr) return;
@@ -157,8 +157,7 @@ void read_fps(Section& section, std::optional<capture::Rational>& fps) {
 SetError::SetError(std::vector<Diagnostic> diagnostics)
     : std::runtime_error(lines_of(diagnostics)), diagnostics_(std::move(diagnostics)) {}
 
-render::Effort read_effort_section(Section section) {
-  render::Effort effort;
+render::Effort read_effort_section(Section section, render::Effort effort) {
   section.integer("aa_samples", effort.aa_samples, 1, render::samples_max);
   section.number("aa_tolerance", effort.aa_tolerance, {0, 1000});
   section.number("glint_contrast", effort.glint_contrast, {0, 1000});

@@ -15,20 +15,6 @@ constexpr Range metres{-farthest_m, farthest_m};
 constexpr Range size_range{1e-6, farthest_m};
 constexpr Range share{0, 1};
 
-PlacementSettings read_placement(Section table) {
-  PlacementSettings placement;
-  table.vector("position", placement.position, metres);
-  double tilt_deg = 0;
-  double yaw_deg = 0;
-  table.number("tilt", tilt_deg, {-360, 360});
-  table.number("yaw", yaw_deg, {-3600, 3600});
-  placement.tilt_rad = tilt_deg * degree;
-  placement.yaw_rad = yaw_deg * degree;
-  table.number("scale", placement.scale, size_range);
-  table.finish();
-  return placement;
-}
-
 void read_copies(Section& section, ObjectSettings& object) {
   std::array<int, 2> copies{};
   if (section.integers("copies", copies, 1, most_instances)) {
@@ -98,6 +84,16 @@ bool holds(const std::vector<std::string>& words, std::string_view word) {
 }
 
 }  // namespace
+
+PlacementSettings read_placement(Section table, PlacementSettings placement) {
+  table.vector("position", placement.position, metres);
+  double angle_deg = 0;
+  if (table.number("tilt", angle_deg, {-360, 360})) placement.tilt_rad = angle_deg * degree;
+  if (table.number("yaw", angle_deg, {-3600, 3600})) placement.yaw_rad = angle_deg * degree;
+  table.number("scale", placement.scale, size_range);
+  table.finish();
+  return placement;
+}
 
 ObjectSettings read_object_section(Section section, const SetContext& context) {
   ObjectSettings object;

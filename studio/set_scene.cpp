@@ -284,6 +284,20 @@ void place_copies(SetScene& scene,
 
 }  // namespace
 
+std::optional<NamedParts> parts_named(const Set& set, std::string_view name) {
+  const auto index_of = [&](std::string_view wanted) -> std::optional<std::size_t> {
+    const auto found = std::ranges::find(set.objects, wanted, &ObjectSettings::name);
+    if (wanted.empty() || found == set.objects.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - set.objects.begin());
+  };
+  if (const auto whole = index_of(name)) return NamedParts{*whole};
+  const std::size_t slash = name.find('/');
+  if (slash == std::string_view::npos) return std::nullopt;
+  const auto object = index_of(name.substr(0, slash));
+  if (!object) return std::nullopt;
+  return NamedParts{*object, std::string(name.substr(slash + 1))};
+}
+
 render::LoadOptions load_options(const ObjectSettings& object) {
   render::LoadOptions options;
   options.hide = object.hide;
@@ -406,27 +420,33 @@ void place_object(const Set& set, std::size_t object, SetScene& scene) {
   }
 }
 
+void require_part(const Set& set,
+                  std::size_t object,
+                  std::string_view part,
+                  const SetScene& scene) {
+  std::string names;
+  for (const ObjectPart& candidate : scene.parts) {
+    if (candidate.object != object) continue;
+    if (candidate.name.starts_with(part)) return;
+    if (candidate.copy == std::array{0, 0}) names += (names.empty() ? "" : ", ") + candidate.name;
+  }
+  throw std::invalid_argument(fmt::format("object \"{}\" has no part \"{}...\"; it has: {}",
+                                          set.objects[object].name, part, names));
+}
+
 void move_parts(const Set& set,
                 std::size_t object,
                 std::string_view part,
                 const PlacementSettings& by,
                 SetScene& scene) {
-  bool found = false;
-  std::string names;
+  require_part(set, object, part, scene);
   for (std::size_t i = 0; i < scene.parts.size(); ++i) {
     ObjectPart& candidate = scene.parts[i];
-    if (candidate.object != object) continue;
-    if (candidate.copy == std::array{0, 0}) names += (names.empty() ? "" : ", ") + candidate.name;
-    if (!candidate.name.starts_with(part)) continue;
-    found = true;
+    if (candidate.object != object || !candidate.name.starts_with(part)) continue;
     candidate.moved = by;
     Instance& instance = scene.description.instances[i];
     instance.set_from_object = set_from_part(set.objects[object], candidate);
     instance.moves = true;
-  }
-  if (!found) {
-    throw std::invalid_argument(fmt::format("object \"{}\" has no part \"{}...\"; it has: {}",
-                                            set.objects[object].name, part, names));
   }
 }
 

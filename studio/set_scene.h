@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -47,6 +48,14 @@ struct SetScene {
 // What people call an object, or else its number, from 1.
 std::string name_of(const ObjectSettings& object, std::size_t number);
 
+// What "OBJECT" or "OBJECT/PART" names.
+struct NamedParts {
+  std::size_t object = 0;             // of the set
+  std::optional<std::string> part{};  // what the names of its parts begin with; nothing = all of it
+};
+// An object whose name has a slash comes before a part. Nothing if the set has no such object.
+std::optional<NamedParts> parts_named(const Set& set, std::string_view name);
+
 // How its model's files are to be read.
 render::LoadOptions load_options(const ObjectSettings& object);
 
@@ -72,8 +81,11 @@ std::vector<ModelReport> check_models(const Set& set);
 // nothing.
 void place_object(const Set& set, std::size_t object, SetScene& scene);
 
+// Throws std::invalid_argument, listing the object's parts, if the name of none begins with `part`.
+void require_part(const Set& set, std::size_t object, std::string_view part, const SetScene& scene);
+
 // Moves the parts of an object whose names begin with `part` from where the model has them. Throws
-// std::invalid_argument, listing the parts, if there is none.
+// as require_part.
 void move_parts(const Set& set,
                 std::size_t object,
                 std::string_view part,

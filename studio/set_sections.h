@@ -53,7 +53,13 @@ PersonSettings read_billboard_section(Section section, const SetContext& context
 void refuse_same_names(const std::vector<PersonSettings>& persons, Faults& faults);
 // Names those that have none, with faults for names that there are twice.
 void name_videos(std::vector<VideoSettings>& videos, Faults& faults);
-render::Effort read_effort_section(Section section);
+// What the section leaves out stays as in `effort`.
+render::Effort read_effort_section(Section section, render::Effort effort = {});
+RecordSettings read_record_section(Section section,
+                                   const std::filesystem::path& base,
+                                   const ShowSettings& show);
+// The same of a place: `pose` of an object.
+PlacementSettings read_placement(Section table, PlacementSettings placement = {});
 
 // The lens of a section: `lens` as a file's name or a table, or `model` and its values beside the
 // section's other keys. `size` is that of the whole source picture, {0, 0} if unknown. Nothing if

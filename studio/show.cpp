@@ -19,9 +19,11 @@
 #include "compositing/display.h"
 #include "compositing/exr_sequence.h"
 #include "render/kept_transport.h"
+#include "studio/display_png.h"
 #include "studio/handover.h"
 #include "studio/notes.h"
 #include "studio/recording.h"
+#include "studio/script.h"
 #include "studio/set_files.h"
 #include "studio/sharpening.h"
 #include "studio/tally.h"
@@ -42,13 +44,6 @@ struct Overloaded : Handlers... {
 
 // What the recording is to do from a frame on.
 using RecorderCommand = std::variant<StartRecording, StopRecording>;
-
-compositing::DisplaySettings display_settings(const Set& set) {
-  compositing::DisplaySettings settings;
-  if (!set.display.display.empty()) settings.display = set.display.display;
-  if (!set.display.view.empty()) settings.view = set.display.view;
-  return settings;
-}
 
 // Throws SetError at `place` for what goes wrong in `make`.
 template <class Make>
@@ -96,7 +91,11 @@ class Show::Stages {
       sharpening_.emplace(maker_.rate(), options_.live);
     }
     frames_ = options.frames ? options.frames : s.show.frames;
-    if (!frames_ && !options_.live && maker_.is_endless()) frames_ = 1;
+    check_script(options.script, s, maker_.set_scene(), recording_);
+    hold_apart(options.script, maker_);
+    if (!frames_ && !options_.live && maker_.is_endless()) {
+      frames_ = std::max<std::int64_t>(end_of(options.script).value_or(0) - options.first, 1);
+    }
     planned_frames_ = frames_ ? frames_ : frames_of_plate();
     if (options.record && !s.record.is_empty()) {
       at_place(s, s.record.place, [&] {
@@ -180,8 +179,9 @@ class Show::Stages {
     std::int64_t dropped = 0;
     for (std::int64_t number = options_.first; !frames_ || made < *frames_; ++number, ++made) {
       Work work;
-      if (!apply_commands(work)) return;
+      if (!apply_script(number, work) || !apply_commands(work)) return;
       const FrameMaker::Due due = next_due(number, start + paused_for_);
+      if (!apply_script(due.frame, work)) return;  // where frames were left out
       dropped += due.frame - number;
       number = due.frame;
       const Clock::time_point begin = Clock::now();
@@ -245,6 +245,16 @@ class Show::Stages {
     return number;
   }
 
+  // What the script has up to a frame. False on Quit.
+  bool apply_script(std::int64_t frame, Work& work) {
+    std::vector<ScriptedCommand>& commands = options_.script.commands;
+    for (; scripted_ < commands.size() && commands[scripted_].frame <= frame; ++scripted_) {
+      if (std::holds_alternative<Quit>(commands[scripted_].what)) return false;
+      apply(commands[scripted_].what, work);
+    }
+    return true;
+  }
+
   // Takes what was posted. Waits while paused, and takes over what is on its way when it is there.
   // False on Quit.
   bool apply_commands(Work& work) {
@@ -255,12 +265,14 @@ class Show::Stages {
         if (paused_) {
           const Clock::time_point before = Clock::now();
           const auto any = [&] { return !commands_.empty(); };
-          if (maker_.is_changing()) {
+          if (maker_.is_changing() || pause_ends_) {
             posted_.wait_for(lock, look_again, any);
           } else {
             posted_.wait(lock, any);
           }
-          paused_for_ += Clock::now() - before;
+          const Clock::time_point now = Clock::now();
+          paused_for_ += now - before;
+          if (pause_ends_ && now >= *pause_ends_) pause(false);
         }
         commands = std::exchange(commands_, {});
       }
@@ -276,6 +288,12 @@ class Show::Stages {
       if (!paused_) return true;
       publish_pause();
     }
+  }
+
+  void pause(bool paused, std::optional<std::chrono::milliseconds> lasting = {}) {
+    paused_ = paused;
+    pause_ends_.reset();
+    if (paused && lasting) pause_ends_ = Clock::now() + *lasting;
   }
 
   // A live show goes on while models are read and videos opened; in others frames depend on no
@@ -308,7 +326,7 @@ class Show::Stages {
                      [&](const MoveObject& c) { maker_.move_object(c.name, c.pose); },
                      [&](const SetView& c) { view_ = c.view; },
                      [&](const SetVideo& c) { change_video(c); },
-                     [&](const SetPaused& c) { paused_ = c.paused; },
+                     [&](const SetPaused& c) { pause(c.paused, c.lasting); },
                      [&](ChangeSet& c) { change_set(std::move(c.set)); }, [](const Quit&) {}},
           command);
     });
@@ -523,7 +541,9 @@ class Show::Stages {
   // Of the thread that makes inputs, once it runs.
   FrameMaker maker_;
   std::optional<render::RayView> view_;
+  std::size_t scripted_ = 0;  // commands of the script that were taken
   Clock::duration paused_for_{};
+  std::optional<Clock::time_point> pause_ends_;
 
   // Of the caller's thread.
   std::shared_ptr<const compositing::Display> display_;

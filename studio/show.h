@@ -47,6 +47,7 @@ struct SetVideo {
 };
 struct SetPaused {
   bool paused = false;
+  std::optional<std::chrono::milliseconds> lasting{};  // nothing = until the next such command
 };
 struct ChangeSet {
   Set set;
@@ -61,6 +62,18 @@ using ShowCommand = std::variant<SetEffort,
                                  SetPaused,
                                  ChangeSet,
                                  Quit>;
+
+// A command that holds from a frame on, whatever the timing: that frame shows it, or the first one
+// after it where that is left out.
+struct ScriptedCommand {
+  std::int64_t frame = 0;
+  ShowCommand what;
+  Place place;
+};
+struct Script {
+  std::string path;                       // of the file that it is from (script.h)
+  std::vector<ScriptedCommand> commands;  // by frame
+};
 
 // How the show stands after a frame, or after commands of one that is paused.
 struct ShowStatus {
@@ -118,6 +131,7 @@ struct ShowOptions {
   std::optional<std::int64_t> frames;     // show at most so many; nothing = as the set says
   std::optional<capture::Rational> rate;  // in place of the set's
   bool record = true;                     // as the set says, from the first frame on
+  Script script;  // before what is posted; without `frames`, shows of a still end with it
   // Of a live show of files: what it is held up for longer is no time of it, and left out is
   // nothing then. Else sources that are read more slowly than time goes by would be later in each
   // frame.
@@ -132,7 +146,8 @@ void check_show(const Set& set);
 // the caller's and oneTBB's. When not live, the frames are the same bits whatever the timing.
 class Show {
  public:
-  // Throws SetError as FrameMaker, also for what cannot be displayed or recorded.
+  // Throws SetError as FrameMaker, also for what cannot be displayed or recorded, and as
+  // check_script.
   explicit Show(Set set, ShowOptions options = {});
   Show(const Show&) = delete;
   Show& operator=(const Show&) = delete;

@@ -70,6 +70,16 @@ bool same_plate(const Set& a, const Set& b) {
          a.camera.response == b.camera.response && a.camera.loop == b.camera.loop;
 }
 
+void require_same_plate(const Set& before, const Set& after) {
+  const ShowSettings &a = before.show, &b = after.show;
+  if (a.width != b.width || a.height != b.height || a.fps != b.fps) {
+    throw std::invalid_argument("the picture's size and rate cannot change on air: start anew");
+  }
+  if (!same_plate(before, after)) {
+    throw std::invalid_argument("the plate's source cannot change on air: start anew");
+  }
+}
+
 calibrate::Lens lens_of(const Set& set) {
   if (set.camera.lens.width > 0) return set.camera.lens;
   // A set without objects needs no lens; the kernel wants directions all the same.

@@ -19,6 +19,9 @@ namespace studio {
 std::unique_ptr<Source> open_plate(const Set& set);
 // Whether a plate that is open serves another set as well.
 bool same_plate(const Set& a, const Set& b);
+// Throws std::invalid_argument if a show of `before` cannot change to `after` on air, since its
+// picture or plate would be another.
+void require_same_plate(const Set& before, const Set& after);
 
 // Of the show's picture; a set without objects needs none, and has a pinhole.
 calibrate::Lens lens_of(const Set& set);

@@ -6,8 +6,10 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <fmt/format.h>
@@ -20,6 +22,7 @@
 #include "studio/figures.h"
 #include "studio/notes.h"
 #include "studio/picture_error.h"
+#include "studio/script.h"
 #include "studio/set_files.h"
 #include "studio/set_watch.h"
 #include "studio/show.h"
@@ -41,6 +44,7 @@ struct RunOptions {
   std::string key;
   std::string view;
   std::string view_png;
+  std::string script;
 };
 
 std::string absolute(const std::string& path) { return std::filesystem::absolute(path).string(); }
@@ -168,7 +172,17 @@ std::vector<const char*> changed_at_start(const Set& on_air, const Set& changed)
   return sections;
 }
 
-void report_end(const ShowStatus& status, const Set& set, Console& console) {
+// What the show recorded to last.
+const RecordSettings& last_record(const Set& set, const Script& script, const ShowStatus& status) {
+  const RecordSettings* last = &set.record;
+  for (const ScriptedCommand& command : script.commands) {
+    const auto* start = std::get_if<StartRecording>(&command.what);
+    if (start != nullptr && command.frame <= status.frame) last = &start->record;
+  }
+  return *last;
+}
+
+void report_end(const ShowStatus& status, const RecordSettings& record, Console& console) {
   console.say(
       fmt::format("{} frames at {:.2f} fps, {} dropped, {} lost in the plate; frame time "
                   "{:.1f} ms (p99 {:.1f}), delay {:.1f} frames",
@@ -191,19 +205,58 @@ void report_end(const ShowStatus& status, const Set& set, Console& console) {
         status.probe.frames, status.probe.lost, status.probe.rejected, status.kept_light_frames));
   }
   if (!status.match.note.empty()) console.say(status.match.note);
-  if (!set.record.file.empty()) {
-    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, set.record.file));
+  if (!record.file.empty()) {
+    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, record.file));
   }
-  if (!set.record.exr.empty()) {
-    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, set.record.exr));
+  if (!record.exr.empty()) {
+    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, record.exr));
   }
-  if (!set.record.fill.empty()) {
+  if (!record.fill.empty()) {
     console.say(fmt::format("recorded {} frames of fill to {} and of key to {}",
-                            status.recorder.written, set.record.fill, set.record.key));
+                            status.recorder.written, record.fill, record.key));
   }
   if (status.recorder.dropped > 0) {
     console.warn(fmt::format("{} frames are not in the recording", status.recorder.dropped));
   }
+}
+
+// Throws if what this run writes is something that its show, or a set of its script, is made from
+// or records to.
+void spare_all(const Set& set, const Script& script, const std::string& written) {
+  spare_sources(set, written);
+  spare_take(set.record, written);
+  const ReadFile file{"the script", script.path};
+  if (!script.path.empty()) spare_files(std::span(&file, 1), written);
+  for (const ScriptedCommand& command : script.commands) {
+    if (const auto* start = std::get_if<StartRecording>(&command.what)) {
+      spare_take(start->record, written);
+    } else if (const auto* change = std::get_if<ChangeSet>(&command.what)) {
+      spare_sources(change->set, written);
+    }
+  }
+}
+
+// Of what a script's sets change.
+void warn_of_sections(const Set& set, const Script& script, Console& console) {
+  for (const ScriptedCommand& command : script.commands) {
+    const auto* change = std::get_if<ChangeSet>(&command.what);
+    if (change == nullptr) continue;
+    for (const char* section : changed_at_start(set, change->set)) {
+      console.warn(fmt::format("{}:{}:{}: [{}] of {} does not count: it is the first set's",
+                               script.path, command.place.line, command.place.column, section,
+                               change->set.path));
+    }
+  }
+}
+
+void warn_of_rest(const Script& script, const ShowStatus& status, Console& console) {
+  const auto rest = std::ranges::find_if(script.commands, [&](const ScriptedCommand& command) {
+    return command.frame > status.frame && !std::holds_alternative<Quit>(command.what);
+  });
+  if (rest == script.commands.end()) return;
+  console.warn(
+      fmt::format("{}:{}:{}: frame {} was not reached, and nothing of the script from then on",
+                  script.path, rest->place.line, rest->place.column, rest->frame));
 }
 
 // Of a show that an error ended. That one is to be told, even where these cannot be written.
@@ -229,12 +282,21 @@ void run(const RunOptions& options, Console& console) {
   if (!options.view_png.empty() && !options.view_png.ends_with(".png"))
     throw UsageError("--view-png names a .png file");
   if (!options.view_png.empty()) compositing::require_writable(options.view_png);
+  const auto adapt = [&](Set& changed) {
+    apply_options(options, changed);
+    if (options.fps || options.error) changed.effort = effort;
+  };
+  Script& script = show_options.script;
+  if (!options.script.empty()) script = read_script(options.script, set, adapt);
   for (const std::string& written : {options.view_png, console.figures_file()}) {
-    spare_sources(set, written);
-    spare_take(set.record, written);
+    spare_all(set, script, written);
+  }
+  warn_of_sections(set, script, console);
+  if (!options.view.empty()) {
+    script.commands.insert(script.commands.begin(),
+                           {0, SetView{render::ray_view_named(options.view)}, {}});
   }
   Show show(set, show_options);
-  if (!options.view.empty()) show.post(SetView{render::ray_view_named(options.view)});
   const std::optional<std::int64_t> planned = show.planned_frames();
 
   Warnings warnings(console);
@@ -243,8 +305,7 @@ void run(const RunOptions& options, Console& console) {
     watch = std::make_unique<SetWatch>(
         options.set, saved,
         [&](Set changed) {
-          apply_options(options, changed);
-          if (options.fps || options.error) changed.effort = effort;
+          adapt(changed);
           console.say(fmt::format("{} has changed", options.set));
           warnings.tell_again();
           for (const char* section : changed_at_start(set, changed)) {
@@ -276,7 +337,8 @@ void run(const RunOptions& options, Console& console) {
 
   const ShowStatus status = *show.status();
   warnings.tell_rest(status);
-  report_end(status, set, console);
+  warn_of_rest(script, status, console);
+  report_end(status, last_record(set, script, status), console);
   if (status.changing) {
     console.say("the last edit was not on air yet, and is given up");
   }
@@ -315,6 +377,8 @@ Command run_command() {
                          "record what an external keyer adds to the plate to this .mkv file; "
                          "with --key");
         arguments.option("--key", o->key, "record what of the plate it hides to this .mkv file");
+        arguments.option("--script", o->script,
+                         "do what this file says at which frame: moves, effort, takes, ...");
         arguments.flag("--watch", o->watch, "take the set file over whenever it changes");
         arguments.option("--check-error", o->check_error, 2, 1 << 20,
                          "render the reference of the last frame with so many samples and "
