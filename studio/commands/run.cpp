@@ -1,5 +1,6 @@
 // platelight run: puts a set on air.
 #include <algorithm>
+#include <chrono>
 #include <exception>
 #include <filesystem>
 #include <map>
@@ -14,7 +15,6 @@
 
 #include <fmt/format.h>
 
-#include "capture/png.h"
 #include "compositing/output_file.h"
 #include "studio/commands/commands.h"
 #include "studio/commands/interruptible.h"
@@ -22,6 +22,7 @@
 #include "studio/figures.h"
 #include "studio/notes.h"
 #include "studio/picture_error.h"
+#include "studio/picture_file.h"
 #include "studio/script.h"
 #include "studio/set_files.h"
 #include "studio/set_watch.h"
@@ -316,6 +317,13 @@ void run(const RunOptions& options, Console& console) {
         [&](const SetError& error) { console.warn(error.what()); });
   }
 
+  std::unique_ptr<PictureFile> picture;
+  if (!options.view_png.empty()) {
+    picture = std::make_unique<PictureFile>(
+        options.view_png, set.show.width, set.show.height, std::chrono::seconds(1),
+        [&](const std::string& why) { console.warn(why + "; the show goes on"); });
+  }
+
   ShownFrame last;
   try {
     const Interruptible ctrl_c;
@@ -326,6 +334,7 @@ void run(const RunOptions& options, Console& console) {
       // A show that is not live is there for its recording.
       const bool in_vain = !status->recorder.error.empty() && !show.is_live();
       if (ctrl_c.is_interrupted() || in_vain) show.post(Quit{});
+      if (picture) picture->show(shown.view_rgb8 ? shown.view_rgb8 : shown.rgb8);
       last = shown;
     });
   } catch (const std::exception&) {
@@ -342,9 +351,6 @@ void run(const RunOptions& options, Console& console) {
   if (status.changing) {
     console.say("the last edit was not on air yet, and is given up");
   }
-  if (!options.view_png.empty() && last.view_rgb8) {
-    capture::write_png(options.view_png, set.show.width, set.show.height, 3, *last.view_rgb8);
-  }
   std::optional<render::PictureError> error;
   if (options.check_error && last.result) {
     error = error_against(truth_of(last, static_cast<int>(*options.check_error)), last);
@@ -355,6 +361,7 @@ void run(const RunOptions& options, Console& console) {
                     error->reference_noise * 100));
   }
   console.figures(show_figures(set, status, error));
+  if (picture) picture->finish();
   if (!status.recorder.error.empty()) throw std::runtime_error(status.recorder.error);
 }
 
@@ -392,11 +399,9 @@ Command run_command() {
         arguments.choice("--view", o->view, render::ray_view_names(),
                          "show what pixels take, in false colours, in place of the picture; "
                          "what is recorded stays");
-        arguments.option("--view-png", o->view_png, "write the last frame's view to this file");
+        arguments.option("--view-png", o->view_png,
+                         "write what the operator sees to this file, once a second and at the end");
         return [o](Console& console) {
-          if (!o->view_png.empty() && o->view.empty()) {
-            throw UsageError("--view-png: which --view?");
-          }
           if (o->fill.empty() != o->key.empty()) {
             throw UsageError("--fill and --key: only both make a pair");
           }
