@@ -108,7 +108,8 @@ double peak_memory_mb() {
 
 std::string show_figures(const Set& set,
                          const ShowStatus& s,
-                         const std::optional<render::PictureError>& error) {
+                         const std::optional<render::PictureError>& error,
+                         const std::optional<ReferenceFigures>& reference) {
   Json stage_ms;
   for (std::size_t i = 0; i < stages; ++i) {
     stage_ms[std::string(name_of(static_cast<Stage>(i)))] = s.stage_ms[i];
@@ -163,6 +164,9 @@ std::string show_figures(const Set& set,
       json["per_pixel"][render::ray_view_names()[i]] = {{"mean", figures.mean},
                                                         {"max", figures.max}};
     }
+  }
+  if (reference) {
+    json["reference"] = {{"paths", reference->paths}, {"seconds", reference->seconds}};
   }
   if (error) {
     json["error"] = {

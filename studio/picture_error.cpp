@@ -28,6 +28,13 @@ Truth truth_of(const ShownFrame& shown, int samples) {
   });
 }
 
+capture::Image mean_of(const Truth& truth) {
+  capture::Image mean = truth.references[0];
+  std::ranges::transform(mean.pixels, truth.references[1].pixels, mean.pixels.begin(),
+                         [](float a, float b) { return (a + b) / 2; });
+  return mean;
+}
+
 render::PictureError error_against(const Truth& truth, const ShownFrame& shown) {
   return render::picture_error(capture::to_float(shown.result->rgba), truth.references, truth.mask);
 }

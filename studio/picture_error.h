@@ -24,6 +24,9 @@ Truth truth_of(const capture::Image& plate,
 // Takes minutes at high samples.
 Truth truth_of(const ShownFrame& shown, int samples);
 
+// What both together show, (height, width, 4): half the noise of the one, in squares.
+capture::Image mean_of(const Truth& truth);
+
 // The same frame at another effort may be compared as well. The references' noise is reported, and
 // is no part of the error.
 render::PictureError error_against(const Truth& truth, const ShownFrame& shown);
