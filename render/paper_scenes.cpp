@@ -25,11 +25,12 @@ constexpr std::string_view pomi = "Pomi et al., VMV 2003, table 1";
 constexpr std::string_view benthin = "Benthin et al., EGPGV 2002, section 5";
 
 constexpr std::array<PaperFigure, 6> figures{{
-    {"tv_room", pomi, made_tv_room_triangles, 24, 640, 480, 19},
-    {"tv_room_lit", pomi, made_tv_room_triangles, 24, 640, 480, 5.5},
-    {"billboards", pomi, made_stage_triangles, 24, 640, 480, 10},
-    {"glass_sphere", pomi, made_stage_triangles + glass_sphere_triangles, 24, 640, 480, 6.4},
-    {"car", pomi, made_car_triangles, 24, 640, 480, 2.6},
+    {"tv_room", pomi, made_tv_room_triangles, 24, 640, 480, 19, 130, 100, 25},
+    {"tv_room_lit", pomi, made_tv_room_triangles, 24, 640, 480, 5.5, 130, 100, 25},
+    {"billboards", pomi, made_stage_triangles, 24, 640, 480, 10, 220, 420, 25},
+    {"glass_sphere", pomi, made_stage_triangles + glass_sphere_triangles, 24, 640, 480, 6.4, 220,
+     420, 25},
+    {"car", pomi, made_car_triangles, 24, 640, 480, 2.6, 350, 350, 1},
     {"headlight", benthin, made_headlight_triangles, 32, 640, 480, 10},
 }};
 

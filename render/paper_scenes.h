@@ -40,6 +40,9 @@ struct PaperFigure {
   int cpus = 0;
   int width = 0, height = 0;
   double fps = 0;
+  // Of the video that its surfaces show, or that is its environment; all 0 = there is none.
+  int video_width = 0, video_height = 0;
+  double video_fps = 0;
 };
 
 // All of them, in the papers' order: Pomi's table 1, then Benthin's section 5. "tv_room_lit" is

@@ -78,9 +78,25 @@ void write_views(const std::string& path_start,
   }
 }
 
+// The live video of a paper's scene: "130x100 at 25 fps".
+std::string video_of(const render::PaperFigure& paper) {
+  if (paper.video_width == 0) return "none";
+  return fmt::format("{}x{} at {:g} fps", paper.video_width, paper.video_height, paper.video_fps);
+}
+
+// What ours has in its place. Of a video, the bench shows one frame.
+std::string video_of(const BenchScene& shot, const render::PaperFigure* paper) {
+  if (shot.video) return fmt::format("{}x{}", shot.video->width(), shot.video->height());
+  return paper != nullptr && paper->video_width > 0 ? "still picture" : "none";
+}
+
 Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
   const int width = bench.width, height = bench.height;
   const auto [shot, compile_ms] = make_paper_shot(name, width, height);
+  const auto figures = render::paper_figures();
+  const auto found = std::ranges::find(figures, name, &render::PaperFigure::scene);
+  const render::PaperFigure* const theirs = found != figures.end() ? &*found : nullptr;
+  const std::string texture = video_of(shot, theirs);
   render::FrameJob fast = shot.job;
   fast.effort = papers_effort();
   render::FrameJob plain = fast;
@@ -94,6 +110,7 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
   const KeptRate still = measure_kept(shot, shot.job, whole_ms > very_slow_ms ? 1 : bench.runs);
   Json row{{"scene", name},
            {"triangles", triangle_count(shot.scene->description())},
+           {"texture", texture},
            {"width", width},
            {"height", height},
            {"threads", tbb::this_task_arena::max_concurrency()},
@@ -136,19 +153,19 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
     write_display_png(fmt::format("{}/{}.png", bench.pictures, name), picture);
     write_views(fmt::format("{}/{}", bench.pictures, name), shot, fast);
   }
-  const auto figures = render::paper_figures();
-  const auto theirs = std::ranges::find(figures, name, &render::PaperFigure::scene);
-  if (theirs != figures.end()) {
+  if (theirs != nullptr) {
     row["paper"] = {{"source", theirs->source},
                     {"triangles", theirs->triangles},
                     {"cpus", theirs->cpus},
+                    {"texture", video_of(*theirs)},
                     {"fps", theirs->fps}};
   }
   console.say(fmt::format(
-      "{:<13} {:>9} {:>8} {:>10.1f} {:>7} {:>9.1f} {:>7} {:>8.1f} {:>9.2f} M {:>7.0f} %", name,
-      std::size_t{row["triangles"]},
-      theirs != figures.end() ? fmt::format("{:.1f}", theirs->fps) : "-", double{row["fps"]},
-      rough_error, double{row["fps_default"]}, whole_error, double{row["fps_still"]},
+      "{:<13} {:>9}  {:<17} {:<13} {:>8} {:>10.1f} {:>7} {:>9.1f} {:>7} {:>8.1f} {:>9.2f} M "
+      "{:>7.0f} %",
+      name, std::size_t{row["triangles"]}, theirs != nullptr ? video_of(*theirs) : "-", texture,
+      theirs != nullptr ? fmt::format("{:.1f}", theirs->fps) : "-", double{row["fps"]}, rough_error,
+      double{row["fps_default"]}, whole_error, double{row["fps_still"]},
       1e-6 * static_cast<double>(moving.rays), 100 * share.bare_ms / share.kernel_ms));
   return row;
 }
@@ -158,12 +175,13 @@ Json row_of(std::string_view name, const PapersBench& bench, Console& console) {
 void bench_papers(const PapersBench& bench, Console& console) {
   if (!bench.scene.empty()) render::made_paper_scene(bench.scene);  // throws for another name
   if (!bench.pictures.empty()) std::filesystem::create_directories(bench.pictures);
+  console.say(fmt::format("{:23}  {:<31} {:>8} {:>10} {:>7} {:>9} {:>7} {:>8} {:>11} {:>9}", "",
+                          "texture", "paper", "1 ray a", "error", "default", "error", "still",
+                          "rays", "share of"));
   console.say(
-      "              triangles    paper   1 ray a    error   default   error    still       rays   "
-      "share of");
-  console.say(
-      "                             fps  pixel, fps          moving            fps      "
-      "           Embree");
+      fmt::format("{:<13} {:>9}  {:<17} {:<13} {:>8} {:>10} {:>7} {:>9} {:>7} {:>8} {:>11} {:>9}",
+                  "scene", "triangles", "paper's", "ours", "fps", "pixel, fps", "", "fps", "",
+                  "fps", "moving", "Embree"));
   Json rows = Json::array();
   for (const std::string_view name : render::paper_scene_names()) {
     if (!bench.scene.empty() && name != bench.scene) continue;

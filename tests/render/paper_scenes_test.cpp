@@ -95,6 +95,15 @@ void expect_view_and_light(const PaperScene& scene) {
                           mask_virtual, RayKind::camera));
 }
 
+TEST(PaperFigures, TellTheVideosThatPomisTableHas) {
+  for (const PaperFigure& figure : paper_figures()) {
+    const bool has_video = figure.scene != "headlight";
+    EXPECT_EQ(figure.video_width > 0, has_video) << figure.scene;
+    EXPECT_EQ(figure.video_height > 0, has_video) << figure.scene;
+    EXPECT_EQ(figure.video_fps, !has_video ? 0 : figure.scene == "car" ? 1 : 25) << figure.scene;
+  }
+}
+
 class PaperScenes : public testing::TestWithParam<std::string_view> {
  protected:
   const PaperScene& scene() const { return made(std::string(GetParam())); }
