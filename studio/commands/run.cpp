@@ -8,6 +8,7 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -275,6 +276,7 @@ void run(const RunOptions& options, Console& console) {
   const auto saved = std::filesystem::last_write_time(options.set, unreadable);
   Set set = read_set(options.set);
   apply_options(options, set);
+  render::Effort of_file = set.effort;
   if (options.fps || options.error) choose_effort(options, set, console);
   const render::Effort effort = set.effort;
   ShowOptions show_options;
@@ -283,6 +285,9 @@ void run(const RunOptions& options, Console& console) {
   if (!options.view_png.empty() && !options.view_png.ends_with(".png"))
     throw UsageError("--view-png names a .png file");
   if (!options.view_png.empty()) compositing::require_writable(options.view_png);
+  if (!options.view_png.empty() &&
+      compositing::is_one_file(options.view_png, console.figures_file()))
+    throw UsageError("--view-png and --json name one file");
   const auto adapt = [&](Set& changed) {
     apply_options(options, changed);
     if (options.fps || options.error) changed.effort = effort;
@@ -306,9 +311,12 @@ void run(const RunOptions& options, Console& console) {
     watch = std::make_unique<SetWatch>(
         options.set, saved,
         [&](Set changed) {
+          const render::Effort now = std::exchange(of_file, changed.effort);
           adapt(changed);
           console.say(fmt::format("{} has changed", options.set));
           warnings.tell_again();
+          if ((options.fps || options.error) && of_file != now)
+            console.warn("[effort] does not count: --fps or --error has chosen it");
           for (const char* section : changed_at_start(set, changed)) {
             console.warn(fmt::format("[{}] counts from the next start on", section));
           }
@@ -325,6 +333,7 @@ void run(const RunOptions& options, Console& console) {
   }
 
   ShownFrame last;
+  bool was_interrupted = false;
   try {
     const Interruptible ctrl_c;
     show.run([&](const ShownFrame& shown) {
@@ -337,6 +346,7 @@ void run(const RunOptions& options, Console& console) {
       if (picture) picture->show(shown.view_rgb8 ? shown.view_rgb8 : shown.rgb8);
       last = shown;
     });
+    was_interrupted = ctrl_c.is_interrupted();
   } catch (const std::exception&) {
     warnings.tell_rest(*show.status());
     write_figures_so_far(set, *show.status(), console);
@@ -361,6 +371,8 @@ void run(const RunOptions& options, Console& console) {
                     error->reference_noise * 100));
   }
   console.figures(show_figures(set, status, error));
+  if (status.frames == 0 && !was_interrupted && options.script.empty())
+    throw std::runtime_error(set.path + ": the show ended before its first picture");
   if (picture) picture->finish();
   if (!status.recorder.error.empty()) throw std::runtime_error(status.recorder.error);
 }

@@ -550,6 +550,10 @@ TEST_F(Runs, ShowWhatPixelsTookInPlaceOfThePicture) {
   const Outcome other = run("run " + set + " --view rays --view-png " + (dir_ / "a.jpg").string());
   EXPECT_EQ(other.status, 2);
   EXPECT_THAT(other.err, HasSubstr("names a .png file"));
+  const std::string both = (dir_ / "both.png").string();
+  const Outcome twice = run("run " + set + " --view-png " + both + " --json " + both);
+  EXPECT_EQ(twice.status, 2) << twice.err;
+  EXPECT_THAT(twice.err, HasSubstr("name one file"));
 }
 
 TEST_F(Runs, ConvertAnHdrPicture) {
