@@ -253,7 +253,7 @@ TEST(Glass, TintsItsShadowTwice) {
   const Vec3f shadow = [] {
     const render::Scene scene(bodies({render::make_box({-1, -1, -1}, {1, 1, 1})},
                                      {{.shadow = {0.5F, 1, 1}, .tint = {0.5F, 0.5F, 0}}}));
-    return transmittance(scene, {0, 0, 5}, {0, 0, -1}, 0, 10, render::mask_virtual);
+    return transmittance(scene, {0.1F, 0.3F, 5}, {0, 0, -1}, 0, 10, render::mask_virtual);
   }();
   EXPECT_NEAR(shadow.x, 0.0625, 1e-6);
   EXPECT_NEAR(shadow.y, 0.25, 1e-6);

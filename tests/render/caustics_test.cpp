@@ -125,7 +125,7 @@ TEST(Caustics, TakeTheTintOfBothSurfaces) {
   const Vec3f light = caustics.at(0, {0, 0, 0}, {0, 0, 1});
   EXPECT_GT(light.x, 1);
   EXPECT_NEAR(light.y, 0.25 * light.x, 1e-3 * light.x);
-  EXPECT_EQ(light.z, 0);
+  EXPECT_LT(light.z, 0.01 * light.x) << "mirrored off it alone";
 }
 
 TEST(Caustics, LetThroughASlabWhatItsSurfacesDo) {
