@@ -112,9 +112,9 @@ constexpr float least_if_clipped = 0.5F;
 // Share of the screen with its colour, but less than a fourth of its light: at most .0014 in the
 // made scenes, .008 to .015 under a shadow of .75.
 constexpr Fall screen_shadowed{0.003F, 0.012F};
-// Noise of the screen's share at a pixel: .02 in "plain", .07 in "noise", .24 under 160 times the
-// variance of "plain".
-constexpr Fall noise_of_share{0.06F, 0.25F};
+// Noise of the screen's share at a pixel: .02 in "plain", .07 in "noise"; .12 under 40 times the
+// variance of "plain", where the error is five times as great.
+constexpr Fall noise_of_share{0.06F, 0.2F};
 // How far the screen is off the plate as lit, as a share of it: .01 in "plain", .04 in "noise"; .14
 // where the screen has 3 % of display white.
 constexpr Fall screen_unlike_plate{0.06F, 0.16F};
@@ -232,6 +232,7 @@ KeyReport Keyer::key_codes(const CodedFrame& frame, const Target& target) {
 // One frame may be shaken; a camera that was pushed stays where it is, also while nothing tells.
 template <class Rows>
 void Keyer::watch(const Rows& rows) {
+  if (looks_moved_ > 0) ++moved_for_;
   if (until_look_-- > 0) return;
   until_look_ = frames_between_looks;
   const PlateShift seen = watch_.look(rows);
@@ -239,6 +240,7 @@ void Keyer::watch(const Rows& rows) {
   shift_ = seen;
   const bool off = shift_.size_px() > shift_still_px + 4 * shift_.sigma_px;
   looks_moved_ = off ? looks_moved_ + 1 : 0;
+  if (looks_moved_ < 2) moved_for_ = looks_moved_;
 }
 
 // Whether pixels may be told to be screen before they are keyed.
@@ -296,6 +298,7 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   report.sight = sight;
   report.shift = shift_;
   report.moved = looks_moved_ > 1;
+  report.moved_for = report.moved ? moved_for_ : 0;
   report.soft = soft;
   const auto lower = [&](float by, KeyStatus status) {
     if (by < 1 && (report.confidence >= 1 || by < report.confidence)) report.status = status;

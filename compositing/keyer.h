@@ -72,8 +72,15 @@ struct KeyReport {
   PlateSight sight;
   PlateShift shift;    // against the plate, as it was known last: looked for in every fourth frame
   bool moved = false;  // the camera, by more than one look
+  int moved_for = 0;   // frames since the look that saw it first, this one counted
   float soft = 0;      // share of pixels that are neither screen nor person
 };
+
+// Whether to look at a key before it is used, by the confidence of a frame or the mean of several:
+// a screen that is at the camera's limit everywhere leaves .5, and a camera that was pushed by 4
+// pixels.
+inline constexpr float sure_from = 0.6F;
+inline bool is_unsure(float confidence) { return confidence < sure_from; }
 
 // Keys the frames of one clip, in order. Not thread-safe; several may run side by side.
 class Keyer {
@@ -135,6 +142,7 @@ class Keyer {
   PlateShift shift_;
   int until_look_ = 0;   // frames
   int looks_moved_ = 0;  // how many in a row have seen the camera elsewhere
+  int moved_for_ = 0;    // frames since the first of them, it counted
   KeySettings settings_;
   KeyMasks masks_;
   KeyDials dials_;

@@ -176,6 +176,8 @@ TEST(PlateWatch, MakesTheKeySayThatTheCameraWasMovedWithinTenFramesAndTakeItBack
   EXPECT_EQ(pushed.status, KeyStatus::moved);
   EXPECT_LT(pushed.confidence, 0.75);
   EXPECT_NEAR(pushed.shift.right_px, 3, 0.3);
+  EXPECT_GE(pushed.moved_for, 7);  // every fourth frame is looked at
+  EXPECT_LE(pushed.moved_for, 10);
   // A shake of one frame is none.
   EXPECT_NE(run(0, 0, 10).status, KeyStatus::moved);
   const KeyReport back = run(-5, -5, 10);
