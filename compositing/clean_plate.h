@@ -35,6 +35,7 @@ struct CleanPlate {
   // Of one frame's pixel: variance = gain * light + floor.
   float noise_gain = 1e-4F;
   float noise_floor = 1e-6F;
+  bool knows_noise = false;  // measured, or told by a file; else it is a good camera's
   float known = 1;  // share of the frame in which the screen itself was seen
 };
 

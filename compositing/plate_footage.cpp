@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -13,6 +14,7 @@
 #include "capture/median.h"
 #include "capture/parallel_loop.h"
 #include "compositing/gap_filler.h"
+#include "compositing/plate_noise.h"
 
 namespace compositing {
 namespace {
@@ -22,7 +24,6 @@ using capture::Image;
 
 constexpr const char* no_frames = "a clean plate is made of at least one frame";
 constexpr std::size_t noise_step = 7;  // every so many values tell noise
-constexpr double clipped = 0.98;       // has none
 // A pixel of which so few frames show the screen is not it: those may be something of its colour.
 constexpr std::size_t least_seen = 10;  // of so many frames, one
 // Mixed with hair or shadowed the screen is darker: the brighter half's middle.
@@ -30,6 +31,7 @@ constexpr double bright_quantile = 0.75;
 constexpr int rows_of_task = 32;
 // An even number.
 constexpr std::size_t most_frames = 96;
+constexpr double least_values = 100;  // of shots, that tell noise
 // How far from its median a pixel of a background that holds still may be: of its light, and more.
 constexpr float still_share = 0.1F, still_least = 4e-3F;
 
@@ -51,6 +53,26 @@ void check_frame(const Image& frame, const Picture* first) {
   }
 }
 
+// Frames that are all the same, as of a video that holds still, tell none.
+void set_noise(const std::optional<PlateNoise>& noise, CleanPlate& plate) {
+  if (!noise) return;
+  plate.noise_gain = noise->gain, plate.noise_floor = noise->floor;
+  plate.knows_noise = noise->gain > 0 || noise->floor > least_noise_floor;
+}
+
+// Codecs take noise away, and errors that they leave hold still: footage never has less than what
+// is taken for it untold.
+void set_footage_noise(std::optional<PlateNoise> noise, CleanPlate& plate) {
+  if (!noise) return;
+  noise->gain = std::max(noise->gain, plate.noise_gain);
+  noise->floor = std::max(noise->floor, plate.noise_floor);
+  set_noise(noise, plate);
+}
+
+bool is_near(float light, float median) {
+  return std::abs(light - median) <= still_share * median + still_least;
+}
+
 }  // namespace
 
 void PlateShots::add(const Image& frame) {
@@ -61,7 +83,7 @@ void PlateShots::add(const Image& frame) {
   steps_.resize(measured), steps_count_.resize(measured);
   for (std::size_t k = 0; k < measured && count_ > 0; ++k) {
     const double a = clean(last_.pixels[k * noise_step]), b = clean(frame.pixels[k * noise_step]);
-    if (a >= clipped || b >= clipped) continue;
+    if (a >= clipped_light || b >= clipped_light) continue;
     steps_[k] += 0.5 * (a - b) * (a - b);
     ++steps_count_[k];
   }
@@ -82,16 +104,11 @@ CleanPlate PlateShots::average() const {
   // noise would make the line flatter.
   Image light = plate.light;
   blur_screen(light);
-  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  NoiseSums sums;
   for (std::size_t k = 0; k < steps_.size(); ++k) {
-    const double x = light.pixels[k * noise_step], y = steps_[k], times = steps_count_[k];
-    n += times, sx += times * x, sy += y, sxx += times * x * x, sxy += x * y;
+    sums.add(light.pixels[k * noise_step], steps_[k], steps_count_[k]);
   }
-  const double spread = n * sxx - sx * sx;
-  if (n < 100 || !(spread > 0)) return plate;
-  const double gain = std::max(0.0, (n * sxy - sx * sy) / spread);
-  plate.noise_gain = static_cast<float>(gain);
-  plate.noise_floor = std::max(least_noise_floor, static_cast<float>((sy - gain * sx) / n));
+  set_noise(sums.line(least_values), plate);
   return plate;
 }
 
@@ -186,6 +203,15 @@ CleanPlate PlateFootage::screen(ScreenColour colour, const ScreenLight& key) con
   }
   plate.known = static_cast<float>(std::accumulate(known.begin(), known.end(), 0.0) /
                                    static_cast<double>(light.pixels.size() / 3));
+  const auto shows = [&](std::size_t, int, const float* row, std::uint8_t* shown) {
+    for (std::size_t x = 0; x < columns; ++x) {
+      shown[x] = is_screen(screen_light({row[3 * x], row[3 * x + 1], row[3 * x + 2]}, colour), key);
+    }
+  };
+  const float reaches = key.first / 2;  // or it is clipped
+  auto noise = noise_of_steps(frames_, shows, reaches);
+  if (!noise) noise = noise_of_grain(frames_, shows, reaches);
+  set_footage_noise(noise, plate);
   return plate;
 }
 
@@ -205,9 +231,7 @@ CleanPlate PlateFootage::background() const {
       for (std::size_t i = 0; i < values; ++i) {
         for (std::size_t f = 0; f < seen.size(); ++f) seen[f] = lights[f * values + i];
         const float median = light.pixels[first + i] = capture::median_in_place(seen);
-        const float near = still_share * median + still_least;
-        const auto alike =
-            std::ranges::count_if(seen, [&](float v) { return std::abs(v - median) <= near; });
+        const auto alike = std::ranges::count_if(seen, [&](float v) { return is_near(v, median); });
         known[static_cast<std::size_t>(y)] += 2 * static_cast<std::size_t>(alike) > seen.size();
       }
     }
@@ -216,6 +240,15 @@ CleanPlate PlateFootage::background() const {
   plate.known = static_cast<float>(
       static_cast<double>(std::accumulate(known.begin(), known.end(), std::size_t{0})) /
       static_cast<double>(light.pixels.size()));
+  const auto shows = [&](std::size_t, int y, const float* row, std::uint8_t* shown) {
+    const std::vector<float> median =
+        smoothed_along(std::span(light.pixels).subspan(light.index(y, 0), values));
+    for (std::size_t x = 0; 3 * x < values; ++x) {
+      shown[x] = is_near(row[3 * x], median[3 * x]) && is_near(row[3 * x + 1], median[3 * x + 1]) &&
+                 is_near(row[3 * x + 2], median[3 * x + 2]);
+    }
+  };
+  set_footage_noise(noise_of_steps(frames_, shows), plate);
   return plate;
 }
 

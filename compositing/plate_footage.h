@@ -43,11 +43,13 @@ class PlateFootage {
 
   // For each pixel the upper quartile of those frames that show the screen there, and where none
   // does, what surrounds it. `known` tells the share that was seen. The colour is the footage's
-  // most saturated large one if not given. Throws std::invalid_argument if there was no frame.
+  // most saturated large one if not given. Noise is measured where the screen is in sight (see
+  // plate_noise.h), of one picture by its grain, and is never less than what is taken for it
+  // untold. Throws std::invalid_argument if there was no frame.
   CleanPlate screen() const;
   CleanPlate screen(ScreenColour colour) const;
-  // The same of any still background: of each pixel the median. `known` tells the share of pixels
-  // in which most frames are near it.
+  // The same of any still background: of each pixel the median; one picture tells no noise. `known`
+  // tells the share of pixels in which most frames are near it.
   CleanPlate background() const;
 
  private:
