@@ -122,11 +122,11 @@ class Operators : public CommandLine {
 
 TEST_F(Operators, SeeTheShowWhileItRuns) {
   const std::string set = write_set(), view = (dir_ / "view.png").string();
+  const std::string script = write("three_seconds.toml", "[[at]]\nframe = 75\nquit = true\n");
   std::atomic<bool> ended = false;
   Outcome outcome;
   std::jthread running([&] {
-    outcome = run("run " + set + " --frames 100000000 --view rays --view-png " + view,
-                  "timeout --preserve-status -s INT 5");
+    outcome = run("run " + set + " --live --script " + script + " --view rays --view-png " + view);
     ended = true;
   });
   int written = 0;
