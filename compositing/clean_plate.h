@@ -36,7 +36,7 @@ struct CleanPlate {
   float noise_gain = 1e-4F;
   float noise_floor = 1e-6F;
   bool knows_noise = false;  // measured, or told by a file; else it is a good camera's
-  float known = 1;  // share of the frame in which the screen itself was seen
+  float known = 1;           // share of the frame in which the screen itself was seen
 };
 
 // The mean of frames of the empty screen, of one size, at least one. Noise is measured if there are
