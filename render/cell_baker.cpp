@@ -35,8 +35,10 @@ void CellBaker::bake(const FrameContext& frame,
                      int x0,
                      int y0,
                      CellTransport& transport,
-                     RenderStatistics& statistics) {
+                     RenderStatistics& statistics,
+                     Clock::time_point give_up) {
   frame_ = &frame;
+  give_up_ = give_up;
   effort_ = frame.efforts[static_cast<std::size_t>(stage)];
   const bool may_move = frame.inputs.kept && frame.inputs.scene->has_moving();
   grid_ = may_move ? &frame.inputs.kept->grid() : nullptr;
@@ -158,6 +160,7 @@ void CellBaker::intersect(int count, TraceContext& context) {
 
 void CellBaker::trace(
     int count, bool coherent, RayKind kind, float cone_rad, LivePictures pictures) {
+  if (give_up_ != Clock::time_point::max() && Clock::now() > give_up_) throw TakesTooLong{};
   RayStream& s = stream_;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     s.far_m[i] = s.mask[i] ? ray_far : -1.0F;

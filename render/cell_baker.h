@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -33,6 +34,9 @@ struct RayStream {
   alignas(64) std::array<float, stream_rays> u, v, ngx, ngy, ngz;
 };
 
+// Thrown where a cell takes too long to be found.
+struct TakesTooLong {};
+
 // A cell under the planned light while its transport is found: one sample after the other is both
 // added up (to decide what is worth more rays) and noted in the transport.
 //
@@ -40,13 +44,17 @@ struct RayStream {
 class CellBaker final : public RaySink {
  public:
   CellBaker();
-  // The cell whose top-left pixel is (x0, y0), at that stage, into `transport`.
+  using Clock = std::chrono::steady_clock;
+
+  // The cell whose top-left pixel is (x0, y0), at that stage, into `transport`. Throws TakesTooLong
+  // some time after `give_up`; `transport` is of no use then.
   void bake(const FrameContext& frame,
             int stage,
             int x0,
             int y0,
             CellTransport& transport,
-            RenderStatistics& statistics);
+            RenderStatistics& statistics,
+            Clock::time_point give_up = Clock::time_point::max());
   void log_rays(RayLog* log) { gather_.log = log; }
   // Of the lists that are as long as cells need: of the longest so far.
   std::size_t scratch_bytes() const;
@@ -478,6 +486,7 @@ class CellBaker final : public RaySink {
   const SpaceGrid* grid_ = nullptr;  // if anything moves and cells are kept
   RenderStatistics* statistics_ = nullptr;
   CellTransport* transport_ = nullptr;
+  Clock::time_point give_up_;
   RayCount* counting_ = nullptr;  // the transport's, by pixel, if they are asked for
   // Whether anything is decided by what samples see: centres', further ones'.
   bool compares_centres_ = false, compares_further_ = false;

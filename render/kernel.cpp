@@ -307,22 +307,28 @@ void TileWorkspace::Impl::render_cell(const FrameContext& frame,
   if (memory) memory->took(column, row, times);
 }
 
-bool find_cell(const FrameContext& context,
-               int column,
-               int row,
-               int stage,
-               TileWorkspace& workspace,
-               RenderStatistics& statistics) {
+FoundCell find_cell(const FrameContext& context,
+                    int column,
+                    int row,
+                    int stage,
+                    std::chrono::steady_clock::time_point give_up,
+                    TileWorkspace& workspace,
+                    RenderStatistics& statistics) {
   prepare_thread();
   KeptTransport& memory = *context.inputs.kept;
   CellTransport* room = memory.place(column, row, stage);
-  if (!room) return false;
+  if (!room) return FoundCell::has_no_room;
   TileWorkspace::Impl& impl = workspace.impl();
-  impl.baker.bake(context, stage, column * cell_size, row * cell_size, impl.transport, statistics);
+  try {
+    impl.baker.bake(context, stage, column * cell_size, row * cell_size, impl.transport, statistics,
+                    give_up);
+  } catch (const TakesTooLong&) {
+    return FoundCell::takes_too_long;
+  }
   memory.found_with(impl.baker.scratch_bytes());
   *room = impl.transport;
   memory.keep(column, row, stage);
-  return memory.find(column, row, stage) != nullptr;
+  return memory.find(column, row, stage) ? FoundCell::kept : FoundCell::has_no_room;
 }
 
 void render_tile(const FrameContext& context, const TileView& tile, TileWorkspace& workspace) {

@@ -116,13 +116,17 @@ void render_tile(const FrameContext& context,
                  const TileJob& tile,
                  TileWorkspace& workspace,
                  TileResult& result);
-// Finds the transport of a cell and keeps it in the frame's inputs.kept. False if it has no room.
-bool find_cell(const FrameContext& context,
-               int column,
-               int row,
-               int stage,
-               TileWorkspace& workspace,
-               RenderStatistics& statistics);
+
+// Finds the transport of a cell and keeps it in the frame's inputs.kept; gives up soon after a
+// time. Unless it did both, what was kept of the cell stays.
+enum class FoundCell : std::uint8_t { kept, has_no_room, takes_too_long };
+FoundCell find_cell(const FrameContext& context,
+                    int column,
+                    int row,
+                    int stage,
+                    std::chrono::steady_clock::time_point give_up,
+                    TileWorkspace& workspace,
+                    RenderStatistics& statistics);
 
 void size_result(const Rect& rect, TileResult& result, bool count_rays = false);
 

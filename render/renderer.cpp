@@ -77,10 +77,12 @@ std::shared_ptr<FrameContext> prepare_frame(const FrameInputs& inputs,
 }
 
 void refine_cells(const FrameContext& context,
-                  std::span<const Refinement> cells,
+                  std::span<Refinement> cells,
                   std::chrono::steady_clock::time_point deadline,
+                  std::chrono::steady_clock::duration most,
                   FrameJob& job,
                   RenderStatistics& statistics) {
+  using Clock = std::chrono::steady_clock;
   if (cells.empty()) return;
   std::atomic<std::size_t> next = 0;
   std::atomic<bool> full = false;
@@ -91,16 +93,18 @@ void refine_cells(const FrameContext& context,
   const auto work = [&](int) {
     TileWorkspace& workspace = workspaces().local();
     RenderStatistics taken;
-    while (!full && std::chrono::steady_clock::now() < deadline) {
+    for (Clock::time_point start; !full && (start = Clock::now()) < deadline;) {
       const std::size_t i = next++;
       if (i >= cells.size()) break;
-      const auto& [cell, stage] = cells[i];
-      if (find_cell(context, static_cast<int>(cell % columns), static_cast<int>(cell / columns),
-                    stage, workspace, taken)) {
-        job.stages[cell] = stage;
-      } else {
-        full = true;
-      }
+      Refinement& one = cells[i];
+      const bool bounded = most < Clock::time_point::max() - start;
+      const FoundCell found = find_cell(
+          context, static_cast<int>(one.cell % columns), static_cast<int>(one.cell / columns),
+          one.stage, bounded ? start + most : Clock::time_point::max(), workspace, taken);
+      one.took_ms = std::chrono::duration<float, std::milli>(Clock::now() - start).count();
+      one.given_up = found == FoundCell::takes_too_long;
+      if (found == FoundCell::kept) job.stages[one.cell] = one.stage;
+      if (found == FoundCell::has_no_room) full = true;
     }
     const std::lock_guard lock(statistics_mutex);
     statistics += taken;

@@ -63,16 +63,20 @@ void render_frame(const FrameContext& context,
 struct Refinement {
   std::size_t cell = 0;
   std::uint8_t stage = 0;
+  // Out: what finding it took on its thread, 0 if nobody came to it; and whether it was given up.
+  float took_ms = 0;
+  bool given_up = false;
 };
 
 // Between the two: finds cells' transport ahead of the frame, in their order, until the deadline,
 // and changes the stages of those that are done in `job`, which is the frame's own. Each cell
-// occurs once. The rays that it took are added to `statistics`. Only for inputs with `kept`; where
-// its memory is used up, it ends, and cells that found no room are found again as they were, in the
-// frame.
+// occurs once; one that takes more than `most` is given up, and stays as it is. The rays that it
+// took are added to `statistics`. Only for inputs with `kept`; where its memory is used up, it
+// ends, and cells that found no room are found again as they were, in the frame.
 void refine_cells(const FrameContext& context,
-                  std::span<const Refinement> cells,
+                  std::span<Refinement> cells,
                   std::chrono::steady_clock::time_point deadline,
+                  std::chrono::steady_clock::duration most,
                   FrameJob& job,
                   RenderStatistics& statistics);
 

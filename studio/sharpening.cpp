@@ -7,6 +7,8 @@
 #include <functional>
 #include <numeric>
 
+#include <fmt/format.h>
+
 namespace studio {
 namespace {
 
@@ -38,6 +40,10 @@ constexpr double worth_a_stage = 2.5;
 constexpr std::size_t anti_aliased = render::smoothed_stage;
 constexpr double small_part = 0.0625, seconds_to_go_straight = 1.5;
 
+// A cell may hold a live frame up for so many frames. Those that took longer before than one that
+// was given up are not tried for a while: each frame what that one took counts for more by so much.
+constexpr double most_frames_of_cell = 3, forgotten_in_frame = 1.01;
+
 // The step through all cells in which they take their turns, spread over the picture: by the golden
 // section (Knuth, "The Art of Computer Programming" 3, 6.4).
 std::size_t stride_of(std::size_t cells) {
@@ -58,7 +64,53 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
     : frame_ms_(1000 / rate.value()),
       frames_a_second_(rate.value()),
       live_(live),
-      cost_(expected_cost) {}
+      cost_(expected_cost) {
+  least_of_slow_ms_.fill(HUGE_VAL);
+}
+
+double Sharpening::most_of_cell_ms() const {
+  return live_ ? most_frames_of_cell * frame_ms_ : HUGE_VAL;
+}
+
+bool Sharpening::takes_too_long(std::size_t cell, std::size_t to) const {
+  const CellTime& time = cell_times_[cell];
+  if (time.too_fine != 0 && to >= time.too_fine) return true;
+  if (time.stage == 0) return false;
+  const double foreseen_ms = double{time.ms} * cost_[to] / cost_[time.stage];
+  return foreseen_ms > most_of_cell_ms() || double{time.ms} >= least_of_slow_ms_[to];
+}
+
+// What was found ahead of the last frame, cell by cell.
+void Sharpening::follow_cells() {
+  for (double& ms : least_of_slow_ms_) ms *= forgotten_in_frame;
+  for (const render::Refinement& one : plan_.ahead) {
+    if (!(one.took_ms > 0)) continue;
+    CellTime& time = cell_times_[one.cell];
+    if (!one.given_up) {
+      time.stage = one.stage, time.ms = one.took_ms;
+      continue;
+    }
+    time.too_fine = one.stage;
+    if (time.stage != 0)
+      least_of_slow_ms_[one.stage] = std::min(least_of_slow_ms_[one.stage], double{time.ms});
+  }
+}
+
+std::string Sharpening::why_coarse() const {
+  if (share() >= 1) return "";
+  if (stopped_) {
+    return fmt::format(
+        "the memory for what is kept is used up: the picture gets no sharper while nothing moves, "
+        "and stays at a sharpness of {:.2f}; a lower [effort] can be finished",
+        share());
+  }
+  if (slow_cells_ == 0 || !plan_.ahead.empty()) return "";
+  const double part = static_cast<double>(slow_cells_) / static_cast<double>(plan_.stages.size());
+  return fmt::format(
+      "{:.1f} % of the picture would hold a frame up by more than {:.0f} frames to be found finer: "
+      "it stays at a sharpness of {:.2f}; a lower [effort] can be finished",
+      100 * part, most_frames_of_cell, share());
+}
 
 // What a live frame may spend on cells that are lost, or else go on: these can wait, where finer
 // ones would take longer to look at.
@@ -112,7 +164,11 @@ void Sharpening::go_on(double left, std::span<const float> looks_ms) {
     for (std::size_t turn = 0; turn < stages.size() && left > 0; ++turn) {
       const std::size_t i = turn * stride % stages.size();
       if (stages[i] != stage || (persons_wait && looks_much(looks_ms[i]))) continue;
-      plan_.ahead.push_back({i, static_cast<std::uint8_t>(to)});
+      std::size_t there = to;
+      while (live_ && there > stage && takes_too_long(i, there)) --there;
+      slow_cells_ += there < to;
+      if (there == stage) continue;
+      plan_.ahead.push_back({i, static_cast<std::uint8_t>(there)});
       if (!live_) left -= cost_[to];
     }
   }
@@ -156,12 +212,18 @@ std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms)
   return order;
 }
 
-const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const float> looks_ms) {
+SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const float> looks_ms) {
   looks_ms_ = std::accumulate(looks_ms.begin(), looks_ms.end(), 0.0);
   if (!(looks_ms_ > 0)) shed_ = {};
   const bool told = told_.has_value();
   follow_last_frame();
   constexpr int none = render::KeptTransport::none;
+  cell_times_.resize(kept.size());
+  follow_cells();
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (kept[i] == none) cell_times_[i] = {};
+  }
+  slow_cells_ = 0;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
   const auto lost = static_cast<std::size_t>(std::ranges::count(kept, none));
@@ -201,9 +263,9 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<cons
   reached_ = std::accumulate(plan_.stages.begin(), plan_.stages.end(), std::size_t{0});
   went_on_ = !live_ && !plan_.ahead.empty();
   if (!live_) {
-    for (const auto& [cell, stage] : plan_.ahead) {
-      reached_ += stage - std::size_t{plan_.stages[cell]};
-      plan_.stages[cell] = stage;
+    for (const render::Refinement& one : plan_.ahead) {
+      reached_ += one.stage - std::size_t{plan_.stages[one.cell]};
+      plan_.stages[one.cell] = one.stage;
     }
     plan_.ahead.clear();
   }
@@ -213,13 +275,16 @@ const SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<cons
 
 void Sharpening::found_ahead(std::span<const std::uint8_t> stages, double ms) {
   ByStage<std::size_t> found{};
-  for (const auto& [cell, stage] : plan_.ahead) {
-    if (stages[cell] != stage) continue;
-    ++found[stage];
-    reached_ += stage - std::size_t{plan_.stages[cell]};
+  double in_vain_ms = 0, all_ms = 0;
+  for (const render::Refinement& one : plan_.ahead) {
+    all_ms += one.took_ms;
+    if (one.given_up) in_vain_ms += one.took_ms;
+    if (stages[one.cell] != one.stage) continue;
+    ++found[one.stage];
+    reached_ += one.stage - std::size_t{plan_.stages[one.cell]};
   }
   went_on_ = !plan_.ahead.empty();
-  learn(found, ms);
+  learn(found, all_ms > 0 ? ms * (1 - in_vain_ms / all_ms) : ms);
 }
 
 void Sharpening::took(double render_ms, double finding_ms, bool full) {
@@ -293,12 +358,16 @@ void render_sharpening(Sharpening& sharpening,
   using Milliseconds = std::chrono::duration<double, std::milli>;
   const Clock::time_point start = Clock::now();
   const auto frame = render::prepare_frame(inputs, job, plate);
-  const SharpeningPlan& plan = sharpening.next(inputs.kept->stages(), inputs.kept->looks_ms());
+  SharpeningPlan& plan = sharpening.next(inputs.kept->stages(), inputs.kept->looks_ms());
   job.stages = plan.stages;
   render::RenderStatistics ahead;
   const Clock::time_point begun = Clock::now();
   const auto time = std::chrono::duration_cast<Clock::duration>(Milliseconds(plan.ahead_ms));
-  render::refine_cells(*frame, plan.ahead, begun + time, job, ahead);
+  const double most_ms = sharpening.most_of_cell_ms();
+  const auto most = std::isfinite(most_ms)
+                        ? std::chrono::duration_cast<Clock::duration>(Milliseconds(most_ms))
+                        : Clock::duration::max();
+  render::refine_cells(*frame, plan.ahead, begun + time, most, job, ahead);
   const Milliseconds ahead_ms = Clock::now() - begun;
   sharpening.found_ahead(job.stages, ahead_ms.count());
   render::render_frame(*frame, plate, result);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "capture/frame.h"
@@ -39,17 +40,20 @@ class Sharpening {
   // Looking takes the longer the finer cells are, in every frame: where that leaves a live show no
   // time, cells stay as they are; where it makes frames late, those that take most of it are found
   // anew, coarser, as long as that helps.
-  const SharpeningPlan& next(std::span<const int> kept, std::span<const float> looks_ms = {});
+  SharpeningPlan& next(std::span<const int> kept, std::span<const float> looks_ms = {});
   // The frame's stages with what was found ahead, and what that took.
   void found_ahead(std::span<const std::uint8_t> stages, double ms);
+  // What a cell may take ahead of a frame.
+  double most_of_cell_ms() const;
   // What rendering the frame took then, what of that finding cells did, and whether what it found
   // could not all be kept.
   void took(double render_ms, double finding_ms, bool full);
   // Of the last frame: 0 = coarse, 1 = as the effort asks.
   double share() const;
-  // Whether the last frame is not as sharp as the effort asks, and stays so until something moves,
-  // for the memory for kept cells is used up.
-  bool is_stopped() const { return stopped_ && share() < 1; }
+  // Why the last frame is not as sharp as the effort asks, and stays so until something moves, in
+  // words; "" where it is, or gets there: the memory for kept cells is used up, or cells take so
+  // long to be found finer that a live show waits for none of them.
+  std::string why_coarse() const;
   // Share of its cells that had to be found anew, for something moved.
   double lost_share() const;
 
@@ -66,6 +70,8 @@ class Sharpening {
   std::size_t after(std::size_t stage, std::size_t coarse) const;
   std::size_t stage_of_lost(std::size_t lost) const;
   void go_on(double left, std::span<const float> looks_ms);
+  bool takes_too_long(std::size_t cell, std::size_t to) const;
+  void follow_cells();
   bool looks_matter() const;
   bool looks_much(float look_ms) const;
   std::vector<std::size_t> too_costly(std::span<const float> looks_ms);
@@ -84,6 +90,16 @@ class Sharpening {
   };
   Shed shed_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
+  // Of a cell that is kept: the last stage that was found ahead and what that took, and the stage
+  // that took too long.
+  struct CellTime {
+    std::uint8_t stage = 0, too_fine = 0;  // 0 = none
+    float ms = 0;
+  };
+  std::vector<CellTime> cell_times_;
+  // A cell that took as much before may take too long at this stage.
+  ByStage<double> least_of_slow_ms_;
+  std::size_t slow_cells_ = 0;  // of the last plan
   // Of the last frame, where none of its cells was shed.
   struct Told {
     double relight_ms, render_ms;

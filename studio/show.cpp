@@ -406,15 +406,9 @@ class Show::Stages {
 
   // Once whenever the light ceases to be renewed.
   void note_sharpness() {
-    const bool stopped = sharpening_->is_stopped();
-    if (stopped && !stays_coarse_) {
-      note(
-          "the memory for what is kept is used up: the picture gets no sharper while nothing "
-          "moves, " +
-          fmt::format("and stays at a sharpness of {:.2f}; a lower [effort] can be finished",
-                      sharpening_->share()));
-    }
-    stays_coarse_ = stopped;
+    const std::string why = sharpening_->why_coarse();
+    if (!why.empty() && !stays_coarse_) note(why);
+    stays_coarse_ = !why.empty();
   }
 
   void note_probe(const PreparedFrame& frame) {

@@ -189,9 +189,18 @@ TEST(RefineCells, FindsCellsAheadAsTheFrameWouldShowThem) {
   std::vector<render::Refinement> wanted;
   for (std::size_t i = 0; i < 30; i += 3) wanted.push_back({i, render::finished_stage});
   render::RenderStatistics ahead;
-  render::refine_cells(*frame, wanted, Clock::now(), job, ahead);
+  render::refine_cells(*frame, wanted, Clock::now(), Clock::duration::max(), job, ahead);
   EXPECT_EQ(job.stages, std::vector<std::uint8_t>(30, 1));
-  render::refine_cells(*frame, wanted, Clock::now() + std::chrono::hours(1), job, ahead);
+  // Given up in their midst, they leave what there is as it was.
+  const auto in_an_hour = Clock::now() + std::chrono::hours(1);
+  render::refine_cells(*frame, wanted, in_an_hour, Clock::duration::zero(), job, ahead);
+  for (const render::Refinement& one : wanted) EXPECT_TRUE(one.given_up);
+  EXPECT_EQ(job.stages, std::vector<std::uint8_t>(30, 1));
+  render::refine_cells(*frame, wanted, in_an_hour, Clock::duration::max(), job, ahead);
+  for (const render::Refinement& one : wanted) {
+    EXPECT_FALSE(one.given_up);
+    EXPECT_GT(one.took_ms, 0);
+  }
   EXPECT_GT(ahead.primary_rays, 0U);
   for (std::size_t i = 0; i < 30; ++i) {
     EXPECT_EQ(job.stages[i], i % 3 == 0 ? render::finished_stage : 1) << i;
@@ -224,7 +233,8 @@ TEST(RefineCells, KeepsNoCellLitWhosePlateHadNoKey) {
       std::vector<render::Refinement> wanted;
       for (std::size_t i = 0; i < 30; ++i) wanted.push_back({i, render::finished_stage});
       render::RenderStatistics ahead;
-      refine_cells(*context, wanted, Clock::now() + std::chrono::hours(1), room.job, ahead);
+      refine_cells(*context, wanted, Clock::now() + std::chrono::hours(1), Clock::duration::max(),
+                   room.job, ahead);
     }
     render::FrameResult warm;
     render_frame(*context, room.plate, warm);

@@ -1,11 +1,14 @@
 // Pictures that sharpen while nothing moves.
 #include "studio/sharpening.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <string>
+#include <utility>
 
 #include "studio/show.h"
 #include "tests/made_files.h"
@@ -36,6 +39,10 @@ struct MadeMachine {
   double look_ms = 0;  // for each of these, finished; in proportion to `look_cost`
   std::array<double, render::refinement_stages> look_cost{0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1};
   std::size_t moving = 0;  // so many cells, the first ones, are lost in every frame
+  // Every so many cells one takes so many times as long, finished; 0 = none does.
+  std::size_t slow_every = 0;
+  double slow = 1;
+  int given_up = 0;
 
   double ms_at(std::size_t stage) const { return cell_ms * made_cost[stage]; }
   std::vector<float> looks_ms() const {
@@ -55,17 +62,25 @@ struct MadeMachine {
   // Shows a frame; returns what it takes.
   double show(Sharpening& sharpening) {
     std::fill_n(kept.begin(), moving, none);
-    const SharpeningPlan& plan = sharpening.next(kept, looks_ms());
+    SharpeningPlan& plan = sharpening.next(kept, looks_ms());
     double ms = 0;
     std::size_t found = 0;
     std::vector<std::uint8_t> stages = plan.stages, ahead(cells);
     for (; found < plan.ahead.size() && ms < plan.ahead_ms; ++found) {
-      const auto& [cell, stage] = plan.ahead[found];
+      render::Refinement& one = plan.ahead[found];
+      const auto [cell, stage] = std::pair(one.cell, one.stage);
       EXPECT_LT(stages[cell], stage);
       EXPECT_EQ(kept[cell], stages[cell]);
+      const bool is_slow =
+          slow_every > 0 && cell % slow_every == 0 && stage == render::finished_stage;
+      const double took_ms = ms_at(stage) * (is_slow ? slow : 1);
+      one.given_up = took_ms > sharpening.most_of_cell_ms();
+      one.took_ms = static_cast<float>(std::min(took_ms, sharpening.most_of_cell_ms()));
+      ms += one.took_ms;
+      given_up += one.given_up;
+      if (one.given_up) continue;
       stages[cell] = stage;
       ahead[cell] = 1;
-      ms += ms_at(stage);
     }
     sharpening.found_ahead(stages, ms);
     double finding_ms = 0;
@@ -315,6 +330,34 @@ TEST(Sharpening, HasEdgesWithinASecondWhereItCan) {
   }
 }
 
+// One cell in twenty would take seconds: none is waited for longer than three frames, hardly any
+// twice, all others are finished, and what stays is told.
+TEST(Sharpening, WaitsForNoCellThatWouldHoldFramesUp) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine{0.1};
+  machine.slow_every = 20, machine.slow = 2000;
+  double longest_ms = 0;
+  std::string why;
+  for (int i = 0; i < 1500; ++i) {
+    longest_ms = std::max(longest_ms, machine.show(sharpening));
+    why = sharpening.why_coarse();
+    if (!why.empty()) break;
+  }
+  EXPECT_LT(longest_ms, 4 * 40);
+  EXPECT_LE(machine.given_up, static_cast<int>(cells / 20 + 1));
+  EXPECT_THAT(why, testing::HasSubstr("5.0 % of the picture"));
+  for (std::size_t i = 0; i < cells; ++i) {
+    EXPECT_EQ(machine.kept[i] == render::finished_stage, i % 20 != 0) << i;
+    EXPECT_GE(machine.kept[i], render::smoothed_stage);
+  }
+  // What moves there may be quicker.
+  std::ranges::fill(machine.kept, none);
+  machine.slow = 1;
+  machine.late_of(1500, sharpening);
+  EXPECT_EQ(machine.kept, std::vector<int>(cells, render::finished_stage));
+  EXPECT_EQ(sharpening.why_coarse(), "");
+}
+
 TEST(Sharpening, StaysWhereTheMemoryEnds) {
   Sharpening sharpening({25, 1}, false);
   std::vector<int> kept(cells, none);
@@ -327,7 +370,7 @@ TEST(Sharpening, StaysWhereTheMemoryEnds) {
     if (i > 20) {
       EXPECT_EQ(sharpening.share(), last);
     }
-    EXPECT_EQ(sharpening.is_stopped(), full) << i;
+    EXPECT_EQ(!sharpening.why_coarse().empty(), full) << i;
     last = sharpening.share();
   }
   EXPECT_LT(last, 0.7);
