@@ -44,6 +44,7 @@ compositing::CleanPlate read_plate(const std::string& path, capture::Transfer tr
   if (const auto noise = capture::read_exr_noise(path)) {
     plate.noise_gain = std::min(noise->gain, most_noise);
     plate.noise_floor = std::clamp(noise->floor, compositing::least_noise_floor, most_noise);
+    plate.knows_noise = true;
   }
   return plate;
 }

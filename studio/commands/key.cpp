@@ -105,10 +105,7 @@ void make_plate(const KeyOptions& options, Console& console) {
   }
   const compositing::CleanPlate plate = maker.plate();
   capture::ExrOptions noise_too;
-  // Of frames that are all the same, as of a video that holds still, it tells nothing.
-  const bool differ = plate.noise_gain > 0 || plate.noise_floor > compositing::least_noise_floor;
-  if (frames > 1 && differ && !options.person)
-    noise_too.noise = {plate.noise_gain, plate.noise_floor};
+  if (plate.knows_noise) noise_too.noise = {plate.noise_gain, plate.noise_floor};
   capture::write_exr(options.out, plate.light, noise_too);
   const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
   const std::string_view colour =

@@ -212,7 +212,10 @@ TEST_F(KeyCommand, TakesAPlateOfAScreenWithSomebodyBeforeIt) {
   const Outcome plate =
       run("key plate " + in("take_%04d.png") + " --colour sRGB --person -o " + in("plate.exr"));
   EXPECT_EQ(plate.status, 0) << plate.err;
-  EXPECT_THAT(plate.out, HasSubstr("middle of 4 frames, a green screen, noise not measured"));
+  EXPECT_THAT(plate.out, HasSubstr("middle of 4 frames, a green screen, noise in black 0.00"));
+  const compositing::CleanPlate read = read_clean_plate(in("plate.exr"), {});
+  EXPECT_TRUE(read.knows_noise);
+  EXPECT_NEAR(read.noise_gain, 1.1e-4, 2e-5);  // variance of the made camera, rounding too
 }
 
 // The plate is of what is keyed, not of what comes before.
