@@ -2,8 +2,11 @@
 #include "studio/clean_plates.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "capture/exr.h"
 #include "compositing/plate_footage.h"
@@ -63,6 +66,13 @@ capture::Image read_picture(const std::string& path, capture::Transfer transfer)
 
 std::string needs_plate(const std::string& uri) {
   return uri + " is live and needs a clean plate: platelight key plate CAMERA -o plate.exr";
+}
+
+std::string words_for_shift(float right_px, float down_px) {
+  const auto tenths = [](float value) { return std::round(10 * value) / 10 + 0.0F; };  // none is -0
+  return fmt::format(
+      "the picture is {:.1f} px further right and {:.1f} px further down than its clean plate",
+      tenths(right_px), tenths(down_px));
 }
 
 compositing::CleanPlate read_clean_plate(const std::string& path,

@@ -18,6 +18,9 @@ capture::Image read_picture(const std::string& path, capture::Transfer transfer)
 // What to do about a live source without a plate.
 std::string needs_plate(const std::string& uri);
 
+// How far a camera's picture has gone from its clean plate.
+std::string words_for_shift(float right_px, float down_px);
+
 // The plate in a file, with the noise that it tells (EXR of `platelight key plate`); with no path,
 // from the source's own frames from first to last, of which some that are spread over them are
 // looked at, as the method asks. Throws std::runtime_error if it cannot be read, or the source is

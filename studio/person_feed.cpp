@@ -17,6 +17,7 @@
 #include "compositing/person_box.h"
 #include "compositing/person_shape.h"
 #include "compositing/visual_hull.h"
+#include "studio/clean_plates.h"
 #include "studio/person_camera.h"
 #include "studio/section.h"
 
@@ -26,10 +27,9 @@ namespace {
 using namespace std::chrono_literals;
 using calibrate::Vec3;
 using compositing::FeetStatus;
+using compositing::KeyStatus;
 
 using calibrate::degree;
-// Below this the key is uncertain, and the show says so.
-constexpr float sure = 0.5F;
 // A camera that was left out is taken back after it has been well for so long.
 constexpr capture::Time trial = 500ms;
 
@@ -46,10 +46,6 @@ std::string words_for(const compositing::ShapeChoice& choice) {
   return choice.hull ? "the hull" : fmt::format("the billboard of camera {}", choice.camera + 1);
 }
 
-std::string tenths(float value) {
-  return fmt::format("{:.1f}", std::round(10 * value) / 10 + 0.0F);  // none is -0
-}
-
 // Whether feet that are followed for one are those of the other.
 bool stands_alike(const PersonSettings& a, const PersonSettings& b) {
   return a.by_feet == b.by_feet && a.floor_z == b.floor_z && a.may_be_hull() == b.may_be_hull() &&
@@ -61,7 +57,8 @@ bool stands_alike(const PersonSettings& a, const PersonSettings& b) {
 struct PersonFeed::Person {
   struct Camera {
     PersonCameraFeed feed;
-    bool unsure = false;
+    std::string_view unsure_for{};  // why its key is; "" = it is not
+    bool told_clipped = false;
     bool moved = false;
     bool late = false;                    // its picture is not of this moment
     std::optional<capture::Time> well{};  // since when, of one that was left out
@@ -242,18 +239,22 @@ std::vector<std::shared_ptr<const render::LivePicture>> PersonFeed::nothing_yet(
 void PersonFeed::show(Person& person, std::size_t index) {
   Person::Camera& camera = person.cameras[index];
   if (!camera.feed.show()) return;
-  const bool unsure = camera.feed.confidence() < sure;
-  if (unsure && !camera.unsure) {
-    person.notes.push_back(
-        fmt::format("{}: the key is unsure ({})", person.name_of(index), camera.feed.key()));
+  const std::string_view why =
+      compositing::is_unsure(camera.feed.confidence()) ? camera.feed.key() : std::string_view();
+  // How a screen is exposed is told once, and that the camera was moved below.
+  const bool clipped = why == compositing::name_of(KeyStatus::clipped);
+  const bool is_told =
+      why == compositing::name_of(KeyStatus::moved) || (clipped && camera.told_clipped);
+  if (!why.empty() && why != camera.unsure_for && !is_told) {
+    person.notes.push_back(fmt::format("{}: the key is unsure ({})", person.name_of(index), why));
   }
-  camera.unsure = unsure;
+  camera.unsure_for = why;
+  camera.told_clipped |= clipped;
   const auto moved = camera.feed.moved_px();
   if (moved && !camera.moved) {
     person.notes.push_back(fmt::format(
-        "{}: its camera was moved: the picture is {} px further right and {} px further down than "
-        "its clean plate. Take the plate anew (platelight key plate), and its pose",
-        person.name_of(index), tenths((*moved)[0]), tenths((*moved)[1])));
+        "{}: its camera was moved: {}. Take the plate anew (platelight key plate), and its pose",
+        person.name_of(index), words_for_shift((*moved)[0], (*moved)[1])));
   }
   camera.moved = moved.has_value();
   if (index == 0) stand(person);

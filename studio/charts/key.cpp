@@ -185,7 +185,7 @@ class KeyChart {
     for (std::size_t i = 0; i < values.size(); ++i) {
       const float confidence = trials[i].confidence;
       StressorSample sample{values[i], trials[i].ours.error.composite, std::nullopt,
-                            confidence > 0.5F ? "ok" : "unsure"};
+                            compositing::is_unsure(confidence) ? "unsure" : "ok"};
       sample.label = fmt::format("{:.2f}", confidence);
       sample.figures = {{"confidence", confidence},
                         {"edge", trials[i].ours.error.edge},

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -33,7 +34,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::int64_t plate_frames = 50;
 constexpr double much_elsewhere = 0.1;  // share of a plate that is no screen
-constexpr double unsure = 0.5;          // confidence, in the mean
 constexpr int plate_footage = 480;      // frames that a clip without a plate is judged by
 
 struct KeyOptions {
@@ -167,10 +167,13 @@ struct KeyedClip {
   bool by_screen = true;
   std::string colour = "no";  // of the screen
   double known = 0;           // share of the plate
-  std::int64_t frames = 0, lost = 0, keyed = 0;
+  std::int64_t frames = 0, lost = 0, keyed = 0, unsure = 0;
   double confidence_sum = 0, least_confidence = 1;
   std::string_view why = "good";  // of the least
-  double key_ms = 0;              // in all
+  // The camera, if it was: the first frame that shows it, and the farthest.
+  std::optional<std::int64_t> moved_from;
+  compositing::PlateShift shift;
+  double key_ms = 0;  // in all
   Json rows = Json::array();
   double confidence() const { return confidence_sum / static_cast<double>(keyed); }
 };
@@ -195,6 +198,11 @@ void add(const compositing::KeyReport& report, std::int64_t frame, KeyedClip& cl
   if (report.confidence < clip.least_confidence) clip.why = compositing::name_of(report.status);
   clip.least_confidence = std::min(clip.least_confidence, double{report.confidence});
   clip.confidence_sum += report.confidence;
+  clip.unsure += compositing::is_unsure(report.confidence);
+  if (report.moved) {
+    if (!clip.moved_from) clip.moved_from = frame - report.moved_for + 1;
+    if (report.shift.size_px() > clip.shift.size_px()) clip.shift = report.shift;
+  }
   clip.rows.push_back(row_of(frame, report));
 }
 
@@ -235,12 +243,20 @@ void key_frames(const KeyOptions& options,
 }
 
 Json json_of(const KeyedClip& clip) {
+  Json moved;
+  if (clip.moved_from) {
+    moved = {{"frame", *clip.moved_from},
+             {"right_px", clip.shift.right_px},
+             {"down_px", clip.shift.down_px}};
+  }
   return {{"frames", clip.frames},
           {"lost", clip.lost},
           {"colour", clip.colour},
           {"plate_known", clip.known},
           {"confidence_mean", clip.confidence()},
           {"confidence_least", clip.least_confidence},
+          {"unsure", clip.unsure},
+          {"moved", moved},
           {"key_ms", clip.key_ms / static_cast<double>(clip.keyed)},
           {"rows", clip.rows}};
 }
@@ -263,8 +279,16 @@ void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Co
         "{} of {} frames were lost: the picture before stands in their place, if there is one",
         clip.lost, clip.frames));
   }
-  if (clip.confidence() < unsure) {
-    console.warn(fmt::format("the key is unsure ({}): look at it before it is used", clip.why));
+  if (clip.unsure > 0) {
+    console.warn(
+        fmt::format("the key is unsure ({}) in {} of {} frames: look at it before it is used",
+                    clip.why, clip.unsure, clip.keyed));
+  }
+  if (clip.moved_from) {
+    console.warn(
+        fmt::format("the camera was moved, from frame {} on or up to 3 before: {}. Key what is "
+                    "before and after by themselves (--frames, --first), each with its own plate",
+                    *clip.moved_from, words_for_shift(clip.shift.right_px, clip.shift.down_px)));
   }
 }
 

@@ -23,6 +23,7 @@ namespace studio::key_command_test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 class KeyCommand : public CommandLine {
  protected:
@@ -189,6 +190,56 @@ TEST_F(KeyCommand, FindsAnyStillBackgroundInFootageAlone) {
   }
 }
 
+TEST_F(KeyCommand, SaysOnceThatTheCameraWasPushed) {
+  constexpr int width = 240, height = 160, frames = 24;
+  constexpr std::array panels{89, 115, 135, 152, 167, 180, 192};
+  for (int i = 0; i < frames; ++i) {
+    const int right = i < 10 ? 0 : 8;
+    std::vector<std::uint8_t> codes;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const int u = x - right + width;  // a cloth between panels
+        const bool cloth = u > width + 60 && u < width + 180;
+        const int panel = panels[static_cast<std::size_t>((u / 14 * 3 + y / 11 * 5) % 7)];
+        for (const int code : {40, 180, 60})
+          codes.push_back(static_cast<std::uint8_t>(cloth ? code : panel));
+      }
+    }
+    capture::write_png(dir_ / fmt::format("room_{:04}.png", i), width, height, 3, codes);
+  }
+  ASSERT_EQ(run("key plate " + in("room_0000.png") + " --colour sRGB -o " + in("room.exr")).status,
+            0);
+  const std::string key = "key " + in("room_%04d.png") + " --colour sRGB --plate " +
+                          in("room.exr") + " -o " + in("keyed") + " --json " + in("key.json");
+  const Outcome still = run(key + " --frames 10");
+  EXPECT_THAT(still.err, Not(HasSubstr("was moved")));
+  EXPECT_TRUE(nlohmann::json::parse(content_of(in("key.json")))["moved"].is_null());
+  const Outcome keyed = run(key);
+  ASSERT_EQ(keyed.status, 0) << keyed.err;
+  EXPECT_THAT(keyed.err, HasSubstr("the key is unsure (moved) in "));
+  EXPECT_THAT(
+      keyed.err,
+      HasSubstr("the camera was moved, from frame 12 on or up to 3 before: the picture is "));
+  EXPECT_THAT(keyed.err,
+              testing::ContainsRegex("is (7.9|8.0|8.1) px further right and 0.0 px further down"));
+  EXPECT_EQ(keyed.err.find("was moved"), keyed.err.rfind("was moved"));
+  const auto figures = nlohmann::json::parse(content_of(in("key.json")));
+  EXPECT_EQ(figures["moved"]["frame"], 12);
+  EXPECT_NEAR(figures["moved"]["right_px"], 8, 0.2);
+  EXPECT_EQ(figures["unsure"], 8);  // known from the second look on
+}
+
+TEST_F(KeyCommand, IsUnsureOfAScreenAtTheCamerasLimit) {
+  const compositing::MadeClip clip(compositing::made_scene("over-exposed"), 4, 90, 160);
+  for (int i = 0; i < 4; ++i) write_picture("empty", i, clip.plate_shot(i));
+  for (int i = 0; i < 4; ++i) write_picture("take", i, clip.frame(i).seen);
+  ASSERT_EQ(
+      run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
+  const Outcome keyed = run("key " + in("take_%04d.png") + " --colour sRGB --plate " +
+                            in("plate.exr") + " -o " + in("keyed"));
+  EXPECT_THAT(keyed.err, HasSubstr("the key is unsure (clipped) in 4 of 4 frames"));
+}
+
 TEST_F(KeyCommand, SaysThatAGreyWallIsNoScreen) {
   capture::write_png(dir_ / "grey.png", 40, 20, 3, std::vector<std::uint8_t>(2400, 130));
   const Outcome plate =
@@ -331,7 +382,7 @@ TEST_F(KeyCommand, BlamesThePlateAndNotTheMaskForThePlatesSize) {
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.err, HasSubstr("the clean plate " + in("small.exr") + " is 80x45"));
   EXPECT_THAT(outcome.err, HasSubstr("is 160x90"));
-  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("mask")));
+  EXPECT_THAT(outcome.err, Not(HasSubstr("mask")));
   expect_one_line(outcome.err);
 }
 

@@ -135,6 +135,38 @@ class PushedCamera final : public capture::Camera {
   std::int64_t number_ = 0;
 };
 
+// Nobody before a screen that is at the camera's limit in every other four frames.
+class BrightScreen final : public capture::Camera {
+ public:
+  BrightScreen() {
+    info_.width = info_.height = 64;
+    info_.rate = {25, 1};
+    info_.frames = 40;
+  }
+  const capture::CameraInfo& info() const override { return info_; }
+  capture::CameraStatistics statistics() const override { return {}; }
+
+  static capture::Image picture(float light) {
+    capture::Image image = capture::make_image(64, 64);
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      image.pixels[i] = light * screen[i % 3] / screen[1];
+    return image;
+  }
+  std::optional<capture::Frame> next() override {
+    if (number_ == info_.frames) return std::nullopt;
+    capture::Frame frame;
+    frame.number = number_;
+    frame.time = capture::time_of_frame(number_, info_.rate);
+    frame.image = std::make_shared<capture::Image>(picture(number_ / 4 % 2 == 0 ? 0.8F : 1.0F));
+    ++number_;
+    return frame;
+  }
+
+ private:
+  capture::CameraInfo info_;
+  std::int64_t number_ = 0;
+};
+
 constexpr const char* walker = R"([[billboard]]
 name = "walker"
 source = "walker:20"
@@ -158,6 +190,9 @@ class PersonSetTest : public MadeShowTest {
     });
     capture::register_camera("pushed", [](std::string_view, const capture::CameraOptions&) {
       return std::make_unique<PushedCamera>();
+    });
+    capture::register_camera("bright", [](std::string_view, const capture::CameraOptions&) {
+      return std::make_unique<BrightScreen>();
     });
   }
   void SetUp() override {
@@ -390,6 +425,25 @@ TEST_F(PersonSetTest, SaysOnceThatACameraWasPushedAndHowFar) {
   EXPECT_THAT(note, HasSubstr("guest"));
   EXPECT_THAT(note,
               testing::ContainsRegex("the picture is (2.9|3.0|3.1) px further right and 0.0 px"));
+}
+
+// How a screen is exposed is no news each time that more of it is in sight.
+TEST_F(PersonSetTest, SaysOnceThatAScreenIsAtTheCamerasLimit) {
+  capture::write_exr((dir_ / "bright.exr").string(), BrightScreen::picture(1));
+  Show show(made_set("grey:40,25,0",
+                     "[[billboard]]\nname = \"guest\"\nsource = \"bright:\"\nheight = 2\n"
+                     "position = [0, 0, 0]\nkey = { plate = \"bright.exr\" }\n"));
+  std::vector<std::string> told;
+  int clipped = 0;
+  show.run([&](const ShownFrame& shown) {
+    clipped += shown.prepared.persons[0].key == "clipped";
+    for (const std::string& line : shown.prepared.notes) {
+      if (line.find("unsure") != std::string::npos) told.push_back(line);
+    }
+  });
+  EXPECT_GT(clipped, 12);
+  EXPECT_LT(clipped, 28);
+  EXPECT_THAT(told, testing::ElementsAre("guest: the key is unsure (clipped)"));
 }
 
 TEST_F(PersonSetTest, RefusesWhatDoesNotFitTogether) {
