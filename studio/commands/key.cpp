@@ -78,6 +78,11 @@ void warn_if_cut_short(const VideoSource& source, const capture::Camera& camera,
   if (!how.empty()) console.warn(source.uri + ": " + how);
 }
 
+// Of any still background there is none to tell.
+Json json_of_colour(bool by_screen, std::string_view colour) {
+  return by_screen ? Json(colour) : Json();
+}
+
 void make_plate(const KeyOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) {
     throw std::invalid_argument(options.out + ": plates are OpenEXR files, name it *.exr");
@@ -108,9 +113,9 @@ void make_plate(const KeyOptions& options, Console& console) {
   if (plate.knows_noise) noise_too.noise = {plate.noise_gain, plate.noise_floor};
   capture::write_exr(options.out, plate.light, noise_too);
   const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
-  const std::string_view colour =
-      elsewhere < 1 ? compositing::name_of(plate.colour) : std::string_view("no");
   const bool by_screen = options.method == "screen";
+  const bool screen = by_screen && elsewhere < 1;
+  const std::string_view colour = screen ? compositing::name_of(plate.colour) : "no";
   if (by_screen && elsewhere >= 1) {
     console.warn("the plate has no colour, and is no screen: --method difference needs none");
   } else if (by_screen && elsewhere > much_elsewhere) {
@@ -119,9 +124,12 @@ void make_plate(const KeyOptions& options, Console& console) {
         "--person; what else it is, a garbage mask is to cut away",
         100 * elsewhere));
   }
-  Json figures{{"frames", frames},           {"lost", bad},
-               {"width", plate.light.width}, {"height", plate.light.height},
-               {"colour", colour},           {"noise_gain", nullptr},
+  Json figures{{"frames", frames},
+               {"lost", bad},
+               {"width", plate.light.width},
+               {"height", plate.light.height},
+               {"colour", json_of_colour(by_screen, colour)},
+               {"noise_gain", nullptr},
                {"noise_floor", nullptr}};
   std::string noise = "noise not measured";
   if (noise_too.noise) {
@@ -132,7 +140,7 @@ void make_plate(const KeyOptions& options, Console& console) {
   console.figures(json_text(figures));
   console.say(fmt::format("{}: {}x{}, {} of {} frames, {} screen, {}", options.out,
                           plate.light.width, plate.light.height, options.person ? "middle" : "mean",
-                          frames, colour == "no" ? "no" : fmt::format("a {}", colour), noise));
+                          frames, screen ? fmt::format("a {}", colour) : "no", noise));
 }
 
 compositing::KeySettings settings_of(const KeyOptions& options) {
@@ -251,7 +259,7 @@ Json json_of(const KeyedClip& clip) {
   }
   return {{"frames", clip.frames},
           {"lost", clip.lost},
-          {"colour", clip.colour},
+          {"colour", json_of_colour(clip.by_screen, clip.colour)},
           {"plate_known", clip.known},
           {"confidence_mean", clip.confidence()},
           {"confidence_least", clip.least_confidence},

@@ -175,6 +175,13 @@ TEST_F(KeyCommand, FindsAnyStillBackgroundInFootageAlone) {
           " --json " + in("wall.json"));
   ASSERT_EQ(keyed.status, 0) << keyed.err;
   EXPECT_THAT(keyed.out, HasSubstr("before a still background"));
+  EXPECT_TRUE(nlohmann::json::parse(content_of(in("wall.json")))["colour"].is_null());
+  const Outcome plate =
+      run("key plate " + in("wall_%04d.png") + " --colour sRGB --person" +
+          " --method difference -o " + in("plate.exr") + " --json " + in("plate.json"));
+  EXPECT_EQ(plate.status, 0) << plate.err;
+  EXPECT_THAT(plate.out, HasSubstr("12 frames, no screen, noise"));
+  EXPECT_TRUE(nlohmann::json::parse(content_of(in("plate.json")))["colour"].is_null());
   EXPECT_GT(nlohmann::json::parse(content_of(in("wall.json")))["plate_known"], 0.99);
   const capture::Image middle = capture::read_exr(in("wall/frame.000006.exr"));
   for (int y = 0; y < height; ++y) {
