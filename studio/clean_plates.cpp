@@ -40,8 +40,18 @@ compositing::PlateFootage spread_frames(capture::Camera& camera, int first, int 
   return footage;
 }
 
-compositing::CleanPlate read_plate(const std::string& path, capture::Transfer transfer) {
-  const capture::Image picture = read_picture(path, transfer);
+compositing::CleanPlate read_plate(const std::string& path, const VideoSource& source) {
+  if (path.ends_with(".exr")) {
+    const auto told = capture::read_exr_transfer(path);
+    if (told && *told != source.colour) {
+      throw std::runtime_error(
+          fmt::format("the clean plate {} was taken as colour = \"{}\", but the video {} is read "
+                      "as \"{}\": one "
+                      "of the two is wrong, or the plate is another camera's",
+                      path, capture::name_of(*told), source.uri, capture::name_of(source.colour)));
+    }
+  }
+  const capture::Image picture = read_picture(path, source.colour);
   compositing::CleanPlate plate = compositing::average_plate(std::span(&picture, 1));
   if (!path.ends_with(".exr")) return plate;
   if (const auto noise = capture::read_exr_noise(path)) {
@@ -79,7 +89,7 @@ compositing::CleanPlate read_clean_plate(const std::string& path,
                                          const VideoSource& source,
                                          compositing::KeyMethod method,
                                          std::array<int, 2> footage) {
-  if (!path.empty()) return read_plate(path, source.colour);
+  if (!path.empty()) return read_plate(path, source);
   VideoSource whole = source;
   whole.first = footage[0];
   whole.loop = false;

@@ -23,8 +23,8 @@ std::string words_for_shift(float right_px, float down_px);
 
 // The plate in a file, with the noise that it tells (EXR of `platelight key plate`); with no path,
 // from the source's own frames from first to last, of which some that are spread over them are
-// looked at, as the method asks. Throws std::runtime_error if it cannot be read, or the source is
-// live and has no file.
+// looked at, as the method asks. Throws std::runtime_error if it cannot be read, was taken by
+// another transfer curve than the source's (it tells), or the source is live and has no file.
 compositing::CleanPlate read_clean_plate(
     const std::string& path,
     const VideoSource& source,

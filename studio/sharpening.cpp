@@ -40,9 +40,9 @@ constexpr double worth_a_stage = 2.5;
 constexpr std::size_t anti_aliased = render::smoothed_stage;
 constexpr double small_part = 0.0625, seconds_to_go_straight = 1.5;
 
-// A cell may hold a live frame up for so many frames. Those that took longer before than one that
-// was given up are not tried for a while: each frame what that one took counts for more by so much.
-constexpr double most_frames_of_cell = 3, forgotten_in_frame = 1.01;
+// A cell may hold a live frame up for so many frames. Those that took such a part, or more, of what
+// one took before that was given up then, wait: in each frame for what is more by so much.
+constexpr double most_frames_of_cell = 3, part_that_waits = 0.9, forgotten_in_frame = 1.01;
 
 // The step through all cells in which they take their turns, spread over the picture: by the golden
 // section (Knuth, "The Art of Computer Programming" 3, 6.4).
@@ -75,9 +75,11 @@ double Sharpening::most_of_cell_ms() const {
 bool Sharpening::takes_too_long(std::size_t cell, std::size_t to) const {
   const CellTime& time = cell_times_[cell];
   if (time.too_fine != 0 && to >= time.too_fine) return true;
-  if (time.stage == 0) return false;
-  const double foreseen_ms = double{time.ms} * cost_[to] / cost_[time.stage];
-  return foreseen_ms > most_of_cell_ms() || double{time.ms} >= least_of_slow_ms_[to];
+  return time.stage != 0 && double{time.ms} * cost_[to] / cost_[time.stage] > most_of_cell_ms();
+}
+bool Sharpening::may_take_too_long(std::size_t cell, std::size_t to) const {
+  const CellTime& time = cell_times_[cell];
+  return time.stage != 0 && double{time.ms} >= least_of_slow_ms_[to];
 }
 
 // What was found ahead of the last frame, cell by cell.
@@ -91,8 +93,9 @@ void Sharpening::follow_cells() {
       continue;
     }
     time.too_fine = one.stage;
-    if (time.stage != 0)
-      least_of_slow_ms_[one.stage] = std::min(least_of_slow_ms_[one.stage], double{time.ms});
+    if (time.stage == 0) continue;
+    double& least_ms = least_of_slow_ms_[one.stage];
+    least_ms = std::min(least_ms, part_that_waits * double{time.ms});
   }
 }
 
@@ -104,7 +107,7 @@ std::string Sharpening::why_coarse() const {
         "and stays at a sharpness of {:.2f}; a lower [effort] can be finished",
         share());
   }
-  if (slow_cells_ == 0 || !plan_.ahead.empty()) return "";
+  if (slow_cells_ == 0 || waiting_cells_ > 0 || !plan_.ahead.empty()) return "";
   const double part = static_cast<double>(slow_cells_) / static_cast<double>(plan_.stages.size());
   return fmt::format(
       "{:.1f} % of the picture would hold a frame up by more than {:.0f} frames to be found finer: "
@@ -168,6 +171,10 @@ void Sharpening::go_on(double left, std::span<const float> looks_ms) {
       while (live_ && there > stage && takes_too_long(i, there)) --there;
       slow_cells_ += there < to;
       if (there == stage) continue;
+      if (live_ && may_take_too_long(i, there)) {
+        ++waiting_cells_;
+        continue;
+      }
       plan_.ahead.push_back({i, static_cast<std::uint8_t>(there)});
       if (!live_) left -= cost_[to];
     }
@@ -223,7 +230,7 @@ SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const floa
   for (std::size_t i = 0; i < kept.size(); ++i) {
     if (kept[i] == none) cell_times_[i] = {};
   }
-  slow_cells_ = 0;
+  slow_cells_ = waiting_cells_ = 0;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
   const auto lost = static_cast<std::size_t>(std::ranges::count(kept, none));

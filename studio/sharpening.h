@@ -71,6 +71,7 @@ class Sharpening {
   std::size_t stage_of_lost(std::size_t lost) const;
   void go_on(double left, std::span<const float> looks_ms);
   bool takes_too_long(std::size_t cell, std::size_t to) const;
+  bool may_take_too_long(std::size_t cell, std::size_t to) const;
   void follow_cells();
   bool looks_matter() const;
   bool looks_much(float look_ms) const;
@@ -99,7 +100,7 @@ class Sharpening {
   std::vector<CellTime> cell_times_;
   // A cell that took as much before may take too long at this stage.
   ByStage<double> least_of_slow_ms_;
-  std::size_t slow_cells_ = 0;  // of the last plan
+  std::size_t slow_cells_ = 0, waiting_cells_ = 0;  // of the last plan
   // Of the last frame, where none of its cells was shed.
   struct Told {
     double relight_ms, render_ms;

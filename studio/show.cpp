@@ -406,9 +406,9 @@ class Show::Stages {
 
   // Once whenever the light ceases to be renewed.
   void note_sharpness() {
+    if (sharpening_->lost_share() > 0) stays_coarse_ = false;
     const std::string why = sharpening_->why_coarse();
-    if (!why.empty() && !stays_coarse_) note(why);
-    stays_coarse_ = !why.empty();
+    if (!why.empty() && !std::exchange(stays_coarse_, true)) note(why);
   }
 
   void note_probe(const PreparedFrame& frame) {

@@ -109,9 +109,10 @@ void make_plate(const KeyOptions& options, Console& console) {
     console.warn(fmt::format("{} of {} frames were lost or damaged, and left out", bad, passed));
   }
   const compositing::CleanPlate plate = maker.plate();
-  capture::ExrOptions noise_too;
-  if (plate.knows_noise) noise_too.noise = {plate.noise_gain, plate.noise_floor};
-  capture::write_exr(options.out, plate.light, noise_too);
+  capture::ExrOptions tags;
+  if (plate.knows_noise) tags.noise = {plate.noise_gain, plate.noise_floor};
+  tags.transfer = source.colour;
+  capture::write_exr(options.out, plate.light, tags);
   const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
   const bool by_screen = options.method == "screen";
   const bool screen = by_screen && elsewhere < 1;
@@ -132,7 +133,7 @@ void make_plate(const KeyOptions& options, Console& console) {
                {"noise_gain", nullptr},
                {"noise_floor", nullptr}};
   std::string noise = "noise not measured";
-  if (noise_too.noise) {
+  if (tags.noise) {
     figures["noise_gain"] = plate.noise_gain;
     figures["noise_floor"] = plate.noise_floor;
     noise = fmt::format("noise in black {:.4f}", std::sqrt(plate.noise_floor));

@@ -74,7 +74,8 @@ TEST_F(KeyCommand, APlatesFileTellsTheNoiseOfItsFrames) {
                             in("plate.exr") + " --json " + in("plate.json"));
   ASSERT_EQ(plate.status, 0) << plate.err;
   const auto told = nlohmann::json::parse(content_of(in("plate.json")));
-  const compositing::CleanPlate read = read_clean_plate(in("plate.exr"), {});
+  const compositing::CleanPlate read =
+      read_clean_plate(in("plate.exr"), {.colour = capture::Transfer::srgb});
   EXPECT_GT(read.noise_floor, compositing::least_noise_floor);
   EXPECT_FLOAT_EQ(read.noise_gain, told["noise_gain"]);
   EXPECT_FLOAT_EQ(read.noise_floor, told["noise_floor"]);
@@ -85,7 +86,8 @@ TEST_F(KeyCommand, APlatesFileTellsTheNoiseOfItsFrames) {
   }
   ASSERT_EQ(
       run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
-  const compositing::CleanPlate still = read_clean_plate(in("plate.exr"), {});
+  const compositing::CleanPlate still =
+      read_clean_plate(in("plate.exr"), {.colour = capture::Transfer::srgb});
   EXPECT_EQ(still.noise_gain, compositing::CleanPlate{}.noise_gain);
   EXPECT_EQ(still.noise_floor, compositing::CleanPlate{}.noise_floor);
 }
@@ -271,7 +273,8 @@ TEST_F(KeyCommand, TakesAPlateOfAScreenWithSomebodyBeforeIt) {
       run("key plate " + in("take_%04d.png") + " --colour sRGB --person -o " + in("plate.exr"));
   EXPECT_EQ(plate.status, 0) << plate.err;
   EXPECT_THAT(plate.out, HasSubstr("middle of 4 frames, a green screen, noise in black 0.00"));
-  const compositing::CleanPlate read = read_clean_plate(in("plate.exr"), {});
+  const compositing::CleanPlate read =
+      read_clean_plate(in("plate.exr"), {.colour = capture::Transfer::srgb});
   EXPECT_TRUE(read.knows_noise);
   EXPECT_NEAR(read.noise_gain, 1.1e-4, 2e-5);  // variance of the made camera, rounding too
 }
@@ -364,8 +367,9 @@ TEST_F(KeyCommand, KeepsToMasks) {
       }
     }
   }
-  const Outcome refused = run("key " + in("take_%04d.png") + " --plate " + in("plate.exr") +
-                              " --core-mask " + in("missing.exr") + " -o " + in("keyed"));
+  const Outcome refused =
+      run("key " + in("take_%04d.png") + " --colour sRGB --plate " + in("plate.exr") +
+          " --core-mask " + in("missing.exr") + " -o " + in("keyed"));
   EXPECT_EQ(refused.status, 1);
   EXPECT_THAT(refused.err, HasSubstr("missing.exr"));
 }
@@ -381,6 +385,18 @@ TEST_F(KeyCommand, RefusesAPlateOfAnotherSizeAndNamesBoth) {
 }
 
 // A mask that fits the video is not to blame.
+TEST_F(KeyCommand, RefusesAPlateOfAnotherCurveAndNamesBoth) {
+  ASSERT_EQ(
+      run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
+  const Outcome keyed =
+      run("key " + in("take_%04d.png") + " --plate " + in("plate.exr") + " -o " + in("keyed"));
+  EXPECT_EQ(keyed.status, 1);
+  expect_one_line(keyed.err);
+  EXPECT_THAT(keyed.err, HasSubstr(in("plate.exr") + " was taken as colour = \"sRGB\""));
+  EXPECT_THAT(keyed.err, HasSubstr("is read as \"Rec.1886\""));
+  EXPECT_FALSE(fs::exists(in("keyed")));
+}
+
 TEST_F(KeyCommand, BlamesThePlateAndNotTheMaskForThePlatesSize) {
   capture::write_exr(in("small.exr"), capture::make_image(45, 80));
   capture::write_exr(in("core.exr"), capture::make_image(90, 160));
