@@ -45,6 +45,12 @@ class KeyCommand : public CommandLine {
   capture::Image truth_;
 };
 
+VideoSource srgb_video() {
+  VideoSource video;
+  video.colour = capture::Transfer::srgb;
+  return video;
+}
+
 TEST_F(KeyCommand, TakesAPlateAndKeysAClipWithIt) {
   const Outcome plate =
       run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr"));
@@ -74,8 +80,7 @@ TEST_F(KeyCommand, APlatesFileTellsTheNoiseOfItsFrames) {
                             in("plate.exr") + " --json " + in("plate.json"));
   ASSERT_EQ(plate.status, 0) << plate.err;
   const auto told = nlohmann::json::parse(content_of(in("plate.json")));
-  const compositing::CleanPlate read =
-      read_clean_plate(in("plate.exr"), {.colour = capture::Transfer::srgb});
+  const compositing::CleanPlate read = read_clean_plate(in("plate.exr"), srgb_video());
   EXPECT_GT(read.noise_floor, compositing::least_noise_floor);
   EXPECT_FLOAT_EQ(read.noise_gain, told["noise_gain"]);
   EXPECT_FLOAT_EQ(read.noise_floor, told["noise_floor"]);
@@ -86,8 +91,7 @@ TEST_F(KeyCommand, APlatesFileTellsTheNoiseOfItsFrames) {
   }
   ASSERT_EQ(
       run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
-  const compositing::CleanPlate still =
-      read_clean_plate(in("plate.exr"), {.colour = capture::Transfer::srgb});
+  const compositing::CleanPlate still = read_clean_plate(in("plate.exr"), srgb_video());
   EXPECT_EQ(still.noise_gain, compositing::CleanPlate{}.noise_gain);
   EXPECT_EQ(still.noise_floor, compositing::CleanPlate{}.noise_floor);
 }
@@ -273,8 +277,7 @@ TEST_F(KeyCommand, TakesAPlateOfAScreenWithSomebodyBeforeIt) {
       run("key plate " + in("take_%04d.png") + " --colour sRGB --person -o " + in("plate.exr"));
   EXPECT_EQ(plate.status, 0) << plate.err;
   EXPECT_THAT(plate.out, HasSubstr("middle of 4 frames, a green screen, noise in black 0.00"));
-  const compositing::CleanPlate read =
-      read_clean_plate(in("plate.exr"), {.colour = capture::Transfer::srgb});
+  const compositing::CleanPlate read = read_clean_plate(in("plate.exr"), srgb_video());
   EXPECT_TRUE(read.knows_noise);
   EXPECT_NEAR(read.noise_gain, 1.1e-4, 2e-5);  // variance of the made camera, rounding too
 }
