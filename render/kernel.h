@@ -117,8 +117,8 @@ void render_tile(const FrameContext& context,
                  TileWorkspace& workspace,
                  TileResult& result);
 
-// Finds the transport of a cell and keeps it in the frame's inputs.kept; gives up soon after a
-// time. Unless it did both, what was kept of the cell stays.
+// Finds the transport of a cell and keeps it in the frame's inputs.kept, or gives up soon after a
+// time. Unless it is kept, what was there of the cell stays.
 enum class FoundCell : std::uint8_t { kept, has_no_room, takes_too_long };
 FoundCell find_cell(const FrameContext& context,
                     int column,

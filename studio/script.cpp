@@ -20,6 +20,7 @@
 #include "studio/set_sections.h"
 #include "studio/show_inputs.h"
 #include "studio/timed_source.h"
+#include "studio/toml_file.h"
 
 namespace studio {
 namespace {
@@ -257,13 +258,7 @@ Script read_script(const std::string& path,
                    const Set& set,
                    const std::function<void(Set&)>& adapt) {
   Faults faults(path);
-  TomlValue file;
-  try {
-    file = read_toml(path);
-  } catch (const TomlError& error) {
-    faults.add(error.place(), error.what());
-    throw SetError(faults.sorted());
-  }
+  const TomlValue file = read_toml_file(path);
   Section root(file, "", faults);
   std::vector<std::pair<std::int64_t, Section>> tables;
   for (Section& at : root.tables("at")) {

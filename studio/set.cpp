@@ -14,6 +14,7 @@
 #include "render/caustics.h"
 #include "render/kernel.h"
 #include "studio/set_sections.h"
+#include "studio/toml_file.h"
 
 namespace studio {
 namespace {
@@ -181,13 +182,7 @@ render::Effort read_effort_section(Section section, render::Effort effort) {
 
 Set read_set(const std::string& path) {
   Faults faults(path);
-  TomlValue file;
-  try {
-    file = read_toml(path);
-  } catch (const TomlError& error) {
-    faults.add(error.place(), error.what());
-    throw SetError(faults.sorted());
-  }
+  const TomlValue file = read_toml_file(path);
 
   Set set;
   set.path = path;

@@ -23,6 +23,7 @@
 #include "studio/light_pairs.h"
 #include "studio/section.h"
 #include "studio/set_sections.h"
+#include "studio/toml_file.h"
 
 namespace studio {
 namespace {
@@ -50,13 +51,7 @@ struct PaintedPatch {
 
 std::vector<PaintedPatch> read_patches(const std::string& path, std::array<int, 2> picture) {
   Faults faults(path);
-  TomlValue file;
-  try {
-    file = read_toml(path);
-  } catch (const TomlError& error) {
-    faults.add(error.place(), error.what());
-    throw SetError(faults.sorted());
-  }
+  const TomlValue file = read_toml_file(path);
   Section root(file, "", faults);
   root.need("patch", "the tables of what is painted: [[patch]] with pixels and albedo");
   std::vector<PaintedPatch> patches;
