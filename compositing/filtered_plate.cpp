@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "capture/half.h"
 #include "compositing/screen_colour.h"
 
 namespace compositing {
@@ -19,10 +20,8 @@ FilteredPlate::FilteredPlate(const LitPlate& bare)
     : across_(share_of(bare.width, bare.columns, bare.step)),
       down_(share_of(bare.height, bare.rows, bare.step)) {
   capture::Image light = capture::make_image(bare.rows, bare.columns, 3);
-  first_.reserve(light.pixels.size() / 3);
   for (std::size_t i = 0; 3 * i < light.pixels.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) light.pixels[3 * i + c] = bare.cells[4 * i + c];
-    first_.push_back(bare.cells[4 * i]);
   }
   cells_.take(light);
   // Screens are smooth: their cells are means already. Of other backgrounds no two pixels are
@@ -33,9 +32,10 @@ FilteredPlate::FilteredPlate(const LitPlate& bare)
 
 std::array<float, 4> FilteredPlate::at(
     const LitPlate& lit, const float* nearest, float u, float v, float footprint_uv) const {
-  if (is_fine(footprint_uv)) return {nearest[0], nearest[1], nearest[2], nearest[3]};
-  const auto cell = static_cast<std::size_t>(nearest - lit.cells.data()) / 4;
-  const float gain = first_[cell] > 0 ? nearest[0] / first_[cell] : 1;
+  if (footprint_uv < fine_uv_) return {nearest[0], nearest[1], nearest[2], nearest[3]};
+  const auto cell = static_cast<std::size_t>(nearest - lit.cells.data());
+  const float bare = capture::float_from_half(cells_.level(0).pixels[cell]);
+  const float gain = bare > 0 ? nearest[0] / bare : 1;
   const float wide = footprint_uv * std::sqrt(across_ * down_);
   const std::array<float, 4> light = cells_.filtered(u * across_, v * down_, wide);
   std::array<float, 4> filtered{gain * light[0], gain * light[1], gain * light[2], nearest[3]};

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <array>
-#include <memory>
-#include <vector>
 
 #include "compositing/clean_plate.h"
 #include "compositing/keyed_texture.h"
@@ -17,18 +15,15 @@ class FilteredPlate {
   // Of a plate before it is lit (PlateLight::bare).
   explicit FilteredPlate(const LitPlate& bare);
 
-  // Whether the nearest cell will do where a frame is filtered over so much of its width.
-  bool is_fine(float footprint_uv) const { return footprint_uv < fine_uv_; }
   // A cell of `lit`, which must be of the same plate, as seen from (u, v); `nearest` is the one
   // there, whose light over the bare plate's is taken for that of all that is filtered.
   std::array<float, 4> at(
       const LitPlate& lit, const float* nearest, float u, float v, float footprint_uv) const;
 
  private:
-  KeyedTexture cells_;        // channels in the keyer's order
-  std::vector<float> first_;  // of each cell
-  float across_, down_;       // of the cells' size, the frame's
-  float fine_uv_;
+  KeyedTexture cells_;   // channels in the keyer's order
+  float across_, down_;  // of the cells' size, the frame's
+  float fine_uv_;        // up to which the nearest cell will do
 };
 
 }  // namespace compositing
