@@ -19,6 +19,7 @@
 #include "render/standard.h"
 #include "render/trace.h"
 #include "render/transform.h"
+#include "render/video_texture.h"
 
 namespace render {
 namespace {
@@ -117,14 +118,16 @@ class PointFinder {
     const Material& material = description.materials[point.hit.material];
     if (point.hit.instance != place.instance || material.shader != "standard") return std::nullopt;
     const Vec3f along = unit_across(point.hit.geometric_normal) * std::sqrt(area_m2);
+    const StandardParameters parameters =
+        standard_parameters(material, description.textures.size(), description.videos.size());
     const StandardSurface surface = standard_surface(
-        standard_parameters(material, description.textures.size(), description.videos.size()),
-        description, point.hit, {along, cross(point.hit.geometric_normal, along)});
+        parameters, description, point.hit, {along, cross(point.hit.geometric_normal, along)});
     const Vec3f aside = normalize(
         cross(std::abs(surface.normal.z) < 0.9F ? Vec3f{0, 0, 1} : Vec3f{1, 0, 0}, surface.normal));
     const Vec3f view =
         surface.normal * mean_cosine + aside * std::sqrt(1 - mean_cosine * mean_cosine);
     point.albedo = standard_weights(surface, view).diffuse;
+    if (parameters.base_color_video >= 0) point.albedo = point.albedo * planned_grey;
     if (!(largest(point.albedo) > 0)) return std::nullopt;
     point.stays = staying_share(point.hit, number);
     return point;

@@ -27,6 +27,8 @@ inline constexpr int most_bounce_points = 1 << 14;
 // planned light alone, and their intensities follow any light of the same table without a ray, so
 // that a still set under live light takes none (LocalLight).
 //
+// What live textures are the colour of counts as grey, whatever they show.
+//
 // What the lamps send to the points, and so to each other, is found by rays as well: all bounces of
 // light are in them. A lamp of some area lights what touches it less than a point would, and has no
 // bright spot around it.

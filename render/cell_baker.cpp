@@ -2,10 +2,8 @@
 #include "render/cell_baker.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "render/cones.h"
 #include "render/embree_context.h"
@@ -103,8 +101,13 @@ bool CellBaker::find(int stage, bool past_pictures) {
   open_sky_of_centre_.fill(1);
   grey_.fill({});
   grey_of_further_.fill({});
+  painted_diffuse_.fill({});
+  for (PaintedOfPixel& pixel : painted_of_pixel_) pixel.count = pixel.next = 0;
   lights_.clear();
   lamps_.clear();
+  bent_.clear();
+  video_.clear();
+  paint_.clear();
   places_.clear(*frame.planned, frame.planned_levels);
   compact_shares_.clear();
   lamps_apart_.fill(0);
@@ -140,7 +143,8 @@ bool CellBaker::find(int stage, bool past_pictures) {
 void CellBaker::clear_answer(ShadePoint& p) {
   p.radiance = p.diffuse = p.light_normal = p.plate_share = p.environment_share = {};
   p.catches_shadow = p.catches_lamps = false;
-  p.video = {};
+  p.video = p.paint = {};
+  p.painted = not_painted;
 }
 
 // The stream's first rays, as far as each goes.
@@ -282,8 +286,11 @@ void CellBaker::shade_points(int count, bool grid) {
     const bool means = compares_centres_ && shader.glows_by_means();
     for (ShadePoint* p : group_points) {
       if (means && p->depth == 0) own_[p->slot] += p->throughput * p->radiance;
+      if (!shades_ring_ || p->depth > 0) {
+        paint(*p);
+        continue;
+      }
       // Around the cell, light is not asked for.
-      if (!shades_ring_ || p->depth > 0) continue;
       answers_light_[index_of(*p)] = p->diffuse != Vec3f{} || p->catches_lamps;
       p->diffuse = {};
       p->catches_shadow = p->catches_lamps = false;
@@ -336,7 +343,7 @@ void CellBaker::collect(const ShadePoint& p) {
   CameraSample& sample = samples_[p.slot];
   const Light& light = light_of_point_[index_of(p)];
   const Vec3f own = p.throughput * p.radiance;
-  const Vec3f sent_back = own + p.throughput * p.diffuse * (light.arriving + light.lamps);
+  const Vec3f sent_back = own + p.throughput * planned_diffuse(p) * (light.arriving + light.lamps);
   base.radiance += own;
   sample.added += sent_back;
   if (p.depth == 0) first_[p.slot] += sent_back;
@@ -347,7 +354,7 @@ void CellBaker::collect(const ShadePoint& p) {
   }
   const Vec3f share = p.throughput * p.plate_share;
   if (p.kind == RayKind::bent && !p.catches_shadow && share != Vec3f{}) {
-    add_bent(p, share, CellTransport::BentPlate::lit);
+    add_bent(p, share, lit);
   }
   if (p.kind != RayKind::camera) return;
   if (!p.catches_shadow) {
@@ -425,7 +432,7 @@ void CellBaker::set_receiver(std::size_t k, const ShadePoint& p) {
   // What is dark shows little of the light, what only mirrors nothing but compact lights.
   if (!p.catches_shadow && !p.catches_lamps) {
     constexpr float grey = 0.25F / std::numbers::pi_v<float>;
-    r.share[k] *= std::min(largest(p.diffuse) / grey, 1.0F);
+    r.share[k] *= std::min(largest(planned_diffuse(p)) / grey, 1.0F);
   }
   r.part[k] = part_of(p, r.share[k]);
 }
@@ -522,7 +529,9 @@ void CellBaker::add_centre(const ShadePoint& p) {
   CellTransport::Centres& c = transport_->centres.front();
   const std::size_t k = p.pixel;
   c.nx[k] = receivers_.nx[k], c.ny[k] = receivers_.ny[k], c.nz[k] = receivers_.nz[k];
-  if (const Vec3f diffuse = p.throughput * p.diffuse; diffuse != Vec3f{}) {
+  if (p.painted != not_painted) {
+    add_painted_centre(p);
+  } else if (const Vec3f diffuse = p.throughput * p.diffuse; diffuse != Vec3f{}) {
     c.diffuse.put(k, diffuse);
     c.any_diffuse = true;
   }
@@ -530,67 +539,6 @@ void CellBaker::add_centre(const ShadePoint& p) {
     c.shadow.put(k, p.throughput * p.plate_share);
     c.any_shadow = true;
   }
-}
-
-// Lights of points that are no centres, in the order of `tested_`.
-void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
-  CellTransport& t = *transport_;
-  const std::size_t first_picture_light = t.picture_lights.size();
-  looked_for_ = {};
-  looked_for_by_.clear();
-  for (const PointLight& l : tested_) {
-    const ShadePoint& p = points_[point_at[l.point]];
-    const Vec3f weight = p.throughput * p.diffuse * l.passed * l.weight;
-    if (weight == Vec3f{}) continue;
-    if (past_pictures_) {
-      add_tested_past_pictures(p, l, weight, light_of_point_[point_at[l.point]].open);
-    } else {
-      lights_.add({static_cast<std::uint16_t>(target_of(p)), l.light, weight});
-    }
-  }
-  settle_picture_lights(first_picture_light);
-  for (std::size_t k = 0; k < point_at.size(); ++k) {
-    const ShadePoint& p = points_[point_at[k]];
-    catcher_of_receiver_[k] = bent_of_receiver_[k] = no_catcher;
-    if (!p.catches_shadow && !p.catches_lamps) continue;
-    const auto first = static_cast<std::uint32_t>(t.shadow_lights.size());
-    for (const PointLight& l : tested_) {
-      if (l.point != k) continue;
-      note_picture_shadow(p, k, l, light_of_point_[point_at[k]].open);
-      t.shadow_lights.push_back({l.light, l.weight, (Vec3f{1, 1, 1} - l.passed) * l.weight});
-    }
-    const bool bent = p.kind == RayKind::bent;
-    t.shadow_points.push_back({static_cast<std::uint16_t>(target_of(p)), first,
-                               static_cast<std::uint32_t>(t.shadow_lights.size()) - first,
-                               p.catches_shadow && !bent ? p.throughput * p.plate_share : Vec3f{}});
-    if (bent) {
-      bent_of_receiver_[k] = static_cast<std::uint32_t>(t.shadow_points.size()) - 1;
-      add_bent(p, p.throughput * p.plate_share, bent_of_receiver_[k]);
-      continue;
-    }
-    if (p.catches_lamps && !frame_->planned_table->lamps.empty()) {
-      needs_pictures_ = needs_pictures_ || p.behind != no_picture_ray;
-      catcher_of_receiver_[k] = static_cast<std::uint32_t>(t.catchers.size());
-      t.catchers.push_back({static_cast<std::uint16_t>(target_of(p)),
-                            static_cast<std::uint32_t>(cell_pixels + t.shadow_points.size() - 1),
-                            p.throughput, p.albedo});
-    }
-  }
-}
-
-// A further sample that shares the light of a centre on the same surface.
-void CellBaker::add_shared(const ShadePoint& p, std::size_t centre) {
-  const auto slot = static_cast<std::uint16_t>(target_of(p));
-  const auto c = static_cast<std::uint16_t>(centre);
-  if (p.diffuse != Vec3f{}) {
-    transport_->shared.push_back(
-        {slot, c, CellTransport::SharedTerm::Of::light, p.throughput * p.diffuse});
-  }
-  if (p.catches_shadow) {
-    transport_->shared.push_back(
-        {slot, c, CellTransport::SharedTerm::Of::shadow, p.throughput * p.plate_share});
-  }
-  catch_lamps(p, centre, light_[centre].lamps);
 }
 
 }  // namespace render

@@ -16,6 +16,7 @@
 #include "render/light_terms.h"
 #include "render/met_centres.h"
 #include "render/open_lobes.h"
+#include "render/place_terms.h"
 #include "render/sample_sequence.h"
 #include "render/standard.h"
 #include "render/trace.h"
@@ -65,7 +66,7 @@ class CellBaker final : public RaySink {
   static constexpr int ring_size = MetCentres::side;
   static constexpr int around = 4 * (ring_size - 1);  // pixels around a cell
   static constexpr std::uint16_t nowhere = 0xFFFF;    // no receiver
-  static constexpr std::uint32_t no_catcher = ~0U;
+  static constexpr std::uint32_t no_catcher = ~0U, lit = ~0U;
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;
@@ -150,6 +151,17 @@ class CellBaker final : public RaySink {
     std::optional<Vec3f> radiance;  // if it was asked for
   };
 
+  // A slot of painted light, whose points show one live texture in one slot.
+  struct PaintedSlot {
+    std::uint16_t number;  // in CellTransport::painted
+    std::uint16_t slot, video;
+    float weight;  // of its points together
+  };
+  struct PaintedOfPixel {
+    std::size_t count = 0, next = 0;
+    std::array<PaintedSlot, CellTransport::most_painted_of_pixel> slots;
+  };
+
   // Of points: the irradiance that is planned.
   struct Light {
     Vec3f open, arriving;
@@ -165,6 +177,19 @@ class CellBaker final : public RaySink {
   static std::size_t target_of(const Sample& p) {
     if (p.behind != no_picture_ray) return slots + p.behind;
     return p.slot < cell_pixels ? p.pixel : cell_pixels + p.pixel;
+  }
+  // Of what a point's matte surface sends back.
+  static std::uint16_t matte_target_of(const ShadePoint& p) {
+    return static_cast<std::uint16_t>(
+        p.painted == not_painted ? target_of(p) : CellPicture::all_slots + p.painted);
+  }
+  // What it sends back, in planned light, under paint as well.
+  static Vec3f planned_diffuse(const ShadePoint& p) {
+    return p.painted == not_painted ? p.diffuse : p.diffuse * planned_grey;
+  }
+  // The same of a centre, times its share.
+  Vec3f diffuse_of_centre(std::size_t k) const {
+    return transport_->centres.front().diffuse.at(k) + painted_diffuse_[k];
   }
   // Of the points that are at work.
   std::size_t index_of(const ShadePoint& p) const {
@@ -205,9 +230,13 @@ class CellBaker final : public RaySink {
   void clear_receivers();
   void set_receiver(std::size_t k, const ShadePoint& p);
   void add_centre(const ShadePoint& p);
+  void collect(const ShadePoint& p);
+
+  // cell_points.cpp
+  std::uint16_t tint_of(Vec3f passed);
+  void sort_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_tested(std::span<const std::uint16_t> point_of_receiver);
   void add_shared(const ShadePoint& p, std::size_t centre);
-  void collect(const ShadePoint& p);
 
   // cell_foreground.cpp
   bool may_see_pictures() const;
@@ -231,7 +260,10 @@ class CellBaker final : public RaySink {
     return past_pictures_ && !shades_ring_ && frame_->stalls.are_passed(from, direction, far_m);
   }
   bool may_dim_lamp(Vec3f from, std::size_t lamp) const;
-  void add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Vec3f weight);
+  void add_lamp_past_pictures(const ShadePoint& p,
+                              std::size_t target,
+                              std::size_t lamp,
+                              Vec3f weight);
   void note_picture_shadow(const ShadePoint& p,
                            std::size_t receiver,
                            const PointLight& l,
@@ -252,8 +284,12 @@ class CellBaker final : public RaySink {
     bool looked_for = false;
   };
   // `part`: of the point's light, if there is other light as well.
-  MayDim add_light_past_pictures(
-      const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part = 1);
+  MayDim add_light_past_pictures(const ShadePoint& p,
+                                 std::size_t target,
+                                 Vec3f direction,
+                                 std::size_t light,
+                                 Vec3f weight,
+                                 float part = 1);
   void add_tested_past_pictures(const ShadePoint& p, const PointLight& l, Vec3f weight, Vec3f open);
   void settle_picture_lights(std::size_t first);
   Vec3f direction_through(std::size_t pixel) const;
@@ -319,7 +355,12 @@ class CellBaker final : public RaySink {
   void add_asked(const ShadePoint& p, const AskedAgain& asked);
 
   // cell_video.cpp
+  template <class F>
+  void for_each_place(const SeenVideo& seen, F&& call) const;
   void add_video(const ShadePoint& p);
+  void paint(ShadePoint& p);
+  PaintedSlot* painted_slot(const ShadePoint& p);
+  void add_painted_centre(const ShadePoint& p);
 
   // cell_bent.cpp
   void leave_bent(
@@ -337,6 +378,7 @@ class CellBaker final : public RaySink {
   void pack();
   void pack_bases();
   void pack_places();
+  void pack_live_places();
 
   // cell_lobes.cpp
   std::uint32_t sample_of(const ShadePoint& p) const;
@@ -425,6 +467,8 @@ class CellBaker final : public RaySink {
   std::array<std::uint8_t, stream_rays> shares_mirrored_;  // points that have their light so
   std::array<std::int16_t, stream_rays> lender_;  // pixel whose light a point shares, or -1
   std::vector<PointLight> tested_;
+  std::array<std::uint32_t, cell_pixels> end_of_receiver_;  // in what follows
+  std::vector<std::uint32_t> tested_by_receiver_;           // of those that catch shadows
   // By pixel, of the points at hand: what lights give that pictures may dim, and what that would be
   // by those that these are looked for in; how many these are likely to be.
   struct LookedFor {
@@ -438,6 +482,7 @@ class CellBaker final : public RaySink {
   std::vector<AskedAgain> asked_;
   LightTerms lights_, lamps_;
   EnvironmentPlaces places_;
+  PlaceTerms bent_, video_, paint_;  // of slots; the last of painted ones
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;
@@ -453,6 +498,9 @@ class CellBaker final : public RaySink {
   // Of centres' answers, what stands for surroundings; and that of a pixel's further samples, in
   // the light of its own centre.
   std::array<Vec3f, cell_pixels> grey_, grey_of_further_;
+  std::array<Vec3f, cell_pixels> painted_diffuse_;  // of centres, planned_diffuse() times share
+  std::array<PaintedOfPixel, cell_pixels> painted_of_pixel_;
+  std::array<float, CellTransport::most_painted> painted_weights_;
   LookUp looked_up_{};                   // last, in this cell
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays
   std::uint32_t pushed_ = 0;

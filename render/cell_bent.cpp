@@ -23,8 +23,7 @@ void CellBaker::leave_bent(
   Vec3f sees_environment = p.environment_share;
   if (p.plate_share != Vec3f{}) {
     const float width_rad = std::sqrt(length(spread.a) * length(spread.b));
-    if (!add_plate(slot, target, direction, width_rad, direction, weight * p.plate_share,
-                   CellTransport::BentPlate::lit)) {
+    if (!add_plate(slot, target, direction, width_rad, direction, weight * p.plate_share, lit)) {
       sees_environment += p.plate_share;
     }
   }
@@ -64,11 +63,15 @@ bool CellBaker::add_plate(std::size_t slot,
   const int level =
       width_px > 1 ? std::min(static_cast<int>(std::lround(std::log2(width_px))), last) : 0;
   const double shrunk = 1.0 / (1 << level);
-  transport_->bent.push_back(
-      {weight, static_cast<float>((q->x + 0.5) * shrunk - 0.5),
-       static_cast<float>((q->y + 0.5) * shrunk - 0.5), static_cast<std::uint16_t>(target),
-       static_cast<std::uint16_t>(frame_->first_plate_level + static_cast<std::size_t>(level)),
-       shadow_point});
+  const PlaceTerm term{
+      weight, static_cast<float>((q->x + 0.5) * shrunk - 0.5),
+      static_cast<float>((q->y + 0.5) * shrunk - 0.5), static_cast<std::uint16_t>(target),
+      static_cast<std::uint16_t>(frame_->first_plate_level + static_cast<std::size_t>(level))};
+  if (shadow_point == lit) {
+    bent_.add(term);
+  } else {
+    transport_->bent_shaded.push_back({term, shadow_point});
+  }
   samples_[slot].added += weight * planned_radiance(look_up(planned_direction, 0, {}, false));
   return true;
 }

@@ -35,8 +35,8 @@ bool CellBaker::lamp_shows(std::size_t place, std::size_t a, std::size_t b) cons
   const std::size_t seeing = t.lamps.factors[place].at[a] > 0 ? a : b;
   const Vec3f irradiance =
       lamp_at(place, seeing) * frame_->planned_table->lamps[t.lamps.numbers[place]].intensity;
-  const ColourPlanes& diffuse = t.centres.front().diffuse;
-  return std::max(largest(diffuse.at(a) * irradiance), largest(diffuse.at(b) * irradiance)) >
+  return std::max(largest(diffuse_of_centre(a) * irradiance),
+                  largest(diffuse_of_centre(b) * irradiance)) >
          least_doubt * effort_.glint_contrast;
 }
 
@@ -205,12 +205,14 @@ void CellBaker::add_asked(const ShadePoint& p, const AskedAgain& asked) {
       (asked.passed * asked.per_source - asked.passed_centre * asked.per_source_centre);
   if (weight == Vec3f{}) return;
   const LightTable& planned = *frame_->planned_table;
+  const float grey = p.painted == not_painted ? 1 : planned_grey;
   if (asked.is_lamp) {
-    add_lamp_past_pictures(p, asked.number, weight);
-    samples_[p.slot].added += weight * planned.lamps[asked.number].intensity;
+    add_lamp_past_pictures(p, matte_target_of(p), asked.number, weight);
+    samples_[p.slot].added += weight * grey * planned.lamps[asked.number].intensity;
   } else {
-    add_light_past_pictures(p, planned.lights[asked.number].direction, asked.number, weight);
-    samples_[p.slot].added += weight * planned.lights[asked.number].irradiance;
+    add_light_past_pictures(p, matte_target_of(p), planned.lights[asked.number].direction,
+                            asked.number, weight);
+    samples_[p.slot].added += weight * grey * planned.lights[asked.number].irradiance;
   }
 }
 

@@ -120,12 +120,14 @@ void CellBaker::shade_ring() {
   std::swap(aside_.reach, own.reach);
   transport_ = &aside_;
   lights_.begin_aside(), lamps_.begin_aside(), places_.begin_aside();
+  bent_.begin_aside(), video_.begin_aside();
   const auto sent = sent_;
   shades_ring_ = true;
   shade_points(count, false);
   bounce();
   shades_ring_ = false;
   lights_.end_aside(), lamps_.end_aside(), places_.end_aside();
+  bent_.end_aside(), video_.end_aside();
   sent_ = sent;
   transport_ = &own;
   std::swap(aside_.reach, own.reach);
@@ -172,9 +174,8 @@ float CellBaker::light_step(std::size_t a, std::size_t b) const {
   const float least = smooths_ ? blend_contrast_ : effort_.glint_contrast;
   if (!(step > least) || !met_.continuous(a, b)) return step;
   const CellTransport& t = *transport_;
-  const CellTransport::Centres& c = t.centres.front();
   const bool lit = in(t.receiving, a) && in(t.receiving, b);
-  const auto diffuse_of = [&](std::size_t k) { return c.diffuse.at(k) - grey_[k]; };
+  const auto diffuse_of = [&](std::size_t k) { return diffuse_of_centre(k) - grey_[k]; };
   const auto even = [&](std::size_t k, std::size_t other) {
     Vec3f change = (own_[other] - own_[k]) * 0.5F;
     if (lit)
@@ -237,7 +238,7 @@ bool CellBaker::lit_unlike(std::size_t a, std::size_t b) const {
   const CellTransport& t = *transport_;
   if (!in(t.receiving, a) || !in(t.receiving, b) || !met_.continuous(a, b)) return false;
   const CellTransport::Centres& c = t.centres.front();
-  const Vec3f diffuse = (c.diffuse.at(a) + c.diffuse.at(b)) * 0.5F;
+  const Vec3f diffuse = (diffuse_of_centre(a) + diffuse_of_centre(b)) * 0.5F;
   const auto shown = [&](std::size_t k, Vec3f in_doubt) {
     const Light& light = light_[k];
     return diffuse * (light.arriving + light.lamps - in_doubt) +

@@ -52,7 +52,7 @@ void CellBaker::add_point_lamps(std::span<const std::uint16_t> point_of_receiver
     const Vec3f weight = p.throughput * p.diffuse * factor;
     light_of_point_[i].lamps += irradiance;
     if (weight != Vec3f{}) {
-      add_lamp_past_pictures(p, l.lamp, weight);
+      add_lamp_past_pictures(p, matte_target_of(p), l.lamp, weight);
     }
     if (bent_of_receiver_[l.point] != no_catcher && shadow_rays_.is_caustic(l.lamp)) {
       t.bent_caustics.push_back({bent_of_receiver_[l.point], l.lamp, factor});

@@ -421,7 +421,8 @@ void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share)
   const ShadePoint& p = *lobe.point;
   const Vec3f weight = lobe.throughput * share * density;
   if (past_pictures_) {
-    add_light_past_pictures(p, frame_->planned_table->lights[light].direction, light, weight);
+    add_light_past_pictures(p, target_of(p), frame_->planned_table->lights[light].direction, light,
+                            weight);
   } else {
     lights_.add(
         {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});
@@ -497,7 +498,7 @@ void CellBaker::add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed) {
   const Vec3f planned = weight * frame_->planned_table->lamps[number].intensity;
   const float least = (1 - frame_->job->effort.accuracy) / (8 * static_cast<float>(lamps.size()));
   if (!(std::max(largest(planned), largest(-planned)) > least)) return;
-  add_lamp_past_pictures(p, number, weight);
+  add_lamp_past_pictures(p, target_of(p), number, weight);
   samples_[p.slot].added += planned;
 }
 

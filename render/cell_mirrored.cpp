@@ -119,7 +119,7 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
     const Vec3f open = r.light.open(k);
     light_of_point_[mirrored_at_[k]] = {open, r.light.arriving(k), {}};
     to.diffuse.put(k, p.throughput * p.diffuse);
-    to.slot[k] = static_cast<std::uint16_t>(target_of(p));
+    to.slot[k] = matte_target_of(p);
     const float reach_m = reach_of_neighbours * (length(p.steps.a) + length(p.steps.b));
     mirrored_hits_[k] = {p.hit.instance, p.hit.material, reach_m,
                          p.light_normal, p.hit.position, light_of_point_[mirrored_at_[k]]};
@@ -157,12 +157,13 @@ bool CellBaker::share_mirrored(std::size_t point) {
     }
   }
   if (nearest == cell_pixels || !(least < mirrored_hits_[nearest].reach_m)) return false;
-  const Vec3f weight = p.throughput * p.diffuse;
-  if (largest(weight * (upper - lower)) > effort_.glint_contrast) return false;
+  if (largest(p.throughput * planned_diffuse(p) * (upper - lower)) > effort_.glint_contrast) {
+    return false;
+  }
   light_of_point_[point] = mirrored_hits_[nearest].light;
-  transport_->shared.push_back({static_cast<std::uint16_t>(target_of(p)),
-                                static_cast<std::uint16_t>(nearest),
-                                CellTransport::SharedTerm::Of::mirrored_light, weight});
+  transport_->shared.push_back({matte_target_of(p), static_cast<std::uint16_t>(nearest),
+                                CellTransport::SharedTerm::Of::mirrored_light,
+                                p.throughput * p.diffuse});
   return true;
 }
 

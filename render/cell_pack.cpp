@@ -9,8 +9,8 @@ namespace render {
 namespace {
 
 std::uint32_t key_of(const CellTransport::SharedTerm& s) {
-  static_assert(CellPicture::all_slots <= 1U << 14);
-  return (s.slot * 65536U + s.centre) * 4U + static_cast<std::uint32_t>(s.of);
+  static_assert(CellPicture::lit_slots <= 1U << 15 && cell_pixels <= 1U << 15);
+  return (s.slot * 32768U + s.centre) * 4U + static_cast<std::uint32_t>(s.of);
 }
 
 // Those of the same slot, centre and kind become one. In place: nothing is allocated.
@@ -35,8 +35,9 @@ void CellBaker::pack() {
   pack_bases();
   const CellTransport::Base plain{{}, {1, 1, 1}, 1, 1};
   t.empty = t.receiving == CellMask{} && t.mirrored.empty() && places_.empty() && lights_.empty() &&
-            t.bent.empty() && t.video.empty() && lamps_.empty() && t.foreground.empty() &&
-            t.picture_rays.empty() && t.picture_lights.empty();
+            bent_.empty() && t.bent_shaded.empty() && video_.empty() && t.painted.empty() &&
+            lamps_.empty() && t.foreground.empty() && t.picture_rays.empty() &&
+            t.picture_lights.empty();
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     t.empty = t.empty && (base_[k] == plain || !is_inside(k)) && edge_[k] == Edge::none;
     if (edge_[k] == Edge::none) continue;
@@ -60,6 +61,7 @@ void CellBaker::pack() {
   t.lights.assign(lights.begin(), lights.end());
   t.lamp_terms.assign(lamps.begin(), lamps.end());
   pack_places();
+  pack_live_places();
   join(t.shared);
   if (none(t.receiving)) t.centres.clear();
 }
@@ -69,12 +71,12 @@ void CellBaker::pack_places() {
   CellTransport& t = *transport_;
   constexpr std::size_t step = EnvironmentTerms::slots;
   // A picture of one ray a pixel is hardly kept.
-  std::span<EnvironmentTerm> left =
+  std::span<PlaceTerm> left =
       effort_.aa_samples > 1 ? places_.join_wider(further_samples_) : places_.join();
   const auto take = [&](std::size_t first, EnvironmentTerms& to) {
-    const auto end = std::ranges::lower_bound(left, first + step, {}, &EnvironmentTerm::slot);
+    const auto end = std::ranges::lower_bound(left, first + step, {}, &PlaceTerm::slot);
     const auto own = left.first(static_cast<std::size_t>(end - left.begin()));
-    for (EnvironmentTerm& term : own) term.slot = static_cast<std::uint16_t>(term.slot - first);
+    for (PlaceTerm& term : own) term.slot = static_cast<std::uint16_t>(term.slot - first);
     to.pack(own, frame_->planned_levels);
     left = left.subspan(own.size());
   };
@@ -82,6 +84,25 @@ void CellBaker::pack_places() {
   take(0, t.environment);
   for (std::size_t first = slots; first < slots + t.picture_rays.size(); first += step) {
     take(first, t.environments_behind.emplace_back());
+  }
+}
+
+// Of the plate, and of live textures.
+void CellBaker::pack_live_places() {
+  CellTransport& t = *transport_;
+  const auto bent = bent_.join();
+  t.bent.assign(bent.begin(), bent.end());
+  const auto videos = video_.join();
+  t.video.assign(videos.begin(), videos.end());
+  for (const PaintedOfPixel& pixel : painted_of_pixel_) {
+    for (const PaintedSlot& slot : std::span(pixel.slots).first(pixel.count)) {
+      painted_weights_[slot.number] = slot.weight;
+    }
+  }
+  for (const PlaceTerm& place : paint_.join()) {
+    const std::size_t i = place.slot;
+    if (t.painted[i].count++ == 0) t.painted[i].first = static_cast<std::uint32_t>(t.paint.size());
+    t.paint.push_back({place.weight.x / painted_weights_[i], place.x, place.y, place.level});
   }
 }
 
@@ -104,7 +125,8 @@ void CellBaker::pack_bases() {
 }
 
 std::size_t CellBaker::scratch_bytes() const {
-  return places_.bytes() + lights_.bytes() + lamps_.bytes();
+  return places_.bytes() + lights_.bytes() + lamps_.bytes() + bent_.bytes() + video_.bytes() +
+         paint_.bytes();
 }
 
 }  // namespace render

@@ -164,8 +164,11 @@ bool CellBaker::may_dim_lamp(Vec3f from, std::size_t lamp) const {
 }
 
 // Light that a point gets of a lamp.
-void CellBaker::add_lamp_past_pictures(const ShadePoint& p, std::size_t lamp, Vec3f weight) {
-  const auto slot = static_cast<std::uint16_t>(target_of(p));
+void CellBaker::add_lamp_past_pictures(const ShadePoint& p,
+                                       std::size_t target,
+                                       std::size_t lamp,
+                                       Vec3f weight) {
+  const auto slot = static_cast<std::uint16_t>(target);
   const auto number = static_cast<std::uint16_t>(lamp);
   const Vec3f origin = past_pictures_ ? offset_origin(p.hit, p.hit.geometric_normal) : Vec3f{};
   if (past_pictures_ && grid_ && !shades_ring_) transport_->reach.add_receiver(*grid_, origin);
@@ -298,9 +301,13 @@ std::uint16_t CellBaker::look_apart(
 }
 
 // Light that a point gets of the table.
-CellBaker::MayDim CellBaker::add_light_past_pictures(
-    const ShadePoint& p, Vec3f direction, std::size_t light, Vec3f weight, float part) {
-  const auto slot = static_cast<std::uint16_t>(target_of(p));
+CellBaker::MayDim CellBaker::add_light_past_pictures(const ShadePoint& p,
+                                                     std::size_t target,
+                                                     Vec3f direction,
+                                                     std::size_t light,
+                                                     Vec3f weight,
+                                                     float part) {
+  const auto slot = static_cast<std::uint16_t>(target);
   const auto number = static_cast<std::uint16_t>(light);
   const Vec3f origin = past_pictures_ ? offset_origin(p.hit, p.hit.geometric_normal) : Vec3f{};
   if (past_pictures_ && grid_ && !shades_ring_) transport_->reach.add_receiver(*grid_, origin);
@@ -325,9 +332,9 @@ void CellBaker::add_tested_past_pictures(const ShadePoint& p,
                                          const PointLight& l,
                                          Vec3f weight,
                                          Vec3f open) {
-  const MayDim may_dim =
-      add_light_past_pictures(p, shadow_rays_.direction(receivers_, l.point, l.light), l.light,
-                              weight, part_of_light(l, open));
+  const MayDim may_dim = add_light_past_pictures(
+      p, matte_target_of(p), shadow_rays_.direction(receivers_, l.point, l.light), l.light, weight,
+      part_of_light(l, open));
   if (may_dim.chance == 0) return;
   const float gives = largest(weight * frame_->planned_table->lights[l.light].irradiance);
   LookedFor& of = looked_for_[p.pixel];

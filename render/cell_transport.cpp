@@ -148,6 +148,13 @@ Vec3f passed_of(Vec3f passed, float stands_for) {
   return stands_for == 1 ? passed : all - (all - passed) * stands_for;
 }
 
+Vec3f lost_of(const CellTransport& cell, const CellTransport::ShadowLight& s) {
+  using Light = CellTransport::ShadowLight;
+  if (s.tint == Light::passes) return {};
+  if (s.tint == Light::blocked) return {s.open, s.open, s.open};
+  return cell.shadow_tints[s.tint - std::size_t{Light::first_tint}] * s.open;
+}
+
 // Shadows on points that are no centres.
 void light_shadow_points(const CellTransport& cell,
                          const FrameLight& light,
@@ -163,11 +170,12 @@ void light_shadow_points(const CellTransport& cell,
     for (std::uint32_t i = point.first; i < point.first + point.count; ++i) {
       const CellTransport::ShadowLight& s = cell.shadow_lights[i];
       const Vec3f e = light.lights[s.light].irradiance;
+      const Vec3f gone = lost_of(cell, s);
       open += e * s.open;
-      lost += e * s.lost;
+      lost += e * gone;
       if (dims && dimmed < cell.picture_shadows.size() && cell.picture_shadows[dimmed].slot == i) {
         const Vec3f all{1, 1, 1};
-        hidden += e * (all * s.open - s.lost) * (all - pictures->shadowed_through[dimmed]) *
+        hidden += e * (all * s.open - gone) * (all - pictures->shadowed_through[dimmed]) *
                   cell.picture_shadows[dimmed].stands_for;
         ++dimmed;
       }
@@ -206,6 +214,27 @@ void fill_blocks(const CellTransport::Blocks& blocks, CellPicture& picture) {
       picture.share[to] = picture.share[from];
       picture.seen[to] = picture.seen[from];
     }
+  }
+}
+
+void show_places(std::span<const PlaceTerm> places, const FrameLight& light, CellPicture& picture) {
+  for (const PlaceTerm& p : places) {
+    picture.added[p.slot] += four_of(p.weight * plate_at(*light.levels[p.level], p.x, p.y));
+  }
+}
+
+// Matte light, in the colours of live textures.
+void show_painted(const CellTransport& cell, const FrameLight& light, CellPicture& picture) {
+  for (std::size_t i = 0; i < cell.painted.size(); ++i) {
+    const CellTransport::Painted& painted = cell.painted[i];
+    Four colour{};
+    for (const CellTransport::Paint& p :
+         std::span(cell.paint).subspan(painted.first, painted.count)) {
+      colour += four_of(plate_at(*light.levels[p.level], p.x, p.y) * p.share);
+    }
+    const Four white = four_of({1, 1, 1});
+    picture.added[painted.slot] +=
+        picture.added[CellPicture::all_slots + i] * (colour < white ? colour : white);
   }
 }
 
@@ -289,10 +318,12 @@ void CellTransport::clear() {
   receiving = mirrored_receiving = {};
   visibility.clear(), mirrored_visibility.clear(), mirrored.clear();
   shared.clear(), lights.clear();
-  environment.clear(), shadow_points.clear(), shadow_lights.clear();
+  environment.clear(), shadow_points.clear(), shadow_lights.clear(), shadow_tints.clear();
   lamps.numbers.clear(), lamps.factors.clear(), lamps.tints.clear();
   lamp_terms.clear(), catchers.clear(), caught.clear();
-  bent.clear(), bent_caustics.clear(), video.clear(), borrowed.clear(), further.clear();
+  bent.clear(), bent_shaded.clear(), bent_caustics.clear(), video.clear(), painted.clear(),
+      paint.clear();
+  borrowed.clear(), further.clear();
   past_pictures = false;
   far_m.clear();
   picture_rays.clear(), bases_behind.clear(), environments_behind.clear();
@@ -310,10 +341,11 @@ std::size_t CellTransport::bytes() const {
   };
   return sizeof *this + of_sight(visibility) + of_sight(mirrored_visibility) + of(mirrored) +
          of(foreground) + of(bases) + of(centres) + of(shared) + of(lights) + environment.bytes() +
-         of(shadow_points) + of(shadow_lights) + of(lamps.numbers) + of(lamps.factors) +
-         of(lamps.tints) + of(lamp_terms) + of(catchers) + of(caught) + of(bent) +
-         of(bent_caustics) + of(video) + of(borrowed) + of(further) + of(counts) + of(far_m) +
-         of(picture_rays) + of(bases_behind) + of(environments_behind) +
+         of(shadow_points) + of(shadow_lights) + of(shadow_tints) + of(lamps.numbers) +
+         of(lamps.factors) + of(lamps.tints) + of(lamp_terms) + of(catchers) + of(caught) +
+         of(bent) + of(bent_shaded) + of(bent_caustics) + of(video) + of(painted) + of(paint) +
+         of(borrowed) + of(further) + of(counts) + of(far_m) + of(picture_rays) + of(bases_behind) +
+         of(environments_behind) +
          std::accumulate(environments_behind.begin(), environments_behind.end(), std::size_t{0},
                          [](std::size_t sum, const auto& e) { return sum + e.bytes(); }) +
          of(picture_lights) + of(picture_shadows) + of(shadowed) + of(mirrored_shadowed);
@@ -338,6 +370,7 @@ void relight(const CellTransport& cell,
     }
   }
   light_centres(cell, w, picture);
+  std::fill_n(picture.added.begin() + CellPicture::all_slots, cell.painted.size(), Four{});
   for (std::size_t i = 0; i < cell.bases_behind.size(); ++i) {
     show_base(cell.bases_behind[i], slots + i, picture);
   }
@@ -386,14 +419,13 @@ void relight(const CellTransport& cell,
     cell.environments_behind[i].add_light(light.environment,
                                           added.subspan(slots + i * step).first<step>());
   }
-  for (const CellTransport::BentPlate& b : cell.bent) {
-    const Vec3f share =
-        b.point == CellTransport::BentPlate::lit ? Vec3f{1, 1, 1} : w.passing_at_points[b.point];
-    picture.added[b.slot] += four_of(b.weight * share * plate_at(*light.levels[b.level], b.x, b.y));
+  show_places(cell.bent, light, picture);
+  for (const auto& [term, point] : cell.bent_shaded) {
+    picture.added[term.slot] += four_of(term.weight * w.passing_at_points[point] *
+                                        plate_at(*light.levels[term.level], term.x, term.y));
   }
-  for (const CellTransport::VideoTerm& v : cell.video) {
-    picture.added[v.slot] += four_of(v.weight * plate_at(*light.levels[v.level], v.x, v.y));
-  }
+  show_places(cell.video, light, picture);
+  show_painted(cell, light, picture);
   show_picture_rays(cell, pictures, picture);
   // Pixels of further samples: their own sums, and what they share of centres, of their own too.
   for (const CellTransport::Borrowed& b : cell.borrowed) {

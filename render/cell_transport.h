@@ -72,10 +72,12 @@ struct CellTransport {
     std::uint32_t first, count;  // of shadow_lights
     Vec3f share;
   };
+  // What is lost of a light is nothing of it, all, or as a tint says. Of samples through glass
+  // there are very many.
   struct ShadowLight {
-    std::uint16_t light;
+    static constexpr std::uint16_t passes = 0, blocked = 1, first_tint = 2;
+    std::uint16_t light, tint;  // of shadow_tints, from first_tint on
     float open;
-    Vec3f lost;
   };
   // A stand-in's point that lamps shine on.
   struct LampCatcher {
@@ -89,14 +91,10 @@ struct CellTransport {
     std::uint16_t lamp;
     Vec3f factor;
   };
-  // Slot += weight * the plate at a place, that clear bodies show there; less where it lies in a
-  // shadow.
-  struct BentPlate {
-    static constexpr std::uint32_t lit = ~0U;
-    Vec3f weight;
-    float x, y;
-    std::uint16_t slot, level;  // of FrameLight::levels
-    std::uint32_t point;        // of shadow_points, or lit
+  // A term of the plate at a place that clear bodies show, less what its point loses of light.
+  struct ShadedPlate {
+    PlaceTerm term;
+    std::uint32_t point;  // of shadow_points
   };
   // The plate of a shadow point that clear bodies show is brighter by factor * intensity of a lamp,
   // of the light that is there.
@@ -105,11 +103,17 @@ struct CellTransport {
     std::uint16_t lamp;
     Vec3f factor;
   };
-  // Slot += weight * a level of a live texture at a place.
-  struct VideoTerm {
-    Vec3f weight;
-    float x, y;
-    std::uint16_t slot, level;  // of FrameLight::levels
+  // Slot += what live textures show at some places, which counts as 1 at most, times the matte
+  // light that is added up in a slot of its own, the CellPicture::all_slots-th and on.
+  struct Painted {
+    std::uint32_t first, count;  // of `paint`
+    std::uint16_t slot;
+  };
+  static constexpr std::size_t most_painted_of_pixel = 12,
+                               most_painted = most_painted_of_pixel * cell_pixels;
+  struct Paint {
+    float share, x, y;
+    std::uint16_t level;  // of FrameLight::levels
   };
   // A pixel of further samples: those that share the whole radiance of a centre, and how many all
   // are.
@@ -198,13 +202,18 @@ struct CellTransport {
   EnvironmentTerms environment;
   std::vector<ShadowPoint> shadow_points;
   std::vector<ShadowLight> shadow_lights;
-  CellLamps lamps;  // that centres see
+  std::vector<Vec3f> shadow_tints;  // shares that are lost
+  CellLamps lamps;                  // that centres see
   std::vector<LightTerm> lamp_terms;
   std::vector<LampCatcher> catchers;
   std::vector<CaughtLamp> caught;
-  std::vector<BentPlate> bent;
+  std::vector<PlaceTerm>
+      bent;  // of the plate where clear bodies show it lit, in FrameLight::levels
+  std::vector<ShadedPlate> bent_shaded;
   std::vector<BentCaustic> bent_caustics;
-  std::vector<VideoTerm> video;
+  std::vector<PlaceTerm> video;  // of live textures, in FrameLight::levels
+  std::vector<Painted> painted;
+  std::vector<Paint> paint;
   std::vector<Borrowed> borrowed;
   std::vector<Further> further;
   bool past_pictures = false;  // found without live pictures
@@ -226,6 +235,7 @@ struct CellTransport {
   std::vector<RayCount> counts;
 
   const Base& base(std::size_t k) const { return bases[base_of[k]]; }
+  bool bends_plate() const { return !bent.empty() || !bent_shaded.empty(); }
   // For a cell to be found: with centres, and without bases.
   void clear();
   std::size_t bytes() const;
@@ -295,10 +305,12 @@ struct RelightWorkspace {
 };
 
 // What a pixel shows: plate * share + added. The first 256 are the pixels; after them, while they
-// are lit, their further samples' sums, and what lies behind picture rays.
+// are lit, their further samples' sums, and what lies behind picture rays; and at last the matte
+// light of what is painted.
 struct CellPicture {
   static constexpr std::size_t all_slots = slots + CellTransport::most_picture_rays;
-  std::array<Four, all_slots> added;
+  static constexpr std::size_t lit_slots = all_slots + CellTransport::most_painted;
+  std::array<Four, lit_slots> added;
   std::array<Four, all_slots> share;  // the last of the four: their mean
   std::array<float, all_slots> seen;
 };

@@ -16,22 +16,6 @@ constexpr float least_change = 3e-4F;
 // And by how much for all of them that join wider ones at the end, each sample of it.
 constexpr float most_change = 1e-3F;
 
-// A number for the four texels that a term's place lies between.
-std::uint64_t texels_of(const EnvironmentTerm& e) {
-  // Texels are fewer than 2^15 a side; left of and above the first ones there is one more.
-  const auto column = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.x)) + 1);
-  const auto row = static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(e.y)) + 1);
-  return std::uint64_t{e.level} << 40 | row << 20 | column;
-}
-
-// One place in the middle of two that lie between the same texels, both of some weight.
-void join_into(EnvironmentTerm& to, const EnvironmentTerm& from) {
-  const float share = mean(to.weight), weight = mean(from.weight), part = weight / (share + weight);
-  to.weight += from.weight;
-  to.x += (from.x - to.x) * part;
-  to.y += (from.y - to.y) * part;
-}
-
 }  // namespace
 
 EnvironmentPlaces::EnvironmentPlaces() {
@@ -48,7 +32,7 @@ void EnvironmentPlaces::clear(const Environment& planned,
   most_ = enough_terms;
 }
 
-void EnvironmentPlaces::add(const EnvironmentTerm& place) {
+void EnvironmentPlaces::add(const PlaceTerm& place) {
   if (!is_finite(place.weight)) return;
   places_.push_back(place);
   if (places_.size() <= most_ || aside_) return;
@@ -61,12 +45,12 @@ std::size_t EnvironmentPlaces::bytes() const {
   return longest_ * sizeof places_[0] + of_slot_.capacity() * sizeof of_slot_[0];
 }
 
-std::span<EnvironmentTerm> EnvironmentPlaces::join() {
+std::span<PlaceTerm> EnvironmentPlaces::join() {
   join(nullptr);
   return places_;
 }
 
-std::span<EnvironmentTerm> EnvironmentPlaces::join_wider(const FurtherSamples& samples) {
+std::span<PlaceTerm> EnvironmentPlaces::join_wider(const FurtherSamples& samples) {
   join(&samples);
   return places_;
 }
@@ -81,49 +65,30 @@ void EnvironmentPlaces::join(const FurtherSamples* samples) {
     for (; i < places_.size() && places_[i].slot == slot; ++i) {
       of_slot_.push_back({texels_of(places_[i]), places_[i]});
     }
-    join_slot();
-    if (of_slot_.size() > most_places_of_slot && halve_faint()) join_slot();
+    join_places(of_slot_);
+    if (of_slot_.size() > most_places_of_slot && halve_faint()) join_places(of_slot_);
     if (samples) {
       const bool of_further = slot >= cell_pixels && slot < slots;
       const int count = of_further ? samples->count(slot - cell_pixels) : 1;
       join_wider_of_slot(static_cast<float>(count));
     }
-    for (const Keyed& place : of_slot_) places_[kept++] = place.term;
+    for (const KeyedPlace& place : of_slot_) places_[kept++] = place.term;
   }
   places_.resize(kept);
 }
 
-void EnvironmentPlaces::join_slot() {
-  std::ranges::sort(of_slot_, [](const Keyed& a, const Keyed& b) {
-    return a.texels != b.texels   ? a.texels < b.texels
-           : a.term.x != b.term.x ? a.term.x < b.term.x
-                                  : a.term.y < b.term.y;
-  });
-  std::size_t kept = 0;
-  for (const Keyed& from : of_slot_) {
-    const float weight = mean(from.term.weight);
-    const float share = kept > 0 ? mean(of_slot_[kept - 1].term.weight) : 0;
-    if (weight > 0 && share > 0 && of_slot_[kept - 1].texels == from.texels) {
-      join_into(of_slot_[kept - 1].term, from.term);
-    } else {
-      of_slot_[kept++] = from;
-    }
-  }
-  of_slot_.resize(kept);
-}
-
 // The same place in texels twice as wide, if there are any. Only those of some weight are joined.
-std::optional<EnvironmentTerm> EnvironmentPlaces::wider(const EnvironmentTerm& e) const {
+std::optional<PlaceTerm> EnvironmentPlaces::wider(const PlaceTerm& e) const {
   const std::size_t level = halved_level(*planned_, e.level);
   if (level == e.level || !(mean(e.weight) > 0)) return {};
   const capture::Image &fine = *levels_[e.level], &coarse = *levels_[level];
   if (coarse.width * 2 != fine.width || coarse.height * 2 != fine.height) return {};
-  return EnvironmentTerm{e.weight, (e.x - 0.5F) / 2, (e.y - 0.5F) / 2, e.slot,
-                         static_cast<std::uint16_t>(level)};
+  return PlaceTerm{e.weight, (e.x - 0.5F) / 2, (e.y - 0.5F) / 2, e.slot,
+                   static_cast<std::uint16_t>(level)};
 }
 
 // By how much its slot changes under the planned light.
-float EnvironmentPlaces::change(const EnvironmentTerm& from, const EnvironmentTerm& to) const {
+float EnvironmentPlaces::change(const PlaceTerm& from, const PlaceTerm& to) const {
   const Vec3f by = from.weight * (radiance_at(*levels_[to.level], to.x, to.y) -
                                   radiance_at(*levels_[from.level], from.x, from.y));
   return std::max({std::abs(by.x), std::abs(by.y), std::abs(by.z)});
@@ -131,7 +96,7 @@ float EnvironmentPlaces::change(const EnvironmentTerm& from, const EnvironmentTe
 
 // Where two places of the same texels were not joined, one takes away what the other gives (rays
 // cut by chance): they stay together.
-bool EnvironmentPlaces::is_alone(std::vector<Keyed>::const_iterator place) const {
+bool EnvironmentPlaces::is_alone(std::vector<KeyedPlace>::const_iterator place) const {
   const bool first = place == of_slot_.begin() || std::prev(place)->texels != place->texels;
   const auto next = std::next(place);
   return first && (next == of_slot_.end() || next->texels != place->texels);
@@ -141,7 +106,7 @@ bool EnvironmentPlaces::is_alone(std::vector<Keyed>::const_iterator place) const
 // texels twice as wide, are looked up there, so that they can be joined. False if there are none.
 bool EnvironmentPlaces::halve_faint() {
   float all = 0;
-  for (const Keyed& place : of_slot_) all += std::abs(mean(place.term.weight));
+  for (const KeyedPlace& place : of_slot_) all += std::abs(mean(place.term.weight));
   const float least = all / static_cast<float>(most_places_of_slot);
   bool halved = false;
   for (auto place = of_slot_.begin(); place != of_slot_.end(); ++place) {
@@ -162,7 +127,7 @@ void EnvironmentPlaces::join_wider_of_slot(float samples) {
     const auto to = is_alone(place) ? wider(place->term) : std::nullopt;
     if (!to) continue;
     const auto other =
-        std::ranges::lower_bound(place, of_slot_.end(), texels_of(*to), {}, &Keyed::texels);
+        std::ranges::lower_bound(place, of_slot_.end(), texels_of(*to), {}, &KeyedPlace::texels);
     if (other == of_slot_.end() || other->texels != texels_of(*to) || !is_alone(other) ||
         !(mean(other->term.weight) > 0))
       continue;
@@ -172,7 +137,7 @@ void EnvironmentPlaces::join_wider_of_slot(float samples) {
     join_into(other->term, *to);
     place->term.weight = {};
   }
-  std::erase_if(of_slot_, [](const Keyed& place) { return place.term.weight == Vec3f{}; });
+  std::erase_if(of_slot_, [](const KeyedPlace& place) { return place.term.weight == Vec3f{}; });
 }
 
 }  // namespace render

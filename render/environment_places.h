@@ -10,6 +10,7 @@
 
 #include "render/environment_terms.h"
 #include "render/further_samples.h"
+#include "render/place_terms.h"
 #include "render/slot_order.h"
 
 namespace render {
@@ -25,41 +26,35 @@ class EnvironmentPlaces {
   // may be looked up less sharply.
   void clear(const Environment& planned, std::span<const capture::Image* const> levels);
   // One whose weight is not finite is left out: nothing could be joined with it.
-  void add(const EnvironmentTerm& place);
+  void add(const PlaceTerm& place);
   // Places that are added in between are few, and are forgotten.
   void begin_aside() { before_ = places_.size(), aside_ = true; }
   void end_aside() { places_.resize(before_), aside_ = false; }
   bool empty() const { return places_.empty(); }
   // All of them, in the order of their slots.
-  std::span<EnvironmentTerm> join();
+  std::span<PlaceTerm> join();
   // Those too that would be the same in texels twice as wide, where next to nothing changes of a
   // slot that has so many samples: a cone looks at the two levels that it lies between, and lobes
   // at cones beside and within each other.
-  std::span<EnvironmentTerm> join_wider(const FurtherSamples& samples);
+  std::span<PlaceTerm> join_wider(const FurtherSamples& samples);
   // Of lists as long as cells needed so far.
   std::size_t bytes() const;
 
  private:
-  struct Keyed {
-    std::uint64_t texels;  // that it lies between
-    EnvironmentTerm term;
-  };
-
   void join(const FurtherSamples* samples);
-  void join_slot();
-  std::optional<EnvironmentTerm> wider(const EnvironmentTerm& e) const;
-  float change(const EnvironmentTerm& from, const EnvironmentTerm& to) const;
-  bool is_alone(std::vector<Keyed>::const_iterator place) const;
+  std::optional<PlaceTerm> wider(const PlaceTerm& e) const;
+  float change(const PlaceTerm& from, const PlaceTerm& to) const;
+  bool is_alone(std::vector<KeyedPlace>::const_iterator place) const;
   bool halve_faint();
   void join_wider_of_slot(float samples);
 
-  std::vector<EnvironmentTerm> places_;
+  std::vector<PlaceTerm> places_;
   // More are joined, and may then be twice as many, but not by more than eight times as many as
   // `enough_terms`.
   std::size_t most_ = enough_terms, longest_ = enough_terms;
   std::size_t before_ = 0;
   bool aside_ = false;
-  std::vector<Keyed> of_slot_;
+  std::vector<KeyedPlace> of_slot_;
   const Environment* planned_ = nullptr;
   std::span<const capture::Image* const> levels_;
 };

@@ -29,7 +29,7 @@ std::uint32_t packed_place(float at, int size) {
 }
 
 using Words = std::array<std::uint32_t, 3>;
-Words packed(const EnvironmentTerm& term, const capture::Image& level) {
+Words packed(const PlaceTerm& term, const capture::Image& level) {
   Words words{term.slot, packed_place(term.x, level.width), packed_place(term.y, level.height)};
   const Vec3f w = term.weight;
   const float most = std::max({std::fabs(w.x), std::fabs(w.y), std::fabs(w.z)});
@@ -114,11 +114,11 @@ class Unpacked {
 
 }  // namespace
 
-void EnvironmentTerms::pack(std::span<const EnvironmentTerm> terms,
+void EnvironmentTerms::pack(std::span<const PlaceTerm> terms,
                             std::span<const capture::Image* const> levels) {
   clear();
   std::array<std::uint32_t, most_levels> counts{};
-  for (const EnvironmentTerm& term : terms) ++counts[term.level];
+  for (const PlaceTerm& term : terms) ++counts[term.level];
   // Where a level's next term goes.
   struct Place {
     std::size_t first, end, block, lane;
@@ -137,7 +137,7 @@ void EnvironmentTerms::pack(std::span<const EnvironmentTerm> terms,
     if (++at.block == at.end) at.block = at.first, ++at.lane;
   };
   std::array<Words, most_levels> last;
-  for (const EnvironmentTerm& term : terms) {
+  for (const PlaceTerm& term : terms) {
     last[term.level] = packed(term, *levels[term.level]);
     put(places[term.level], last[term.level]);
   }

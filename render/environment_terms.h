@@ -8,20 +8,13 @@
 #include <span>
 #include <vector>
 
-#include "calibrate/vec.h"
 #include "capture/image.h"
 #include "render/bordered_levels.h"
 #include "render/environment.h"
 #include "render/lanes.h"
+#include "render/place_term.h"
 
 namespace render {
-
-// Slot += weight * a level of the environment at a place.
-struct EnvironmentTerm {
-  calibrate::Vec3f weight;
-  float x, y;  // in the level's pixels, from -1 to its width or height
-  std::uint16_t slot, level;
-};
 
 // Many of them in half the room, for they are most of what is kept, and in the order in which they
 // are lit: by levels, and within each so that the next term is of another slot, where that can be,
@@ -40,7 +33,7 @@ class EnvironmentTerms {
 
   // Takes the place of what was there. Terms have slots below 512 and are in their order; `levels`,
   // at most 128, are those of an environment of this size.
-  void pack(std::span<const EnvironmentTerm> terms, std::span<const capture::Image* const> levels);
+  void pack(std::span<const PlaceTerm> terms, std::span<const capture::Image* const> levels);
 
   // Adds to the slots what comes from the levels of an environment of the same size.
   void add_light(const BorderedLevels& levels, std::span<Four, slots> added) const;

@@ -59,7 +59,8 @@ void join(SceneDescription& whole, const SceneDescription& part, const Placement
           &parameters.clearcoat_roughness_texture, &parameters.alpha_texture}) {
       if (*texture >= 0) *texture += first_texture;
     }
-    if (parameters.emission_video >= 0) parameters.emission_video += first_video;
+    for (std::int32_t* video : {&parameters.emission_video, &parameters.base_color_video})
+      if (*video >= 0) *video += first_video;
     whole.materials.push_back(make_standard_material(material.name, parameters));
   }
   for (Instance instance : part.instances) {

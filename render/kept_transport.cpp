@@ -214,7 +214,7 @@ void KeptTransport::keep(int column, int row, int stage) {
   cell.bytes = bytes;
   cell.stage = stage;
   cell.needs_pictures = none;
-  if (!cell.transport->bent.empty()) bends_plate_ = true;
+  if (cell.transport->bends_plate()) bends_plate_ = true;
   const bool less = bytes <= std::exchange(cell.replaced, std::size_t{0});
   if (others + bytes <= room() || less) return;
   // Too much: this cell's is given back.

@@ -251,9 +251,9 @@ void TileWorkspace::Impl::write_kept(
   const FrameKeys& keys = memory.keys();
   const LitCell* lit = memory.lit(column, row);
   // Before a frame knows of clear bodies, or while the light changes, its plate has no key.
-  const bool knows_plate = cell.bent.empty() || keys.plate_levels.all != 0;
+  const bool knows_plate = !cell.bends_plate() || keys.plate_levels.all != 0;
   if (lit && lit->light == keys.light.all && knows_plate &&
-      (cell.bent.empty() || lit->plate_levels == keys.plate_levels.all) &&
+      (!cell.bends_plate() || lit->plate_levels == keys.plate_levels.all) &&
       (lit->shows_plate ? has_plate_of(*lit, tile, x0, y0) : !is_broken_plate(tile, x0, y0))) {
     copy_lit(*lit, tile, x0, y0);
     return;
@@ -264,7 +264,7 @@ void TileWorkspace::Impl::write_kept(
   apart.statistics = &statistics;
   light(frame, cell, false, statistics);
   write(frame, apart, x0, y0);
-  const bool can_stay = cell.video.empty() && knows_plate;
+  const bool can_stay = cell.video.empty() && cell.painted.empty() && knows_plate;
   if (LitCell* room = can_stay ? memory.place_lit(column, row) : nullptr) {
     keep_lit(tile, x0, y0, *room);
     room->light = keys.light.all;

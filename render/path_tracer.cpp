@@ -208,6 +208,14 @@ StandardSurface PathTracer::surface_at(const HitPoint& hit) const {
   return surface;
 }
 
+// What a live texture makes of the light that a matte surface sends back.
+Vec3f PathTracer::paint_at(const HitPoint& hit) const {
+  const std::int32_t index = materials_[hit.material].parameters.base_color_video;
+  if (index < 0) return {1, 1, 1};
+  const Vec3f light = sample(*videos_[static_cast<std::size_t>(index)], hit.u, hit.v, 0);
+  return {std::min(light.x, 1.0F), std::min(light.y, 1.0F), std::min(light.z, 1.0F)};
+}
+
 void PathTracer::add_sky(const Walk& w, Vec3f& radiance) const {
   if (!w.sky_straight_on) return;
   float weight = 1;
@@ -445,10 +453,11 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
       surface.clearcoat_roughness = std::max(surface.clearcoat_roughness, caustic_roughness);
     }
     const Vec3f view = -w.direction;
-    const StandardWeights weights =
+    StandardWeights weights =
         layer ? StandardWeights{.diffuse = layer->albedo, .transmission = layer->passed}
         : materials_[hit.material].matte ? StandardWeights{.diffuse = surface.base}
                                          : standard_weights(surface, view);
+    weights.diffuse = times(weights.diffuse, paint_at(hit));
     w.result.radiance += times(w.glow_share, surface.emission);
     const bool split = w.kind == RayKind::camera && w.depth < split_depth;
     const PathLobes lobes(surface, weights, rules_.diffuse_bounces, split);

@@ -107,6 +107,7 @@ class PathTracer {
                PathLobe by,
                SampleSequence& numbers) const;
   StandardSurface surface_at(const HitPoint& hit) const;
+  Vec3f paint_at(const HitPoint& hit) const;
 
   const Scene& scene_;
   const EnvironmentSampler& environment_;

@@ -29,15 +29,14 @@ enum class RayKind : std::uint8_t {
   shadow,
 };
 
-inline constexpr std::uint16_t no_picture_ray = 0xFFFF;
+inline constexpr std::uint16_t no_picture_ray = 0xFFFF, not_painted = 0xFFFF;
 
-// Light of a live texture: gain times its look-up at (u, v).
+// A look-up of a live texture at (u, v).
 struct SeenVideo {
   std::int32_t index = -1;  // of SceneDescription::videos, or none
   float u = 0, v = 0;
   UvFootprint footprint;  // see find_video_samples
   float blur_uv = 0;
-  Vec3f gain;
 };
 
 // One point to shade. Filled by the kernel, then by shade(). A shader never sees the light: it says
@@ -54,6 +53,7 @@ struct ShadePoint {
   std::uint32_t pixel = 0;  // index in the cell, for patterns
   std::uint32_t slot = 0;   // the sample that the result is added to
   std::uint16_t behind = no_picture_ray;  // what its path passed that pictures may come before
+  std::uint16_t painted = not_painted;    // where its matte light waits for `paint`
   RayKind kind = RayKind::camera;
   std::uint8_t depth = 0;
   std::uint32_t path = 1;  // a number for the surfaces' rays that led here
@@ -61,8 +61,10 @@ struct ShadePoint {
   // From shade(), cleared before: all that is sent back along `incoming`. Each is multiplied by
   // throughput by the kernel.
   Vec3f radiance;               // its own light
-  SeenVideo video;              // ... that a live texture shows
-  Vec3f diffuse;                // radiance per irradiance on light_normal
+  SeenVideo video;              // ... that a live texture shows,
+  Vec3f video_gain;             // ... times this
+  Vec3f diffuse;                // radiance per irradiance on light_normal,
+  SeenVideo paint;              // ... times what this live texture shows
   Vec3f light_normal;           // unit
   Vec3f plate_share;            // share of the pixel's background that passes
   Vec3f environment_share;      // of the environment's radiance straight on, where a ray leaves

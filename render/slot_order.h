@@ -18,7 +18,7 @@ namespace render {
 template <class Term>
 void sort_by_slot(std::vector<Term>& terms) {
   if (terms.empty()) return;  // as most lists are where one ray a pixel meets dull things
-  constexpr std::size_t all = CellPicture::all_slots;
+  constexpr std::size_t all = CellPicture::lit_slots;
   const std::size_t count = std::size_t{std::ranges::max(terms, {}, &Term::slot).slot} + 1;
   std::array<std::uint32_t, all + 1> first;
   std::fill_n(first.begin(), count + 1, 0U);

@@ -16,7 +16,7 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 296, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 300, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
@@ -144,9 +144,9 @@ StandardParameters standard_parameters(const Material& material,
     if (!std::ranges::all_of(uv.u, finite) || !std::ranges::all_of(uv.v, finite))
       refuse("a place of its textures is not finite");
   }
-  const std::int32_t video = parameters.emission_video;
-  if (video < -1 || (video >= 0 && static_cast<std::size_t>(video) >= video_count))
-    refuse("it names video " + std::to_string(video) + " of " + std::to_string(video_count));
+  for (const std::int32_t video : {parameters.emission_video, parameters.base_color_video})
+    if (video < -1 || (video >= 0 && static_cast<std::size_t>(video) >= video_count))
+      refuse("it names video " + std::to_string(video) + " of " + std::to_string(video_count));
   return parameters;
 }
 

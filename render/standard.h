@@ -65,6 +65,9 @@ struct StandardParameters {
   float base_color_alpha = 1;
   float specular = 1;  // share of the mirrored light of what is not metal (KHR_materials_specular)
   std::int32_t emission_video = -1;  // of SceneDescription::videos: emission is times its light
+  // What of the surface is matte is times this one, which counts as 1 at most. It tints neither
+  // what metal mirrors nor what passes.
+  std::int32_t base_color_video = -1;
   std::int32_t clearcoat_roughness_texture = -1;  // green
   // In the place of the base texture's alpha: its alpha if it has one, else red.
   std::int32_t alpha_texture = -1;

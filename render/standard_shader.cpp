@@ -17,6 +17,14 @@ StandardParameters block_of(const Material& material) {
   return parameters;
 }
 
+SeenVideo seen_video(const ShadePoint& p, std::int32_t index) {
+  return {index,
+          p.hit.u,
+          p.hit.v,
+          {uv_of_step(p.hit, p.steps.a), uv_of_step(p.hit, p.steps.b)},
+          p.blur_m * p.hit.uv_per_metre};
+}
+
 class StandardShader final : public Shader {
  public:
   void check(const SceneDescription& scene, const Material& material) const override {
@@ -35,15 +43,12 @@ class StandardShader final : public Shader {
       const StandardWeights weights = standard_weights(surface, view);
       constexpr float per_pi = 0.318309886F;
       if (block.emission_video >= 0) {
-        p->video = {block.emission_video,
-                    p->hit.u,
-                    p->hit.v,
-                    {uv_of_step(p->hit, p->steps.a), uv_of_step(p->hit, p->steps.b)},
-                    p->blur_m * p->hit.uv_per_metre,
-                    surface.emission};
+        p->video = seen_video(*p, block.emission_video);
+        p->video_gain = surface.emission;
       } else {
         p->radiance = surface.emission;
       }
+      if (block.base_color_video >= 0) p->paint = seen_video(*p, block.base_color_video);
       p->diffuse = weights.diffuse * per_pi;
       p->light_normal = surface.normal;
       if (weights.coat > 0) {

@@ -20,9 +20,9 @@ struct Sky {
     places.clear(environment, levels);
   }
 
-  Vec3f light(std::span<const EnvironmentTerm> terms, std::uint16_t slot) const {
+  Vec3f light(std::span<const PlaceTerm> terms, std::uint16_t slot) const {
     Vec3f sum{};
-    for (const EnvironmentTerm& e : terms) {
+    for (const PlaceTerm& e : terms) {
       if (e.slot == slot) sum += e.weight * radiance_at(*levels[e.level], e.x, e.y);
     }
     return sum;
@@ -33,8 +33,8 @@ struct Sky {
   EnvironmentPlaces places;
 };
 
-std::size_t count(std::span<const EnvironmentTerm> terms, std::uint16_t slot) {
-  return static_cast<std::size_t>(std::ranges::count(terms, slot, &EnvironmentTerm::slot));
+std::size_t count(std::span<const PlaceTerm> terms, std::uint16_t slot) {
+  return static_cast<std::size_t>(std::ranges::count(terms, slot, &PlaceTerm::slot));
 }
 
 TEST(EnvironmentPlaces, BetweenTheSameTexelsBecomeOneInTheirMiddle) {
@@ -47,7 +47,7 @@ TEST(EnvironmentPlaces, BetweenTheSameTexelsBecomeOneInTheirMiddle) {
   const auto joined = sky.places.join();
   ASSERT_EQ(joined.size(), 4U);
   EXPECT_EQ(joined[0].slot, centre - 1);
-  const auto both = std::ranges::find(joined, Vec3f{4, 4, 4}, &EnvironmentTerm::weight);
+  const auto both = std::ranges::find(joined, Vec3f{4, 4, 4}, &PlaceTerm::weight);
   ASSERT_NE(both, joined.end());
   EXPECT_NEAR(both->x, 10.5F, 1e-5);
   EXPECT_NEAR(both->y, 7.2F, 1e-5);
@@ -89,7 +89,7 @@ TEST(EnvironmentPlaces, AreFewHoweverManyWereAdded) {
   constexpr int all = 400'000;
   Vec3f expected{};
   for (int i = 0; i < all; ++i) {
-    const EnvironmentTerm e{Vec3f{1, 1, 1} * (1.0F / all), 20 + 8 * unit(random),
+    const PlaceTerm e{Vec3f{1, 1, 1} * (1.0F / all), 20 + 8 * unit(random),
                             10 + 4 * unit(random), centre, 0};
     expected += e.weight * radiance_at(*sky.levels[0], e.x, e.y);
     sky.places.add(e);

@@ -28,7 +28,7 @@ struct Sky {
 
 using Slots = std::array<Four, EnvironmentTerms::slots>;
 
-Slots lit(const std::vector<EnvironmentTerm>& terms, const Sky& sky) {
+Slots lit(const std::vector<PlaceTerm>& terms, const Sky& sky) {
   EnvironmentTerms packed;
   packed.pack(terms, sky.levels);
   BorderedLevels levels;
@@ -42,7 +42,7 @@ TEST(EnvironmentTerms, LightSlotsAsTermsOneByOneDo) {
   const Sky sky;
   std::mt19937 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
-  std::vector<EnvironmentTerm> terms;
+  std::vector<PlaceTerm> terms;
   std::array<Vec3f, EnvironmentTerms::slots> expected{};
   std::array<float, EnvironmentTerms::slots> scale{};
   for (std::uint16_t slot = 0; slot < EnvironmentTerms::slots; slot += 7) {
