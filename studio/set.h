@@ -174,7 +174,8 @@ struct VideoSettings {
   std::string object;    // "OBJECT" or "OBJECT/PART"; "" = any
   std::string material;  // by its name in the model; "" = any
   Place object_place;
-  std::array<float, 3> gain{1, 1, 1};  // radiance of its white, in the plate's units
+  std::array<float, 3> gain{1, 1, 1};  // radiance of its white, in the plate's units; or,
+  bool lit = false;                    // ... where it is the colour of a matte surface, its albedo
   bool loop = false;
   capture::Transfer colour = capture::Transfer::rec1886;
   bool lights = false;               // its surroundings as well:

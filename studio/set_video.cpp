@@ -34,6 +34,10 @@ std::uint32_t material_of(const Mesh& mesh, std::size_t triangle) {
   return mesh.materials[mesh.materials.size() == 1 ? 0 : triangle];
 }
 
+bool has_alpha(const SceneDescription& scene, std::int32_t texture) {
+  return texture >= 0 && scene.textures[static_cast<std::size_t>(texture)]->channels % 2 == 0;
+}
+
 // The material that shows video `index` in the place of `from`.
 render::Material showing(const render::Material& from,
                          const SceneDescription& scene,
@@ -41,10 +45,21 @@ render::Material showing(const render::Material& from,
                          std::int32_t index) {
   render::StandardParameters p =
       render::standard_parameters(from, scene.textures.size(), scene.videos.size());
-  std::ranges::copy(video.gain, p.emission);
-  p.emission_gain = 1;
-  p.emission_texture = -1;
-  p.emission_video = index;
+  if (video.lit) {
+    if (p.alpha_texture < 0 && has_alpha(scene, p.base_color_texture)) {  // its holes stay
+      p.alpha_texture = p.base_color_texture;
+      p.alpha_uv = p.base_color_uv;
+    }
+    std::ranges::copy(video.gain, p.base_color);
+    p.base_color_texture = -1;
+    p.base_color_video = index;
+    p.metallic = p.transmission = 0;
+  } else {
+    std::ranges::copy(video.gain, p.emission);
+    p.emission_gain = 1;
+    p.emission_texture = -1;
+    p.emission_video = index;
+  }
   return render::make_standard_material(from.name, p);
 }
 
@@ -94,7 +109,9 @@ std::vector<bool> videos_seen(const SetScene& scene) {
     if (!used[i] || description.materials[i].shader != "standard") continue;
     const auto p = render::standard_parameters(
         description.materials[i], description.textures.size(), description.videos.size());
-    if (p.emission_video >= 0) seen[static_cast<std::size_t>(p.emission_video)] = true;
+    for (const std::int32_t video : {p.emission_video, p.base_color_video}) {
+      if (video >= 0) seen[static_cast<std::size_t>(video)] = true;
+    }
   }
   return seen;
 }
@@ -114,12 +131,16 @@ VideoSettings read_video_section(Section section, const SetContext& context, boo
   if (!section.has("object") && !section.has("material")) {
     section.fault("", "must have object = \"NAME\" or material = \"NAME\", or both");
   }
-  section.colour("gain", video.gain, {0, 1e9});
+  section.boolean("lit", video.lit);
+  section.colour("gain", video.gain, {0, video.lit ? 1 : 1e9});
   section.boolean("loop", video.loop);
   read_colour(section, video.colour);
   if (lights) {
     section.integers("samples", video.samples, 1, render::most_area_samples);
     section.number("ambient", video.ambient, {0, 1});
+    if (video.lit) {
+      section.fault("lit", "is for [[video]]: what is lit gives no light of its own");
+    }
   }
   for (const std::string_view key : {"samples", "ambient"}) {
     section.of_use_only(lights, key, "[[video_light]]");

@@ -45,6 +45,11 @@ gain = 2
 samples = [5, 4]
 )";
 
+constexpr const char* lamp = R"([[lamp]]
+position = [0, -4, 1]
+intensity = [4, 4, 4]
+)";
+
 // What the screen mirrors of the sky, at most.
 constexpr float glare = 0.05F;
 
@@ -157,6 +162,40 @@ TEST_F(VideoSetTest, IsOnThePartThatIsNamedSo) {
   } catch (const std::invalid_argument& error) {
     EXPECT_THAT(error.what(), HasSubstr("faces all ways alike"));
   }
+}
+
+// The colour of a matte surface: its light goes with the set's, a lamp's here.
+TEST_F(VideoSetTest, IsLitByTheSet) {
+  const std::string lit = "[[video]]\nsource = \"grey:6,25,0\"\nobject = \"tv\"\nlit = true\n";
+  Show dark(made_set(lit)), bright(made_set(lit + lamp));
+  const std::vector<float> none = screens_of(dark), some = screens_of(bright);
+  ASSERT_EQ(none.size(), 6U);
+  ASSERT_EQ(some.size(), 6U);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const float grey = 0.1F + 0.01F * static_cast<float>(i);
+    EXPECT_NEAR((some[i] - none[i]) / (some[0] - none[0]), grey / 0.1F, 0.02F) << i;
+  }
+}
+
+TEST_F(VideoSetTest, RefusesALitOneThatGlows) {
+  const auto fault_of = [&](const std::string& lines) {
+    try {
+      made_set(lines);
+    } catch (const SetError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  const std::string source = "source = \"grey:6,25,0\"\nobject = \"tv\"\nlit = true\n";
+  EXPECT_THAT(fault_of("[[video_light]]\n" + source), HasSubstr("gives no light of its own"));
+  EXPECT_THAT(fault_of("[[video]]\n" + source + "gain = 2\n"), HasSubstr("gain"));
+}
+
+// One that glows and one that is lit have a surface together.
+TEST_F(VideoSetTest, ShowsALitVideoBesideOneThatGlows) {
+  const std::string both = "[[video]]\nsource = \"grey:6,25,0\"\nobject = \"tv\"\n";
+  Show one(made_set(both)), two(made_set(both + both + "lit = true\n" + lamp));
+  EXPECT_GT(screens_of(two).at(0), screens_of(one).at(0) + 0.01F);
 }
 
 TEST_F(VideoSetTest, RefusesAVideoThatAnotherCovers) {
