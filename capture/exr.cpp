@@ -126,9 +126,8 @@ Imf::Header make_header(int width, int height, const ExrOptions& options) {
     header.insert(wire::noise_attribute,
                   Imf::V2fAttribute(Imath::V2f(options.noise->gain, options.noise->floor)));
   }
-  if (options.transfer) {
-    header.insert(wire::transfer_attribute,
-                  Imf::StringAttribute(std::string(name_of(*options.transfer))));
+  if (!options.transfer.empty()) {
+    header.insert(wire::transfer_attribute, Imf::StringAttribute(options.transfer));
   }
   return header;
 }
@@ -384,14 +383,14 @@ std::optional<LightNoise> read_exr_noise(const std::string& path, const ExrLimit
   });
 }
 
-std::optional<Transfer> read_exr_transfer(const std::string& path, const ExrLimits& limits) {
-  return decode(path, limits, [](SandboxedChild& child) -> std::optional<Transfer> {
+std::string read_exr_transfer(const std::string& path, const ExrLimits& limits) {
+  return decode(path, limits, [](SandboxedChild& child) -> std::string {
     const wire::Header header = receive_header(child);
     const std::string told(header.transfer.begin(), std::ranges::find(header.transfer, '\0'));
     try {
-      return transfer_from_name(told);
+      return told == by_response ? told : std::string(name_of(transfer_from_name(told)));
     } catch (const std::invalid_argument&) {
-      return {};
+      return "";
     }
   });
 }

@@ -40,6 +40,9 @@ struct LightNoise {
   friend bool operator==(const LightNoise&, const LightNoise&) = default;
 };
 
+// Of light that a camera's measured response tells.
+inline constexpr std::string_view by_response = "response";
+
 struct ExrOptions {
   ExrCompression compression = ExrCompression::none;
   std::optional<ExrTimecode> timecode{};
@@ -47,8 +50,8 @@ struct ExrOptions {
   Rational pixel_aspect{1, 1};  // a pixel's width over its height
   // Of the frames that the picture is a mean of: attribute "frameNoise", V2f of gain and floor.
   std::optional<LightNoise> noise{};
-  // By which their codes became light: attribute "frameTransfer", its name.
-  std::optional<Transfer> transfer{};
+  // By what their codes became light: attribute "frameTransfer", a curve's name or by_response.
+  std::string transfer{};
 };
 
 // An image's channels under these names, in its order.
@@ -102,7 +105,7 @@ void limit_infinite(Image& image);
 // not negative. Throws as read_exr, of what comes before the pixels.
 std::optional<LightNoise> read_exr_noise(const std::string& path, const ExrLimits& limits = {});
 
-// The same of ExrOptions::transfer, if it is one of ours.
-std::optional<Transfer> read_exr_transfer(const std::string& path, const ExrLimits& limits = {});
+// The same of ExrOptions::transfer; "" if it is none of ours.
+std::string read_exr_transfer(const std::string& path, const ExrLimits& limits = {});
 
 }  // namespace capture

@@ -42,14 +42,23 @@ compositing::PlateFootage spread_frames(capture::Camera& camera, int first, int 
 
 compositing::CleanPlate read_plate(const std::string& path, const VideoSource& source) {
   if (path.ends_with(".exr")) {
-    const auto told = capture::read_exr_transfer(path);
-    if (told && *told != source.colour) {
-      throw std::runtime_error(
-          fmt::format("the clean plate {} was taken as colour = \"{}\", but the video {} is read "
-                      "as \"{}\": one "
-                      "of the two is wrong, or the plate is another camera's",
-                      path, capture::name_of(*told), source.uri, capture::name_of(source.colour)));
+    const std::string told = capture::read_exr_transfer(path), wanted = name_of_light(source);
+    const auto words_for = [](const std::string& name) {
+      return name == capture::by_response ? "by a response" : fmt::format("as \"{}\"", name);
+    };
+    if (!told.empty() && told != wanted) {
+      throw std::runtime_error(fmt::format(
+          "the clean plate {} was taken {}, but the video {} is read {}: one of the two "
+          "is wrong (colour, response), or the plate is another camera's",
+          path, words_for(told), source.uri, words_for(wanted)));
     }
+  }
+  const bool holds_light = path.ends_with(".exr") || path.ends_with(".hdr");
+  if (!source.response.empty() && !holds_light) {
+    throw std::runtime_error(
+        fmt::format("the clean plate {} holds codes, but the video {} is read by a response: take "
+                    "it as light (platelight key plate CAMERA --response {} -o plate.exr)",
+                    path, source.uri, source.response));
   }
   const capture::Image picture = read_picture(path, source.colour);
   compositing::CleanPlate plate = compositing::average_plate(std::span(&picture, 1));

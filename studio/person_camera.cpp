@@ -75,7 +75,7 @@ compositing::Window window_about(const std::array<float, 4>& outline,
 }
 
 VideoSource video_of(const PersonCamera& s, const std::string& base_dir) {
-  return {s.source, base_dir, s.loop, s.first, s.colour, !s.key};
+  return {s.source, base_dir, s.loop, s.first, s.colour, !s.key, s.response};
 }
 
 std::shared_ptr<TimedSource> open_source(const VideoSource& source,
@@ -88,8 +88,9 @@ std::shared_ptr<TimedSource> open_source(const VideoSource& source,
   }
 }
 
-FileTimes times_of(const std::optional<KeyChoice>& key) {
-  return key ? file_times({key->plate, key->masks.garbage, key->masks.core}) : FileTimes{};
+FileTimes times_of(const PersonCamera& camera) {
+  const KeyChoice none, &key = camera.key ? *camera.key : none;
+  return file_times({camera.response, key.plate, key.masks.garbage, key.masks.core});
 }
 
 // But for where in their files they are written.
@@ -113,7 +114,7 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
                                    const std::string& held)
     : settings_(settings),
       options_(options),
-      times_(times_of(settings.key)),
+      times_(times_of(settings)),
       picture_(clear_picture()) {
   const PersonCamera& s = settings_;
   const VideoSource source = video_of(s, options.base_dir);
@@ -161,7 +162,7 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
 bool PersonCameraFeed::serves(const PersonCamera& settings, const Options& options) const {
   Options asked = options;
   asked.start = options_.start;
-  return asked == options_ && same(settings, settings_) && times_of(settings.key) == times_;
+  return asked == options_ && same(settings, settings_) && times_of(settings) == times_;
 }
 
 bool PersonCameraFeed::has_source_of(const PersonCamera& settings) const {
@@ -180,7 +181,9 @@ std::string PersonCameraFeed::words_for_held(const PersonCamera& asked,
 }
 
 void PersonCameraFeed::advance(capture::Time time) {
-  const std::optional<capture::Frame> frame = source_->at(time);
+  const auto offset =
+      std::chrono::duration_cast<capture::Time>(std::chrono::duration<double>(settings_.offset_s));
+  const std::optional<capture::Frame> frame = source_->at(time, offset);
   const capture::Frame& newest = frame && frame->image ? *frame : source_->newest();
   if (newest.image == image_ || !newest.image) return;
   skipped_ = image_ != shown_ || newest.pass_first != pass_;

@@ -95,7 +95,7 @@ class PersonCameraFeed {
 
   PersonCamera settings_;
   Options options_;
-  FileTimes times_;  // of plate and masks, when they were read
+  FileTimes times_;  // of response, plate and masks, when they were read
   bool by_texel_ = false;
   VideoSource opened_;  // as source_ was
   std::shared_ptr<TimedSource> source_;

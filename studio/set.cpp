@@ -225,16 +225,17 @@ Set read_set(const std::string& path) {
     set.videos.push_back(read_video_section(section, context, true));
   }
   name_videos(set.videos, faults);
-  for (const Section& section : root.tables("billboard")) {
-    set.persons.push_back(read_billboard_section(section, context));
-  }
-  refuse_same_names(set.persons, faults);
-  context.has_scene = !set.objects.empty() || !set.stand_ins.empty() || !set.persons.empty();
+  const std::vector<Section> persons = root.tables("billboard");
+  context.has_scene = !set.objects.empty() || !set.stand_ins.empty() || !persons.empty();
 
   if (auto section = root.table("rig")) context.rig = read_rig_section(*section, context.base);
   root.need("camera", "every set has [camera] with a source");
   if (auto section = root.table("camera")) set.camera = read_camera_section(*section, context);
   context.plate_offset_s = set.camera.rig_offset_s;
+  for (const Section& section : persons) {
+    set.persons.push_back(read_billboard_section(section, context));
+  }
+  refuse_same_names(set.persons, faults);
   if (auto section = root.table("probe")) set.probe = read_probe_section(*section, context);
   if (auto section = root.table("effort")) set.effort = read_effort_section(*section);
   if (auto section = root.table("display")) set.display = read_display_section(*section);

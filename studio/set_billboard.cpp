@@ -68,17 +68,32 @@ void read_camera(Section& section, const SetContext& context, PersonCamera& came
   section.boolean("loop", camera.loop);
   read_start(section, camera.source, camera.first);
   read_colour(section, camera.colour);
-  if (auto lens = read_lens_key(section, {0, 0}, context.base)) camera.lens = *lens;
-  if (auto table = section.table("pose")) camera.cam_from_set = read_fixed_pose(*table);
+  std::optional<RigCamera> of_rig;
+  if (section.has("rig_camera")) {
+    of_rig = read_rig_camera(section, context);
+    if (of_rig) {
+      camera.lens = of_rig->lens;
+      camera.cam_from_set = of_rig->cam_from_set;
+      camera.response = of_rig->response;
+    }
+  } else {
+    if (auto lens = read_lens_key(section, {0, 0}, context.base)) camera.lens = *lens;
+    if (auto table = section.table("pose")) camera.cam_from_set = read_fixed_pose(*table);
+    read_response_key(section, context.base, camera.response);
+  }
+  read_offset(section, context, of_rig, camera.offset_s);
   if (auto table = section.table("key")) camera.key = read_key(*table, context);
 }
 
-bool has_lens(const Section& section) { return section.has("lens") || section.has("model"); }
+bool has_lens(const Section& section) {
+  return section.has("lens") || section.has("model") || section.has("rig_camera");
+}
+bool has_pose(const Section& section) { return section.has("pose") || section.has("rig_camera"); }
 
 // Where the person stands, and how the picture is laid there.
 void read_standing(Section& section, PersonSettings& person) {
   const bool calibrated = has_lens(section);
-  if (calibrated != section.has("pose")) {
+  if (calibrated != has_pose(section)) {
     section.fault("", "lens and pose of the person's camera come together");
   }
   std::string feet;
@@ -130,7 +145,7 @@ void read_further_cameras(Section& section, const SetContext& context, PersonSet
       break;
     }
     if (!has_lens(further)) further.need("lens", "of this camera: a file, or a table");
-    further.need("pose", "where this camera is in the set");
+    if (!has_pose(further)) further.need("pose", "where this camera is in the set");
     read_camera(further, context, person.cameras.emplace_back());
     further.finish();
   }

@@ -255,8 +255,6 @@ bool read_source_key(Section& section,
   return true;
 }
 
-namespace {
-
 void read_response_key(Section& section, const fs::path& base, std::string& response) {
   if (!section.file("response", base, response)) return;
   try {
@@ -265,6 +263,22 @@ void read_response_key(Section& section, const fs::path& base, std::string& resp
     section.fault("response", fmt::format("cannot be used: {}", error.what()));
   }
 }
+
+void read_offset(Section& section,
+                 const SetContext& context,
+                 const std::optional<RigCamera>& of_rig,
+                 double& offset_s) {
+  section.number("offset_s", offset_s, {-60, 60});
+  if (!of_rig || !context.plate_offset_s) return;
+  offset_s = of_rig->time_offset_s - *context.plate_offset_s;
+  if (section.value("offset_s") != nullptr) {
+    section.fault("offset_s",
+                  "is the rig's already, which both cameras are of: leave out either it or "
+                  "rig_camera");
+  }
+}
+
+namespace {
 
 // The lens, the pose and the response of a camera that is of no rig.
 void read_own_camera(Section& section,
@@ -299,23 +313,6 @@ void read_own_probe(Section& section, const SetContext& context, ProbeSettings& 
   if (auto table = section.table("pose")) read_probe_pose(*table, probe.probe_from_set);
   if (!is_map && !latlong) section.need("pose", "how the probe is turned");
   read_response_key(section, context.base, probe.response);
-}
-
-// Of two cameras of one rig, clocks and all.
-void read_probe_of_rig(Section& section, const SetContext& context, ProbeSettings& probe) {
-  const auto of_rig = read_rig_camera(section, context);
-  if (of_rig) {
-    probe.lens = of_rig->lens;
-    probe.probe_from_set = of_rig->cam_from_set;
-    probe.response = of_rig->response;
-  }
-  if (!of_rig || !context.plate_offset_s) return;
-  probe.offset_s = of_rig->time_offset_s - *context.plate_offset_s;
-  if (section.value("offset_s") != nullptr) {
-    section.fault("offset_s",
-                  "is the rig's already, which both cameras are of: leave out either it or "
-                  "rig_camera");
-  }
 }
 
 }  // namespace
@@ -355,12 +352,18 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
 ProbeSettings read_probe_section(Section section, const SetContext& context) {
   ProbeSettings probe;
   read_probe_source(section, context.base, probe);
-  section.number("offset_s", probe.offset_s, {-60, 60});
+  std::optional<RigCamera> of_rig;
   if (section.has("rig_camera")) {
-    read_probe_of_rig(section, context, probe);
+    of_rig = read_rig_camera(section, context);
+    if (of_rig) {
+      probe.lens = of_rig->lens;
+      probe.probe_from_set = of_rig->cam_from_set;
+      probe.response = of_rig->response;
+    }
   } else {
     read_own_probe(section, context, probe);
   }
+  read_offset(section, context, of_rig, probe.offset_s);
   if (double yaw_deg = 0; section.number("yaw", yaw_deg, angle_range)) {
     probe.yaw_rad = yaw_deg * degree;
   }

@@ -90,8 +90,16 @@ std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& con
 // The pose of a camera that stays where it is: position, and look_at or rotation.
 calibrate::Pose read_fixed_pose(Section table);
 
-// How a source's codes become light: `colour`.
+// How a source's codes become light: `colour`, and, in its place, `response`.
 void read_colour(Section& section, capture::Transfer& colour);
+void read_response_key(Section& section, const std::filesystem::path& base, std::string& response);
+
+// How much later than the plate's a camera's frames are stamped: `offset_s`, or, if both are of one
+// rig, what the rig says.
+void read_offset(Section& section,
+                 const SetContext& context,
+                 const std::optional<RigCamera>& of_rig,
+                 double& offset_s);
 
 // Where a source begins, `frame`; of a device nowhere but at 0. False if there is no such key.
 bool read_start(Section& section, const std::string& uri, std::int64_t& frame);

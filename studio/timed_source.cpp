@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "capture/exr.h"
 #include "capture/live_reader.h"
 
 namespace studio {
@@ -18,12 +19,18 @@ constexpr capture::Time patience = 1s;
 
 }  // namespace
 
+std::string name_of_light(const VideoSource& source) {
+  return std::string(source.response.empty() ? capture::name_of(source.colour)
+                                             : capture::by_response);
+}
+
 std::unique_ptr<capture::Camera> open_video(const VideoSource& source) {
   capture::CameraOptions options;
   options.colour.transfer = source.colour;
   options.loop = source.loop;
   options.base_dir = source.base_dir;
   options.alpha = source.alpha;
+  options.response = source.response;
   if (source.first > 0) options.frame = source.first;
   return capture::open_camera(source.uri, options);
 }
@@ -32,7 +39,9 @@ std::string words_for_held(const VideoSource& held,
                            const VideoSource& asked,
                            const std::string& holder) {
   std::string other;
-  if (held.colour != asked.colour) {
+  if (held.response != asked.response) {
+    other += " with another response";
+  } else if (held.colour != asked.colour) {
     other += fmt::format(" with colour = \"{}\", not \"{}\"", capture::name_of(held.colour),
                          capture::name_of(asked.colour));
   }
@@ -47,11 +56,11 @@ std::string words_for_held(const VideoSource& held,
 TimedSource::TimedSource(const VideoSource& source, std::optional<capture::Time> start, bool live)
     : source_(open_video(source)), start_(start), live_(live) {}
 
-std::optional<capture::Frame> TimedSource::at(capture::Time time) {
-  capture::Time asked = time;
+std::optional<capture::Frame> TimedSource::at(capture::Time time, capture::Time offset) {
+  capture::Time asked = time + offset;
   if (!source_.is_live()) {
     if (!start_) start_ = time;
-    asked = source_.first().time + (time - *start_);
+    asked = source_.first().time + (time - *start_) + offset;
   } else if (!live_) {
     asked = capture::monotonic_now();
   }

@@ -18,9 +18,13 @@ struct VideoSource {
   bool loop = false;
   std::int64_t first = 0;  // frame that it begins with
   capture::Transfer colour = capture::Transfer::rec1886;
-  bool alpha = false;  // as capture::CameraOptions
+  bool alpha = false;      // as capture::CameraOptions
+  std::string response{};  // the same, in place of `colour`
   friend bool operator==(const VideoSource&, const VideoSource&) = default;
 };
+
+// How its codes become light, for people and files: the curve's name, or capture::by_response.
+std::string name_of_light(const VideoSource& source);
 
 // Opens it. Throws as capture::open_camera.
 std::unique_ptr<capture::Camera> open_video(const VideoSource& source);
@@ -39,9 +43,10 @@ class TimedSource {
   // std::invalid_argument if the source cannot be opened.
   TimedSource(const VideoSource& source, std::optional<capture::Time> start, bool live);
 
-  // The newest frame whose time is not after the show's. Times must not fall. Nothing where the
-  // last one holds, because there is no newer one.
-  std::optional<capture::Frame> at(capture::Time time);
+  // The newest frame whose time is not after the show's and `offset`, by which the source's frames
+  // are stamped later. Times must not fall. Nothing where the last one holds, because there is no
+  // newer one.
+  std::optional<capture::Frame> at(capture::Time time, capture::Time offset = {});
   // The newest one with a picture that at() gave; before that, the source's first.
   const capture::Frame& newest() const { return pictured_ ? *pictured_ : source_.first(); }
   const capture::Frame& first() const { return source_.first(); }

@@ -38,7 +38,7 @@ constexpr int plate_footage = 480;      // frames that a clip without a plate is
 
 struct KeyOptions {
   std::vector<std::string> what;
-  std::string out, plate, colour = "Rec.1886", method = "screen", effort = "full";
+  std::string out, plate, response, colour = "Rec.1886", method = "screen", effort = "full";
   bool person = false;
   std::optional<std::int64_t> frames, first;
   std::optional<double> screen, core, edge, despill, smoothing;
@@ -50,6 +50,7 @@ VideoSource source_of(const KeyOptions& options, const std::string& uri) {
   source.uri = uri.find(':') == std::string::npos ? "file:" + uri : uri;
   source.base_dir = std::filesystem::current_path().string();
   source.colour = capture::transfer_from_name(options.colour);
+  source.response = options.response;
   source.first = options.first.value_or(0);
   return source;
 }
@@ -111,7 +112,7 @@ void make_plate(const KeyOptions& options, Console& console) {
   const compositing::CleanPlate plate = maker.plate();
   capture::ExrOptions tags;
   if (plate.knows_noise) tags.noise = {plate.noise_gain, plate.noise_floor};
-  tags.transfer = source.colour;
+  tags.transfer = name_of_light(source);
   capture::write_exr(options.out, plate.light, tags);
   const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
   const bool by_screen = options.method == "screen";
@@ -162,7 +163,8 @@ compositing::KeySettings settings_of(const KeyOptions& options) {
 // Throws if anything that is to be written is what is read.
 void spare_what_is_read(const KeyOptions& options, const VideoSource& source, Console& console) {
   std::vector<ReadFile> files = files_of(source.uri, "the clip");
-  for (const std::string& path : {options.plate, options.masks.garbage, options.masks.core}) {
+  for (const std::string& path :
+       {options.plate, options.response, options.masks.garbage, options.masks.core}) {
     if (path.empty()) continue;
     files.push_back({"what the clip is keyed by", path});
   }
@@ -369,6 +371,8 @@ Command key_command() {
         arguments.choice("--method", o->method, {"screen", "difference"},
                          "by the screen's colour, or by the distance from any still background");
         arguments.option("--colour", o->colour, "the clip's transfer curve, as in a set");
+        arguments.option("--response", o->response,
+                         "the camera's measured response (.rsp or .toml), in place of --colour");
         arguments.option("--first", o->first, 0, 1'000'000'000, "begin at this frame");
         arguments.option(
             "--frames", o->frames, 1, 1'000'000'000,

@@ -154,13 +154,16 @@ TEST(WriteExr, PassesAnIndependentReaderWithItsAttributes) {
 TEST(WriteExr, KeepsHowCodesBecameLight) {
   const std::string path = made::make_temporary_directory() / "a.exr";
   write_exr(path, make_image(3, 4));
-  EXPECT_EQ(read_exr_transfer(path), std::nullopt);
-  for (const Transfer transfer :
-       {Transfer::rec1886, Transfer::srgb, Transfer::rec709_camera, Transfer::linear}) {
-    write_exr(path, make_image(3, 4), {.transfer = transfer});
+  EXPECT_EQ(read_exr_transfer(path), "");
+  for (const std::string_view transfer :
+       {name_of(Transfer::rec1886), name_of(Transfer::srgb), name_of(Transfer::rec709_camera),
+        name_of(Transfer::linear), by_response}) {
+    write_exr(path, make_image(3, 4), {.transfer = std::string(transfer)});
     EXPECT_EQ(read_exr_transfer(path), transfer);
     EXPECT_EQ(read_exr_noise(path), std::nullopt);
   }
+  write_exr(path, make_image(3, 4), {.transfer = "another program's"});
+  EXPECT_EQ(read_exr_transfer(path), "");
 }
 
 TEST(WriteExr, KeepsWhatIsKnownOfNoise) {

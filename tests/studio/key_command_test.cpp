@@ -395,9 +395,29 @@ TEST_F(KeyCommand, RefusesAPlateOfAnotherCurveAndNamesBoth) {
       run("key " + in("take_%04d.png") + " --plate " + in("plate.exr") + " -o " + in("keyed"));
   EXPECT_EQ(keyed.status, 1);
   expect_one_line(keyed.err);
-  EXPECT_THAT(keyed.err, HasSubstr(in("plate.exr") + " was taken as colour = \"sRGB\""));
+  EXPECT_THAT(keyed.err, HasSubstr(in("plate.exr") + " was taken as \"sRGB\""));
   EXPECT_THAT(keyed.err, HasSubstr("is read as \"Rec.1886\""));
   EXPECT_FALSE(fs::exists(in("keyed")));
+}
+
+TEST_F(KeyCommand, TakesLightByACamerasResponse) {
+  std::ofstream(in("camera.rsp")) << "2 0 1\n2 0 1\n2 0 1\n";  // light is the code's square
+  const std::string response = " --response " + in("camera.rsp");
+  const auto key = [&](const std::string& plate, const std::string& options) {
+    return run("key " + in("take_%04d.png") + " --plate " + in(plate) + options + " -o " +
+               in("keyed"));
+  };
+  ASSERT_EQ(run("key plate " + in("empty_%04d.png") + response + " -o " + in("plate.exr")).status,
+            0);
+  const Outcome keyed = key("plate.exr", response);
+  EXPECT_EQ(keyed.status, 0) << keyed.err;
+  const Outcome by_curve = key("plate.exr", "");
+  EXPECT_EQ(by_curve.status, 1);
+  EXPECT_THAT(by_curve.err, HasSubstr("was taken by a response"));
+  const Outcome of_codes = key("empty_0000.png", response);
+  EXPECT_EQ(of_codes.status, 1);
+  EXPECT_THAT(of_codes.err, HasSubstr("holds codes"));
+  expect_one_line(of_codes.err);
 }
 
 TEST_F(KeyCommand, BlamesThePlateAndNotTheMaskForThePlatesSize) {

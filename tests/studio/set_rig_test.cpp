@@ -120,6 +120,36 @@ TEST_F(SetRig, GivesWhatTheSameValuesWrittenOutWould) {
   EXPECT_LT(probe.position_m, 1e-12);
 }
 
+TEST_F(SetRig, GivesPersonsTheirCamerasToo) {
+  const std::string person = "[[billboard]]\nsource = \"map.exr\"\nposition = [0, 0, 0]\n";
+  const std::string further = "[[billboard.camera]]\nsource = \"map.exr\"\n";
+  const std::string probe = "rig_camera = \"up\"\n";
+  const std::string of_left =
+      "lens = \"rig/plate.toml\"\nresponse = \"rig/plate.rsp\"\npose = " + pose_of(rig_from_set_) +
+      "\n";
+  const Set of_rig = read_set(set_of(rig(pose_of(rig_from_set_)), "rig_camera = \"left\"\n",
+                                     probe + person + "rig_camera = \"left\"\n" + further + probe));
+  const Set written =
+      read_set(set_of(rig(pose_of(rig_from_set_)), "rig_camera = \"left\"\n",
+                      probe + person + of_left + "offset_s = 0\n" + further +
+                          "lens = \"rig/probe.toml\"\nresponse = \"rig/probe.rsp\"\n"
+                          "offset_s = 0.125\npose = " +
+                          pose_of(up_from_rig_ * rig_from_set_) + "\n"));
+  ASSERT_EQ(of_rig.persons.at(0).cameras.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const PersonCamera &a = of_rig.persons[0].cameras[i], &b = written.persons.at(0).cameras.at(i);
+    EXPECT_EQ(a.lens, b.lens) << i;
+    EXPECT_EQ(a.response, b.response) << i;
+    EXPECT_FALSE(a.response.empty()) << i;
+    EXPECT_DOUBLE_EQ(a.offset_s, b.offset_s) << i;
+    EXPECT_LT(made::error_of(a.cam_from_set, b.cam_from_set).position_m, 1e-12) << i;
+    EXPECT_LT(made::error_of(a.cam_from_set, b.cam_from_set).turn_rad, 1e-7) << i;
+  }
+  EXPECT_THAT(faults_of(set_of(rig(""), "rig_camera = \"left\"\n",
+                               probe + person + "rig_camera = \"left\"\noffset_s = 1\n")),
+              HasSubstr("is the rig's already"));
+}
+
 TEST_F(SetRig, StandsAtTheOriginIfNothingIsSaid) {
   const Set set = read_set(set_of(rig(""), "rig_camera = \"left\"\n", "rig_camera = \"up\"\n"));
   EXPECT_EQ(set.camera.pose.cam_from_set, Pose{});

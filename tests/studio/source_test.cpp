@@ -164,6 +164,24 @@ TEST(TimedSource, SaysHowOldItsNewestPictureIs) {
   EXPECT_EQ(still.age(), 0s);
 }
 
+TEST(TimedSource, GivesFramesThatAreStampedLater) {
+  register_grey_camera();
+  const auto number_at = [](capture::Time time, capture::Time offset) {
+    TimedSource source({"grey:30,10,0", "", false, 0, capture::Transfer::linear}, capture::Time{1s},
+                       false);
+    source.at(time, offset);
+    return source.newest().number;
+  };
+  EXPECT_EQ(number_at(2s, 0ms), 10);
+  EXPECT_EQ(number_at(2s, 250ms), 12);
+  EXPECT_EQ(number_at(2s, -250ms), 7);
+  EXPECT_EQ(number_at(1s, -250ms), 0);
+  TimedSource begins_now({"grey:30,10,0", "", false, 0, capture::Transfer::linear}, {}, false);
+  begins_now.at(7s, 250ms);
+  EXPECT_EQ(begins_now.newest().number, 2);
+  EXPECT_EQ(begins_now.age(), 50ms);
+}
+
 // As a still of a late frame asks for it.
 TEST(TimedSource, HoldsItsLastPictureThoughNobodyAskedBefore) {
   register_grey_camera();
