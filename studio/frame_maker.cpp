@@ -206,7 +206,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     const capture::Time next = time + capture::time_of_frame(1, rate_);
     plate_->read_sound_to(next);
     prepared.sound = plate_->take_sound(next);
-    videos = videos_->at(time);
+    videos = videos_->at(time, *frame);
     prepared.notes = videos_->take_notes();
     std::ranges::move(take_notes(), std::back_inserter(prepared.notes));
   }

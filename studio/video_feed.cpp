@@ -22,7 +22,7 @@ bool same_source(const VideoSettings& a, const VideoSettings& b) {
 // An open source, with the texture of its newest frame.
 struct VideoFeed::Player {
   VideoSettings settings;
-  std::unique_ptr<TimedSource> source;
+  std::unique_ptr<TimedSource> source;          // null = the plate's
   std::shared_ptr<const capture::Image> image;  // that `frame` was made from
   VideoFrame frame;
   bool reported = false;  // numbers that are none
@@ -41,6 +41,7 @@ VideoFeed::VideoFeed(const Set& set,
                      const VideoFeed* before)
     : base_dir_(std::filesystem::absolute(set.path).parent_path().string()),
       live_(live),
+      plate_(set.camera.source),
       start_(start) {
   Faults faults(set.path);
   for (const VideoSettings& video : set.videos) {
@@ -77,6 +78,7 @@ std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings
   };
   auto player = std::make_shared<Player>();
   player->settings = settings;
+  if (live_ && settings.source == plate_) return player;
   try {
     player->source = std::make_unique<TimedSource>(video_of(settings), start_, live_);
   } catch (const std::runtime_error& error) {
@@ -84,7 +86,7 @@ std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings
       if (feed == nullptr) continue;
       for (const Channel& channel : feed->channels_) {
         if (!channel.player || channel.player->settings.source != settings.source) continue;
-        if (!channel.player->source->info().live) continue;
+        if (!channel.player->source || !channel.player->source->info().live) continue;
         throw std::runtime_error(error.what() + words_for_held(video_of(channel.player->settings),
                                                                video_of(settings),
                                                                feed->name_of(channel)));
@@ -118,14 +120,22 @@ void VideoFeed::place(const Set& set, const SetScene& scene) {
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
 }
 
-void VideoFeed::update(Player& player, capture::Time time) {
+void VideoFeed::update(Player& player, capture::Time time, const capture::Frame& plate) {
+  if (!player.source) return show(player, plate);
   TimedSource& source = *player.source;
   const std::optional<capture::Frame> frame = source.at(time);
   for (const std::string& note : source.take_notes())
     notes_.push_back("video " + player.settings.source + " " + note);
-  if (player.frame.texture != nullptr && (!frame || frame->image == player.image)) return;
+  if (frame) {
+    show(player, *frame);
+  } else if (player.frame.texture == nullptr) {
+    show(player, source.newest());
+  }
+}
+
+void VideoFeed::show(Player& player, const capture::Frame& shown) {
+  if (player.frame.texture != nullptr && shown.image == player.image) return;
   auto texture = player.textures.lend();
-  const capture::Frame& shown = frame ? *frame : source.newest();
   render::make_video_texture(shown.image ? *shown.image : capture::make_image(1, 1), *texture);
   player.image = shown.image;
   if (texture->not_numbers > 0 && !player.reported) {
@@ -136,10 +146,10 @@ void VideoFeed::update(Player& player, capture::Time time) {
   player.frame = {std::move(texture), shown.time};
 }
 
-std::vector<VideoFrame> VideoFeed::at(capture::Time time) {
+std::vector<VideoFrame> VideoFeed::at(capture::Time time, const capture::Frame& plate) {
   std::vector<VideoFrame> frames;
   for (const Channel& channel : channels_) {
-    update(*channel.player, time);
+    update(*channel.player, time, plate);
     frames.push_back(channel.player->frame);
   }
   return frames;

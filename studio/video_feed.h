@@ -20,7 +20,8 @@ struct VideoFrame {
 };
 
 // One thread uses it. Each source gives its newest frame whose time is not after the show's; one
-// that ends or stalls holds its last. Videos of the same source share it.
+// that ends or stalls holds its last. Videos of the same source share it; those of a live plate's
+// camera, which is open already, show the frame's plate.
 class VideoFeed {
  public:
   struct Player;  // an open source
@@ -36,8 +37,8 @@ class VideoFeed {
   // Where the videos shine from, after the scene has changed. Throws SetError.
   void place(const Set& set, const SetScene& scene);
 
-  // One for each of the set's videos. Times must not fall.
-  std::vector<VideoFrame> at(capture::Time time);
+  // One for each of the set's videos, beside the show's plate. Times must not fall.
+  std::vector<VideoFrame> at(capture::Time time, const capture::Frame& plate);
   // Of these frames.
   std::vector<render::LocalLight> lamps(const std::vector<VideoFrame>& frames) const;
 
@@ -67,10 +68,12 @@ class VideoFeed {
   VideoSettings settings_of(const std::string& name, const std::string& uri) const;
   std::shared_ptr<Player> find(const VideoSettings& settings, const VideoFeed* before) const;
   std::shared_ptr<Player> open(const VideoSettings& settings, const VideoFeed* before) const;
-  void update(Player& player, capture::Time time);
+  void update(Player& player, capture::Time time, const capture::Frame& plate);
+  void show(Player& player, const capture::Frame& frame);
 
   std::string base_dir_;
   bool live_ = false;
+  std::string plate_;                   // the set's camera
   std::optional<capture::Time> start_;  // for sources opened now; nothing = the next time asked for
   std::vector<Channel> channels_;
   std::vector<std::string> notes_;

@@ -116,5 +116,24 @@ TEST_F(VideoChangeTest, AVideoThatIsBeingOpenedWhenAnEditIsThereComesAfterIt) {
   EXPECT_EQ(open_now, 1);
 }
 
+// A camera that can be opened only once is the plate and on a screen.
+TEST_F(VideoChangeTest, ALivePlatesCameraIsShownAsThePlate) {
+  FrameMaker maker(made_set("live_grey:1000,100", news));
+  const auto shown_at = [&](std::int64_t frame) {
+    const auto made = maker.make(frame);
+    const capture::HalfImage& plate = *made->plate;
+    return std::pair(made->videos.at(0)->levels.front().at(0, 0, 0),
+                     capture::float_from_half(plate.pixels[plate.index(0, 0, 0)]));
+  };
+  shown_at(0);
+  maker.change_video("news", "live_grey:1000,100");
+  for (std::int64_t n = 1; n < 5; ++n) {
+    const auto [video, plate] = shown_at(n);
+    EXPECT_NEAR(video, plate, 1e-3F) << n;
+  }
+  maker.change_video("news", "grey:1,25,0");
+  EXPECT_NEAR(shown_at(6).first, 0.1F, 1e-3F);
+}
+
 }  // namespace
 }  // namespace studio::video_change_test
