@@ -243,6 +243,7 @@ Set read_set(const std::string& path) {
     set.record = read_record_section(*section, context.base, context.show);
   }
   root.finish();
+  refuse_shared_devices(set, faults);
 
   std::vector<Diagnostic> diagnostics = faults.sorted();
   if (!diagnostics.empty()) throw SetError(std::move(diagnostics));

@@ -51,6 +51,8 @@ VideoSettings read_video_section(Section section, const SetContext& context, boo
 PersonSettings read_billboard_section(Section section, const SetContext& context);
 // Adds a fault for every person that is named as one before.
 void refuse_same_names(const std::vector<PersonSettings>& persons, Faults& faults);
+// Adds a fault for every use of a device that has another use before.
+void refuse_shared_devices(const Set& set, Faults& faults);
 // Names those that have none, with faults for names that there are twice.
 void name_videos(std::vector<VideoSettings>& videos, Faults& faults);
 // What the section leaves out stays as in `effort`.
