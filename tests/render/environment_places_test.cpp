@@ -89,8 +89,8 @@ TEST(EnvironmentPlaces, AreFewHoweverManyWereAdded) {
   constexpr int all = 400'000;
   Vec3f expected{};
   for (int i = 0; i < all; ++i) {
-    const PlaceTerm e{Vec3f{1, 1, 1} * (1.0F / all), 20 + 8 * unit(random),
-                            10 + 4 * unit(random), centre, 0};
+    const PlaceTerm e{Vec3f{1, 1, 1} * (1.0F / all), 20 + 8 * unit(random), 10 + 4 * unit(random),
+                      centre, 0};
     expected += e.weight * radiance_at(*sky.levels[0], e.x, e.y);
     sky.places.add(e);
   }
