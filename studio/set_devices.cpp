@@ -9,7 +9,7 @@
 namespace studio {
 namespace {
 
-constexpr std::string_view plate = "the plate";
+constexpr std::string_view the_plate = "the plate";
 
 struct DeviceUse {
   std::string device;  // its URI without settings
@@ -18,9 +18,9 @@ struct DeviceUse {
 };
 
 // Whether the second one shows what is open for the first (VideoFeed).
-bool share(const DeviceUse& first, const DeviceUse& second) {
+bool are_one(const DeviceUse& first, const DeviceUse& second) {
   if (second.video == nullptr || first.uri != second.uri) return false;
-  if (first.video == nullptr) return first.what == plate;
+  if (first.video == nullptr) return first.what == the_plate;
   return first.video->loop == second.video->loop && first.video->colour == second.video->colour;
 }
 
@@ -35,15 +35,15 @@ void refuse_shared_devices(const Set& set, Faults& faults) {
     const auto before = std::ranges::find(uses, use.device, &DeviceUse::device);
     if (before == uses.end()) {
       uses.push_back(use);
-    } else if (!share(*before, use)) {
-      const bool may_share = video && before->what == plate;
+    } else if (!are_one(*before, use)) {
+      const bool may_share = video && before->what == the_plate;
       faults.add(
           place,
           fmt::format("{} is {}'s already, and can be opened only once{}", use.device, before->what,
                       may_share ? ": to show the plate, write its source as there" : ""));
     }
   };
-  add(set.camera.source, std::string(plate), set.camera.source_place);
+  add(set.camera.source, std::string(the_plate), set.camera.source_place);
   if (set.probe) add(set.probe->source, "the probe", set.probe->source_place);
   for (const VideoSettings& video : set.videos) {
     add(video.source, fmt::format("video \"{}\"", video.name), video.source_place, &video);

@@ -401,7 +401,7 @@ TEST_F(KeyCommand, RefusesAPlateOfAnotherCurveAndNamesBoth) {
 }
 
 TEST_F(KeyCommand, TakesLightByACamerasResponse) {
-  std::ofstream(in("camera.rsp")) << "2 0 1\n2 0 1\n2 0 1\n";  // light is the code's square
+  std::ofstream(in("camera.rsp")) << "2 1 0 0\n2 1 0 0\n2 1 0 0\n";  // light is the code's square
   const std::string response = " --response " + in("camera.rsp");
   const auto key = [&](const std::string& plate, const std::string& options) {
     return run("key " + in("take_%04d.png") + " --plate " + in(plate) + options + " -o " +
