@@ -2,9 +2,14 @@
 #include "compositing/key_trial.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
 
 #include "capture/parallel_loop.h"
 #include "compositing/clean_plate.h"
+#include "compositing/keyed_picture.h"
+#include "compositing/plate_footage.h"
 
 namespace compositing {
 namespace {
@@ -24,7 +29,49 @@ struct Judge {
   KeyScore score() const { return {errors.mean(), flicker.deviation()}; }
 };
 
+CleanPlate plate_of(const MadeClip& clip, const KeyWay& way, int frames) {
+  if (way.from_footage) {
+    PlateFootage footage;
+    for (int i = 0; i < frames; ++i) footage.add(light_of(clip.frame(i).seen));
+    return way.settings.method == KeyMethod::screen ? footage.screen() : footage.background();
+  }
+  std::vector<Image> shots;
+  for (int i = 0; i < 8; ++i) shots.push_back(light_of(clip.plate_shot(i)));
+  return average_plate(shots);
+}
+
+KeyReport key(Keyer& keyer, const Image& frame, bool by_texel, Image& keyed) {
+  if (by_texel) {
+    const KeyReport report = keyer.follow(frame);
+    keyed = key_by_texels(keyer, make_keyed_texture(frame));
+    return report;
+  }
+  capture::HalfImage half;
+  const KeyReport report = keyer.key(frame, half);
+  keyed = to_float(half);
+  return report;
+}
+
 }  // namespace
+
+capture::Image key_by_texels(Keyer& keyer, std::shared_ptr<const KeyedTexture> texture) {
+  const int height = texture->height(), width = texture->width();
+  const TexelKeyedPicture picture(std::move(texture), keyer.shared_lit(), keyer.shared_filtered(),
+                                  keyer.dials());
+  const float pixel = 1 / std::sqrt(static_cast<float>(width) * static_cast<float>(height));
+  Image keyed = capture::make_image(height, width, 4);
+  std::vector<render::PicturePlace> places(static_cast<std::size_t>(width));
+  std::vector<std::array<float, 4>> row(places.size());
+  for (int y = 0; y < height; ++y) {
+    const float v = (static_cast<float>(y) + 0.5F) / static_cast<float>(height);
+    for (std::size_t x = 0; x < places.size(); ++x) {
+      places[x] = {(static_cast<float>(x) + 0.5F) / static_cast<float>(width), v, pixel};
+    }
+    picture.look_up_all(places, row);
+    std::memcpy(&keyed.at(y, 0, 0), row.data(), row.size() * sizeof row[0]);
+  }
+  return keyed;
+}
 
 KeyScore mean_of(std::span<const KeyScore> scores) {
   KeyScore mean;
@@ -42,7 +89,7 @@ KeyScore mean_of(std::span<const KeyScore> scores) {
 
 SceneTrial judge_scene(const MadeScene& scene,
                        std::span<const std::uint32_t> seeds,
-                       const KeySettings& settings,
+                       const KeyWay& way,
                        const TrialSize& size) {
   SceneTrial trial;
   trial.name = scene.name;
@@ -50,17 +97,15 @@ SceneTrial judge_scene(const MadeScene& scene,
   std::vector<KeyScore> ours, ffmpeg, obs, gstreamer;
   for (const std::uint32_t seed : seeds) {
     const MadeClip clip(scene, seed, size.height, size.width);
-    std::vector<Image> shots;
-    for (int i = 0; i < 8; ++i) shots.push_back(light_of(clip.plate_shot(i)));
-    Keyer keyer(average_plate(shots), settings);
-    capture::HalfImage keyed;
+    Keyer keyer(plate_of(clip, way, size.frames), way.settings);
     Judge own, f, o, g;
     for (int i = 0; i < size.frames; ++i) {
       const MadeFrame made = clip.frame(i);
-      const KeyReport report = keyer.key(light_of(made.seen), keyed);
+      Image keyed;
+      const KeyReport report = key(keyer, light_of(made.seen), way.by_texel, keyed);
       trial.confidence +=
           report.confidence / static_cast<float>(size.frames * static_cast<int>(seeds.size()));
-      own.add(to_float(keyed), made, background, i, true);
+      own.add(keyed, made, background, i, true);
       const bool counts = i % size.peer_step == 0;
       if (!counts && i < MadeClip::rests_from) continue;
       const PeerKeyColour key = pick_key_colour(made);
@@ -78,11 +123,11 @@ SceneTrial judge_scene(const MadeScene& scene,
 
 std::vector<SceneTrial> judge_scenes(std::span<const MadeScene> scenes,
                                      std::span<const std::uint32_t> seeds,
-                                     const KeySettings& settings,
+                                     const KeyWay& way,
                                      const TrialSize& size) {
   std::vector<SceneTrial> trials(scenes.size());
   capture::parallel_for(std::size_t{0}, scenes.size(), [&](std::size_t i) {
-    trials[i] = judge_scene(scenes[i], seeds, settings, size);
+    trials[i] = judge_scene(scenes[i], seeds, way, size);
   });
   return trials;
 }

@@ -50,7 +50,8 @@ std::vector<MadeScene> make_scenes() {
   add("noise", [](MadeScene& s) { s.noise_gain = 1.5e-3F, s.noise_floor = 2e-5F; });
   add("green clothes", [](MadeScene& s) { s.actor.green_clothes = true; });
   add("lamp flicker", [](MadeScene& s) { s.flicker = 0.08F, s.uneven = 0.3F; });
-  add("stale plate", [](MadeScene& s) { s.stale = 0.12F, s.uneven = 0.5F, s.wrinkles = 0.2F; });
+  add("stale plate",
+      [](MadeScene& s) { s.stale = 0.12F, s.shift_px = 4, s.uneven = 0.5F, s.wrinkles = 0.2F; });
   add("blue screen", [](MadeScene& s) { s.screen = {0.03F, 0.06F, 0.36F}, s.uneven = 0.3F; });
   add("yellow screen", [](MadeScene& s) { s.screen = {0.35F, 0.4F, 0.02F}, s.uneven = 0.3F; });
   add("studio", [](MadeScene& s) {
@@ -272,11 +273,12 @@ MadeFrame MadeClip::frame(int index) const {
 
 MadePicture MadeClip::plate_shot(int index) const {
   Image light = screen_;
-  if (scene_.stale > 0) {
+  if (scene_.stale > 0 || scene_.shift_px > 0) {
     for (int y = 0; y < height_; ++y) {
       for (int x = 0; x < width_; ++x) {
         for (int c = 0; c < 3; ++c) {
-          light.at(y, x, c) = (1 + scene_.stale) * screen_.at(y, std::min(x + 4, width_ - 1), c);
+          light.at(y, x, c) =
+              (1 + scene_.stale) * screen_.at(y, std::min(x + scene_.shift_px, width_ - 1), c);
         }
       }
     }

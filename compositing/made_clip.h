@@ -17,14 +17,15 @@ struct MadeScene {
   std::string_view name;
   MadeActor actor{};
   std::array<float, 3> screen{0.035F, 0.40F, 0.06F};
-  float uneven = 0;    // of the screen's light: slope and vignette
-  float wrinkles = 0;  // of the cloth
-  float shadow = 0;    // of the person on the screen; moves with the person
-  float light = 1;     // of the screen: above 2.4 green is clipped
-  float flicker = 0;   // of the lamps, from frame to frame
-  float stale = 0;     // the plate's light is this much too bright, and it is shifted by 4 pixels
-  float arm = 0.06F;   // how fast it waves, rad a frame
-  float walk = 0.7F;   // pixels a frame to the side
+  float uneven = 0;            // of the screen's light: slope and vignette
+  float wrinkles = 0;          // of the cloth
+  float shadow = 0;            // of the person on the screen; moves with the person
+  float light = 1;             // of the screen: above 2.4 green is clipped
+  float flicker = 0;           // of the lamps, from frame to frame
+  float stale = 0;             // the plate's light is this much too bright,
+  int shift_px = 0;            // ... and the plate is shifted so far to the left
+  float arm = 0.06F;           // how fast it waves, rad a frame
+  float walk = 0.7F;           // pixels a frame to the side
   float noise_gain = 1e-4F;    // variance per light
   float noise_floor = 1e-6F;   // variance
   bool halved_chroma = false;  // 4:2:0 on the way

@@ -18,6 +18,7 @@
 #include "compositing/key_error.h"
 #include "compositing/keyed_picture.h"
 #include "compositing/made_walker.h"
+#include "compositing/person_shape.h"
 #include "compositing/stand_in.h"
 #include "compositing/visual_hull.h"
 #include "render/renderer.h"
@@ -84,6 +85,23 @@ class HullChart {
       if (quick_) break;
     }
     for (double angle = 0; angle <= 90; angle += quick_ ? 30 : 15) angles_.push_back(angle);
+  }
+
+  Stressor billboard_views() {
+    Stressor s{"view, off the person's camera", "degrees", false, {}};
+    s.error_name = "outline of the billboard: error, m";
+    const double metres_a_pixel = distance_m / lens_.parameters[0];
+    for (const double angle : angles_) {
+      if (angle > 75) break;  // seen from the edge, it shows next to nothing
+      console_.progress(0.9 + 0.001 * angle, "views of a billboard");
+      const Mean mean = mean_at({"", 1}, angle, step_px_, times_.size());
+      StressorSample sample{angle, mean.error.silhouette_px * metres_a_pixel,
+                            compositing::billboard_error_m(angle * degree, compositing::off_foot_m),
+                            angle * degree > turn_rad + 1e-6 ? "shallow" : "ok"};
+      sample.figures = {{"composite", mean.error.composite}, {"wrong", mean.error.wrong_share}};
+      s.samples.push_back(std::move(sample));
+    }
+    return s;
   }
 
   Chart measure() {
@@ -364,6 +382,12 @@ class HullChart {
 };
 
 }  // namespace
+
+Stressor billboard_view_stressor(bool quick, Console& console) {
+  ChartRequest request;
+  request.quick = quick;
+  return HullChart(request, console).billboard_views();
+}
 
 ChartStage hull_chart() {
   return {"hull", "a person seen from the side, as a billboard and as a visual hull",

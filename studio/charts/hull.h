@@ -8,4 +8,8 @@ namespace studio {
 
 ChartStage hull_chart();
 
+// How far off the outline of a made walker's billboard is, in metres on the person, against the
+// angle of the view from its camera's, beside what is stated (billboard_error_m).
+Stressor billboard_view_stressor(bool quick, Console& console);
+
 }  // namespace studio

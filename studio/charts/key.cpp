@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "compositing/key_trial.h"
+#include "studio/charts/hull.h"
 #include "studio/machine.h"
 
 namespace studio {
@@ -17,6 +18,7 @@ namespace {
 
 using compositing::KeyScore;
 using compositing::KeySettings;
+using compositing::KeyWay;
 using compositing::MadeClip;
 using compositing::MadeScene;
 using compositing::SceneTrial;
@@ -25,7 +27,7 @@ constexpr std::uint32_t seed = 1;  // none that anything was tuned on
 
 struct Setting {
   std::string name, label;
-  KeySettings settings;
+  KeyWay way;
   bool by_default = false;
 };
 
@@ -33,21 +35,26 @@ std::vector<Setting> settings() {
   std::vector<Setting> all{{"table", "default", {}, true}};
   KeySettings s;
   s.smoothing = 0;
-  all.push_back({"table", "no smoothing", s});
+  all.push_back({"table", "no smoothing", {s}});
   s.follows_light = false;
-  all.push_back({"table", "plate as taken", s});
+  all.push_back({"table", "plate as taken", {s}});
+  all.push_back({"table", "plate of the footage", {.from_footage = true}});
+  all.push_back({"by texels", "each pixel once", {.by_texel = true}});
   s = {};
   s.effort = compositing::KeyEffort::quick;
-  all.push_back({"table, quick", "quick", s});
+  all.push_back({"table, quick", "quick", {s}});
   s.smoothing = 0;
-  all.push_back({"table, quick", "no smoothing", s});
+  all.push_back({"table, quick", "no smoothing", {s}});
   s = {};
   s.learned = false;
-  all.push_back({"plain ratio", "all else", s});
+  all.push_back({"plain ratio", "all else", {s}});
   s.smoothing = 0;
-  all.push_back({"plain ratio", "no smoothing", s});
+  all.push_back({"plain ratio", "no smoothing", {s}});
   s.follows_light = false;
-  all.push_back({"plain ratio", "plate as taken", s});
+  all.push_back({"plain ratio", "plate as taken", {s}});
+  s = {};
+  s.method = compositing::KeyMethod::difference;
+  all.push_back({"difference", "from any background", {s}});
   return all;
 }
 
@@ -101,12 +108,12 @@ class KeyChart {
   }
 
   std::vector<SceneTrial> judge(const std::vector<MadeScene>& scenes,
-                                const KeySettings& settings,
+                                const KeyWay& way,
                                 bool peers = true) const {
     compositing::TrialSize trial_size = size();
     if (!peers) trial_size.peer_step = trial_size.frames;
     const std::array<std::uint32_t, 1> seeds{seed};
-    return compositing::judge_scenes(scenes, seeds, settings, trial_size);
+    return compositing::judge_scenes(scenes, seeds, way, trial_size);
   }
 
   void add(Chart& chart, ChartPoint point, const KeyScore& score) const {
@@ -130,24 +137,39 @@ class KeyChart {
                                frame.seen.codes[i + 2], std::uint8_t{255}});
     }
     const compositing::CodedFrame coded{height_, width_, rgba, capture::Transfer::srgb};
+    const capture::Image light = compositing::light_of(frame.seen);
+    const auto texture = compositing::make_keyed_texture(light);
     const auto all = settings();
     std::vector<SceneTrial> trials;
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Setting& setting = all[i];
       console_.progress(0.6 * static_cast<double>(i) / static_cast<double>(all.size()),
                         setting.name + ", " + setting.label);
-      trials = judge(scenes_, setting.settings, i + 1 == all.size());
-      compositing::Keyer keyer(compositing::average_plate(shots), setting.settings);
+      const KeySettings& s = setting.way.settings;
+      trials = judge(scenes_, setting.way, i + 1 == all.size());
+      compositing::Keyer keyer(compositing::average_plate(shots), s);
       compositing::KeyedFrame keyed;
       ChartPoint point;
       point.method = setting.name;
       point.label = setting.label;
       point.by_default = setting.by_default;
-      point.settings = {{"learned", setting.settings.learned},
-                        {"follows_light", setting.settings.follows_light},
-                        {"smoothing", double{setting.settings.smoothing}},
-                        {"quick", setting.settings.effort == compositing::KeyEffort::quick}};
-      point.time_ms = least_ms(quick_ ? 2 : 9, [&] { keyer.key(coded, keyed); });
+      point.settings = {
+          {"method",
+           std::string(s.method == compositing::KeyMethod::screen ? "screen" : "difference")},
+          {"by_texel", setting.way.by_texel},
+          {"from_footage", setting.way.from_footage},
+          {"learned", s.learned},
+          {"follows_light", s.follows_light},
+          {"smoothing", double{s.smoothing}},
+          {"quick", s.effort == compositing::KeyEffort::quick}};
+      point.time_ms = least_ms(quick_ ? 2 : 9, [&] {
+        if (setting.way.by_texel) {
+          keyer.follow(light);
+          compositing::key_by_texels(keyer, texture);
+        } else {
+          keyer.key(coded, keyed);
+        }
+      });
       add(chart, std::move(point), compositing::mean_over(trials, &SceneTrial::ours));
     }
     const auto key = compositing::pick_key_colour(frame);
@@ -173,14 +195,14 @@ class KeyChart {
                     std::vector<double> values,
                     const std::function<void(MadeScene&, float)>& stress) {
     if (quick_) values.resize(2);
-    console_.progress(0.6 + 0.1 * static_cast<double>(chart.stressors.size()), name);
+    console_.progress(0.6 + 0.05 * static_cast<double>(chart.stressors.size()), name);
     std::vector<MadeScene> scenes;
     for (const double value : values) {
       MadeScene scene = compositing::made_scene("plain");
       stress(scene, static_cast<float>(value));
       scenes.push_back(scene);
     }
-    const auto trials = judge(scenes, {});
+    const auto trials = judge(scenes, KeyWay{});
     Stressor stressor{name, unit, false, {}};
     for (std::size_t i = 0; i < values.size(); ++i) {
       const float confidence = trials[i].confidence;
@@ -203,9 +225,22 @@ class KeyChart {
     add_stressor(chart, "light of the screen (confidence)", "of display white",
                  {.1, .3, 1, 2, 3, 4}, [](MadeScene& scene, float v) { scene.light = v; });
     add_stressor(chart, "plate too bright, and shifted by 4 px (confidence)", "of its light",
-                 {0, .1, .2, .4, .8, 1.2}, [](MadeScene& scene, float v) { scene.stale = v; });
+                 {0, .1, .2, .4, .8, 1.2}, [](MadeScene& scene, float v) {
+                   scene.stale = v;
+                   scene.shift_px = v > 0 ? 4 : 0;
+                 });
+    // Of a screen that tells where it is.
+    add_stressor(chart, "plate shifted, of a screen with folds (confidence)", "px",
+                 {0, 1, 2, 3, 4, 6, 8}, [](MadeScene& scene, float v) {
+                   scene.shift_px = static_cast<int>(v);
+                   scene.uneven = 0.5F;
+                   scene.wrinkles = 0.4F;
+                 });
+    add_stressor(chart, "flicker of the lamps (confidence)", "of their light",
+                 {0, .05, .1, .2, .4, .8}, [](MadeScene& scene, float v) { scene.flicker = v; });
     add_stressor(chart, "noise (confidence)", "x1000 variance per light", {.1, .5, 1, 2, 4, 8},
                  [](MadeScene& scene, float v) { scene.noise_gain = 1e-3F * v; });
+    chart.stressors.push_back(billboard_view_stressor(quick_, console_));
   }
 
   bool quick_;

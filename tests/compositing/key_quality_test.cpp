@@ -46,7 +46,7 @@ TEST(KeyQuality, HoldsForQuickKeysToo) {
   settings.effort = KeyEffort::quick;
   const TrialSize size{270, 480, PLATELIGHT_FULL_TESTS ? MadeClip::frames : 8, MadeClip::frames};
   const auto trials =
-      judge_scenes(scenes, {judged_seeds, PLATELIGHT_FULL_TESTS ? 3U : 1U}, settings, size);
+      judge_scenes(scenes, {judged_seeds, PLATELIGHT_FULL_TESTS ? 3U : 1U}, {settings}, size);
   const KeyScore ours = mean_over(trials, &SceneTrial::ours);
   EXPECT_LE(ours.error.composite, 0.55);
   EXPECT_LE(ours.error.edge, 1.3);

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <span>
 
+#include "studio/charts/hull.h"
 #include "tests/studio/quick_chart.h"
 
 namespace studio::key_chart_test {
@@ -24,11 +26,30 @@ TEST(KeyChart, HasADefaultThatErrsLessThanEachOtherToolAndSaysWhenItIsUnsure) {
     EXPECT_LT(ours->error, p.error) << p.method;
   }
   EXPECT_EQ(peers, 3);
-  ASSERT_EQ(chart.stressors.size(), 4U);
-  for (const Stressor& stressor : chart.stressors) {
+  for (const auto& [method, most] : {std::pair("by texels", 2.0), {"difference", 6.0}}) {
+    const auto point = std::ranges::find(chart.points, method, &ChartPoint::method);
+    ASSERT_NE(point, chart.points.end()) << method;
+    EXPECT_LT(point->error, most * ours->error) << method;
+  }
+  ASSERT_EQ(chart.stressors.size(), 7U);
+  for (const Stressor& stressor : std::span(chart.stressors).first(6)) {
     for (const StressorSample& sample : stressor.samples) {
       EXPECT_TRUE(sample.status == "ok" || sample.status == "unsure") << sample.status;
     }
+  }
+}
+
+// From its own camera's place a billboard is the picture; from aside its outline is off as stated.
+TEST(KeyChart, HasViewsOfABillboardThatErrAsIsStated) {
+  Console console(true, "");
+  const Stressor views = billboard_view_stressor(true, console);
+  ASSERT_GE(views.samples.size(), 2U);
+  EXPECT_EQ(views.samples[0].value, 0);
+  EXPECT_LT(views.samples[0].error, 0.005);
+  for (const StressorSample& sample : views.samples) {
+    if (sample.status != "ok") continue;
+    ASSERT_TRUE(sample.reported_error);
+    EXPECT_LT(sample.error, *sample.reported_error + 0.02) << sample.value;
   }
 }
 
