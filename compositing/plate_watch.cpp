@@ -18,6 +18,7 @@ namespace {
 constexpr int regions_across = 8, regions_down = 6;  // the best patch of each
 constexpr int stride = 6;                            // of places that are tried, in cells
 constexpr int cells_afar = 8;                        // along a coarse one, of those far away
+constexpr int beside = 4;                            // cells: as far as patches surely find
 constexpr float most_sigma = 0.1F;                   // of a patch that is worth following, in cells
 constexpr float own_error = 0.004F;                  // of light: what is neither noise nor shift
 constexpr int fewest = 4;                            // patches that must agree
@@ -292,14 +293,24 @@ PlateShift PlateWatch::look_afar(const Rows& frame) {
   }
   std::array<CoarseShift::Shift, 6> shifts;
   const std::size_t count = afar_->find(seen_afar_, shifts);
+  const auto look_about = [&](About about) {
+    const PlateShift shift = follow(frame, about);
+    if (!shift.known || shift.agree <= best.agree) return;
+    best = shift, about_ = about;
+  };
   for (const CoarseShift::Shift& coarse : std::span(shifts).first(count)) {
     const auto cells = [](float at) { return static_cast<int>(std::lround(at * cells_afar)); };
-    const About about{cells(coarse.right), cells(coarse.down)};
-    const PlateShift shift = follow(frame, about);
-    if (!shift.known || shift.agree <= best.agree) continue;
-    best = shift, about_ = about;
+    look_about({cells(coarse.right), cells(coarse.down)});
   }
-  return best;
+  if (best.known) return best;
+  // What is within one coarse cell shows as none, and may be too far from where it was. What is
+  // nearer would have been found there.
+  for (int down = -beside; down <= beside; down += beside) {
+    for (int right = -beside; right <= beside; right += beside) look_about({right, down});
+  }
+  if (best.size_px() > farthest / 2 * static_cast<float>(pixels_)) return best;
+  about_ = {};
+  return {};
 }
 
 // Where it was seen last, where it was at first, and then anywhere.

@@ -123,6 +123,24 @@ TEST(PlateWatch, MeasuresPushesOfUpToAFifthOfThePicture) {
   }
 }
 
+// As before a screen with folds, whose coarse picture tells little.
+TEST(PlateWatch, MeasuresPushesOfAnySizeBeforeAScreenWithFolds) {
+  for (const int push : {1, 4, 6, 7, 8, 9, 10, 12, 16}) {
+    MadeScene scene = made_scene("plain");
+    scene.shift_px = push;
+    scene.uneven = 0.5F;
+    scene.wrinkles = 0.4F;
+    const MadeClip clip(scene, 1, height, width);
+    std::vector<Image> shots;
+    for (int i = 0; i < 4; ++i) shots.push_back(light_of(clip.plate_shot(i)));
+    PlateWatch watch(average_plate(shots));
+    const PlateShift shift = look(watch, light_of(clip.frame(3).seen));
+    ASSERT_TRUE(shift.known) << push;
+    EXPECT_NEAR(shift.right_px, push, 0.5);
+    EXPECT_NEAR(shift.down_px, 0, 0.5);
+  }
+}
+
 TEST(PlateWatch, SaysThatItCannotTellBeforeABareScreenAndBehindACrowd) {
   const MadeClip even(made_scene("plain"), 5, height, width);
   std::vector<Image> shots;
