@@ -154,7 +154,7 @@ class KeyChart {
       point.label = setting.label;
       point.by_default = setting.by_default;
       point.settings = {
-          {"method",
+          {"by",
            std::string(s.method == compositing::KeyMethod::screen ? "screen" : "difference")},
           {"by_texel", setting.way.by_texel},
           {"from_footage", setting.way.from_footage},
