@@ -43,7 +43,7 @@ CleanPlate plate_of(const MadeClip& clip, const KeyWay& way, int frames) {
 KeyReport key(Keyer& keyer, const Image& frame, bool by_texel, Image& keyed) {
   if (by_texel) {
     const KeyReport report = keyer.follow(frame);
-    keyed = key_by_texels(keyer, make_keyed_texture(frame));
+    key_by_texels(keyer, make_keyed_texture(frame), keyed);
     return report;
   }
   capture::HalfImage half;
@@ -54,12 +54,16 @@ KeyReport key(Keyer& keyer, const Image& frame, bool by_texel, Image& keyed) {
 
 }  // namespace
 
-capture::Image key_by_texels(Keyer& keyer, std::shared_ptr<const KeyedTexture> texture) {
+void key_by_texels(Keyer& keyer,
+                   std::shared_ptr<const KeyedTexture> texture,
+                   capture::Image& keyed) {
   const int height = texture->height(), width = texture->width();
   const TexelKeyedPicture picture(std::move(texture), keyer.shared_lit(), keyer.shared_filtered(),
                                   keyer.dials());
   const float pixel = 1 / std::sqrt(static_cast<float>(width) * static_cast<float>(height));
-  Image keyed = capture::make_image(height, width, 4);
+  if (keyed.height != height || keyed.width != width || keyed.channels != 4) {
+    keyed = capture::make_image(height, width, 4);
+  }
   std::vector<render::PicturePlace> places(static_cast<std::size_t>(width));
   std::vector<std::array<float, 4>> row(places.size());
   for (int y = 0; y < height; ++y) {
@@ -70,7 +74,6 @@ capture::Image key_by_texels(Keyer& keyer, std::shared_ptr<const KeyedTexture> t
     picture.look_up_all(places, row);
     std::memcpy(&keyed.at(y, 0, 0), row.data(), row.size() * sizeof row[0]);
   }
-  return keyed;
 }
 
 KeyScore mean_of(std::span<const KeyScore> scores) {

@@ -62,8 +62,11 @@ std::vector<SceneTrial> judge_scenes(std::span<const MadeScene> scenes,
                                      const KeyWay& way,
                                      const TrialSize& size = {});
 
-// A frame whose every pixel is looked up in a picture that is keyed by texels: (height, width, 4).
-capture::Image key_by_texels(Keyer& keyer, std::shared_ptr<const KeyedTexture> texture);
+// A frame whose every pixel is looked up in a picture that is keyed by texels, to `keyed`: (height,
+// width, 4).
+void key_by_texels(Keyer& keyer,
+                   std::shared_ptr<const KeyedTexture> texture,
+                   capture::Image& keyed);
 
 // The mean of one method's scores.
 KeyScore mean_over(std::span<const SceneTrial> trials, KeyScore SceneTrial::*method);

@@ -139,6 +139,7 @@ class KeyChart {
     const compositing::CodedFrame coded{height_, width_, rgba, capture::Transfer::srgb};
     const capture::Image light = compositing::light_of(frame.seen);
     const auto texture = compositing::make_keyed_texture(light);
+    capture::Image by_texels;
     const auto all = settings();
     std::vector<SceneTrial> trials;
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -154,8 +155,7 @@ class KeyChart {
       point.label = setting.label;
       point.by_default = setting.by_default;
       point.settings = {
-          {"by",
-           std::string(s.method == compositing::KeyMethod::screen ? "screen" : "difference")},
+          {"by", std::string(s.method == compositing::KeyMethod::screen ? "screen" : "difference")},
           {"by_texel", setting.way.by_texel},
           {"from_footage", setting.way.from_footage},
           {"learned", s.learned},
@@ -165,7 +165,7 @@ class KeyChart {
       point.time_ms = least_ms(quick_ ? 2 : 9, [&] {
         if (setting.way.by_texel) {
           keyer.follow(light);
-          compositing::key_by_texels(keyer, texture);
+          compositing::key_by_texels(keyer, texture, by_texels);
         } else {
           keyer.key(coded, keyed);
         }
