@@ -300,13 +300,16 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
   const float cy = std::clamp(y, 0.0F, static_cast<float>(level.height - 1));
   const int x0 = std::min(static_cast<int>(cx), std::max(level.width - 2, 0));
   const int y0 = std::min(static_cast<int>(cy), std::max(level.height - 2, 0));
-  const int x1 = std::min(x0 + 1, level.width - 1), y1 = std::min(y0 + 1, level.height - 1);
   const float u = cx - static_cast<float>(x0), v = cy - static_cast<float>(y0);
-  const auto texel = [&](int row, int column) {
-    return Vec3f{level.at(row, column, 0), level.at(row, column, 1), level.at(row, column, 2)};
+  const float* const top = &level.pixels[level.index(y0, x0)];
+  const float* const low = level.height > 1 ? top + level.index(1, 0) : top;
+  const int right = level.width > 1 ? level.channels : 0;
+  const auto between = [&](const float* texel) {
+    const Vec3f here{texel[0], texel[1], texel[2]};
+    const Vec3f there{texel[right], texel[right + 1], texel[right + 2]};
+    return here * (1 - u) + there * u;
   };
-  return (texel(y0, x0) * (1 - u) + texel(y0, x1) * u) * (1 - v) +
-         (texel(y1, x0) * (1 - u) + texel(y1, x1) * u) * v;
+  return between(top) * (1 - v) + between(low) * v;
 }
 
 void CellTransport::clear() {
