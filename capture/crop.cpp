@@ -1,8 +1,11 @@
 // Parts of pictures.
 #include "capture/crop.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace capture {
 
@@ -19,6 +22,20 @@ Crop crop_within(const std::optional<std::array<int, 4>>& wanted, int width, int
                              " x " + std::to_string(height) + " pixels");
   }
   return {x, y, crop_width, crop_height};
+}
+
+void cut(Image& image, const Crop& crop) {
+  if (crop.width == image.width && crop.height == image.height) {
+    return;
+  }
+  Image part = make_image(crop.height, crop.width, image.channels);
+  for (int y = 0; y < crop.height; ++y) {
+    const auto from =
+        image.pixels.begin() + static_cast<std::ptrdiff_t>(image.index(crop.y + y, crop.x));
+    std::copy_n(from, crop.width * image.channels,
+                part.pixels.begin() + static_cast<std::ptrdiff_t>(part.index(y, 0)));
+  }
+  image = std::move(part);
 }
 
 }  // namespace capture

@@ -4,6 +4,8 @@
 #include <array>
 #include <optional>
 
+#include "capture/image.h"
+
 namespace capture {
 
 // Part of a picture, in its pixels.
@@ -17,5 +19,8 @@ struct Crop {
 // The part that x, y, width, height name, or all of it. Throws std::runtime_error, without a file
 // name, if it is not wholly inside a picture of that size.
 Crop crop_within(const std::optional<std::array<int, 4>>& wanted, int width, int height);
+
+// Leaves that part of a picture, which must have it.
+void cut(Image& image, const Crop& crop);
 
 }  // namespace capture

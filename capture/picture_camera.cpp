@@ -54,20 +54,6 @@ Image as_colour(Image image, bool alpha) {
   return colour;
 }
 
-void cut(Image& image, const Crop& crop) {
-  if (crop.width == image.width && crop.height == image.height) {
-    return;
-  }
-  Image part = make_image(crop.height, crop.width, image.channels);
-  for (int y = 0; y < crop.height; ++y) {
-    const auto from =
-        image.pixels.begin() + static_cast<std::ptrdiff_t>(image.index(crop.y + y, crop.x));
-    std::copy_n(from, crop.width * image.channels,
-                part.pixels.begin() + static_cast<std::ptrdiff_t>(part.index(y, 0)));
-  }
-  image = std::move(part);
-}
-
 // Reads any picture file as three channels of light, or four where alpha is asked for: OpenEXR and
 // Radiance pictures, by their endings (.exr, .hdr, .pic), are light already; other stills and
 // recorded pictures become it.

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "capture/crop.h"
 #include "capture/exr.h"
 #include "compositing/plate_footage.h"
 
@@ -40,7 +41,9 @@ compositing::PlateFootage spread_frames(capture::Camera& camera, int first, int 
   return footage;
 }
 
-compositing::CleanPlate read_plate(const std::string& path, const VideoSource& source) {
+compositing::CleanPlate read_plate(const std::string& path,
+                                   const VideoSource& source,
+                                   const ShownPart& shown) {
   if (path.ends_with(".exr")) {
     const std::string told = capture::read_exr_transfer(path), wanted = name_of_light(source);
     const auto words_for = [](const std::string& name) {
@@ -60,7 +63,7 @@ compositing::CleanPlate read_plate(const std::string& path, const VideoSource& s
                     "it as light (platelight key plate CAMERA --response {} -o plate.exr)",
                     path, source.uri, source.response));
   }
-  const capture::Image picture = read_picture(path, source.colour);
+  const capture::Image picture = read_picture(path, source.colour, shown);
   compositing::CleanPlate plate = compositing::average_plate(std::span(&picture, 1));
   if (!path.ends_with(".exr")) return plate;
   if (const auto noise = capture::read_exr_noise(path)) {
@@ -73,14 +76,24 @@ compositing::CleanPlate read_plate(const std::string& path, const VideoSource& s
 
 }  // namespace
 
-capture::Image read_picture(const std::string& path, capture::Transfer transfer) {
+ShownPart shown_part(const capture::CameraInfo& info, const VideoSource& source) {
+  return {info.whole_width, info.whole_height, source.crop};
+}
+
+capture::Image read_picture(const std::string& path,
+                            capture::Transfer transfer,
+                            const ShownPart& shown) {
   const std::string ending = std::filesystem::path(path).extension().string();
   capture::CameraOptions options;
   options.colour.transfer =
       ending == ".exr" || ending == ".hdr" ? capture::Transfer::linear : transfer;
   const auto frame = capture::open_camera("file:" + path, options)->next();
   if (!frame || !frame->image) throw std::runtime_error(path + " holds no picture");
-  return *frame->image;
+  capture::Image image = *frame->image;
+  if (shown.crop && image.width == shown.whole_width && image.height == shown.whole_height) {
+    capture::cut(image, capture::crop_within(shown.crop, image.width, image.height));
+  }
+  return image;
 }
 
 std::string needs_plate(const std::string& uri) {
@@ -97,8 +110,9 @@ std::string words_for_shift(float right_px, float down_px) {
 compositing::CleanPlate read_clean_plate(const std::string& path,
                                          const VideoSource& source,
                                          compositing::KeyMethod method,
-                                         std::array<int, 2> footage) {
-  if (!path.empty()) return read_plate(path, source);
+                                         std::array<int, 2> footage,
+                                         const ShownPart& shown) {
+  if (!path.empty()) return read_plate(path, source, shown);
   VideoSource whole = source;
   whole.first = footage[0];
   whole.loop = false;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 
 #include "capture/camera.h"
@@ -11,9 +12,18 @@
 
 namespace studio {
 
-// One picture as scene-linear light; EXR and HDR as they are, others by the transfer curve. Throws
-// std::runtime_error if there is none.
-capture::Image read_picture(const std::string& path, capture::Transfer transfer);
+// What a video shows of its source's picture: pictures that belong to it may be of either.
+struct ShownPart {
+  int whole_width = 0, whole_height = 0;   // of the source's picture
+  std::optional<std::array<int, 4>> crop;  // nothing = all of it
+};
+ShownPart shown_part(const capture::CameraInfo& info, const VideoSource& source);
+
+// One picture as scene-linear light; EXR and HDR as they are, others by the transfer curve. Of the
+// whole picture of a video only what this shows. Throws std::runtime_error if there is none.
+capture::Image read_picture(const std::string& path,
+                            capture::Transfer transfer,
+                            const ShownPart& shown = {});
 
 // What to do about a live source without a plate.
 std::string needs_plate(const std::string& uri);
@@ -29,6 +39,7 @@ compositing::CleanPlate read_clean_plate(
     const std::string& path,
     const VideoSource& source,
     compositing::KeyMethod method = compositing::KeyMethod::screen,
-    std::array<int, 2> footage = {0, 479});
+    std::array<int, 2> footage = {0, 479},
+    const ShownPart& shown = {});
 
 }  // namespace studio

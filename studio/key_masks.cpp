@@ -9,17 +9,13 @@
 
 #include <fmt/format.h>
 
-#include "studio/clean_plates.h"
-
 namespace studio {
 namespace {
 
-std::vector<std::uint8_t> read_mask(const char* kind,
-                                    const std::string& path,
-                                    int width,
-                                    int height) {
+std::vector<std::uint8_t> read_mask(
+    const char* kind, const std::string& path, int width, int height, const ShownPart& shown) {
   if (path.empty()) return {};
-  const capture::Image mask = read_picture(path, capture::Transfer::linear);
+  const capture::Image mask = read_picture(path, capture::Transfer::linear, shown);
   if (mask.width != width || mask.height != height) {
     throw std::invalid_argument(
         fmt::format("the {} mask {} is {}x{}, but the video is {}x{}: draw it in that size", kind,
@@ -42,9 +38,12 @@ std::vector<std::uint8_t> read_mask(const char* kind,
 
 }  // namespace
 
-compositing::KeyMasks read_key_masks(const KeyMaskFiles& files, int width, int height) {
-  return {read_mask("garbage", files.garbage, width, height),
-          read_mask("core", files.core, width, height)};
+compositing::KeyMasks read_key_masks(const KeyMaskFiles& files,
+                                     int width,
+                                     int height,
+                                     const ShownPart& shown) {
+  return {read_mask("garbage", files.garbage, width, height, shown),
+          read_mask("core", files.core, width, height, shown)};
 }
 
 }  // namespace studio

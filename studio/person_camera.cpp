@@ -75,7 +75,7 @@ compositing::Window window_about(const std::array<float, 4>& outline,
 }
 
 VideoSource video_of(const PersonCamera& s, const std::string& base_dir) {
-  return {s.source, base_dir, s.loop, s.first, s.colour, !s.key, s.response};
+  return {s.source, base_dir, s.loop, s.first, s.colour, !s.key, s.response, s.crop};
 }
 
 std::shared_ptr<TimedSource> open_source(const VideoSource& source,
@@ -145,14 +145,16 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
     if (s.key->plate.empty() && info.live) {
       throw std::invalid_argument(needs_plate(s.source));
     }
-    auto plate = read_clean_plate(s.key->plate, source, s.key->settings.method, s.key->footage);
+    const ShownPart shown = shown_part(info, source);
+    auto plate =
+        read_clean_plate(s.key->plate, source, s.key->settings.method, s.key->footage, shown);
     if (plate.light.width != info.width || plate.light.height != info.height) {
       throw std::invalid_argument(
           fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", s.key->plate,
                       plate.light.width, plate.light.height, s.source, info.width, info.height));
     }
     keyer_.emplace(std::move(plate), s.key->settings,
-                   read_key_masks(s.key->masks, info.width, info.height));
+                   read_key_masks(s.key->masks, info.width, info.height, shown));
     by_texel_ = s.key->by_texel && !options.needs_matte;
   } catch (const std::exception& error) {
     faults.add(s.key->place, error.what());

@@ -201,10 +201,11 @@ struct PersonCamera {
   bool loop = false;
   std::int64_t first = 0;  // frame of the video that it begins with
   capture::Transfer colour = capture::Transfer::rec1886;
-  std::string response;                 // .rsp file; "" = none
-  double offset_s = 0;                  // how much later than the plate its frames are stamped
-  std::optional<KeyChoice> key;         // nothing = the source has alpha, or shows all
-  std::optional<calibrate::Lens> lens;  // with its pose; further cameras always have both
+  std::optional<std::array<int, 4>> crop;  // x, y, width, height in source pixels
+  std::string response;                    // .rsp file; "" = none
+  double offset_s = 0;                     // how much later than the plate its frames are stamped
+  std::optional<KeyChoice> key;            // nothing = the source has alpha, or shows all
+  std::optional<calibrate::Lens> lens;     // with its pose; further cameras always have both
   calibrate::Pose cam_from_set;
   friend bool operator==(const PersonCamera&, const PersonCamera&) = default;
 };

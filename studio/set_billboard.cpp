@@ -81,6 +81,8 @@ void read_camera(Section& section, const SetContext& context, PersonCamera& came
     if (auto table = section.table("pose")) camera.cam_from_set = read_fixed_pose(*table);
     read_response_key(section, context.base, camera.response);
   }
+  read_rectangle(section, "crop", {0, 0}, camera.crop);
+  if (camera.lens && camera.crop) crop_lens(section, *camera.crop, *camera.lens);
   read_offset(section, context, of_rig, camera.offset_s);
   if (auto table = section.table("key")) camera.key = read_key(*table, context);
 }

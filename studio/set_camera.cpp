@@ -86,15 +86,7 @@ void fit_lens(Section& section, const SetContext& context, CameraSettings& camer
                                : section.has("lens")     ? "lens"
                                                          : "model";
   camera.lens_size = {camera.lens.width, camera.lens.height};
-  if (camera.crop) {
-    const auto [x, y, width, height] = *camera.crop;
-    if (x + width > camera.lens.width || y + height > camera.lens.height) {
-      section.fault("crop", fmt::format("reaches beyond the lens's picture of {}x{}",
-                                        camera.lens.width, camera.lens.height));
-      return;
-    }
-    camera.lens = calibrate::cropped(camera.lens, x, y, width, height);
-  }
+  if (camera.crop && !crop_lens(section, *camera.crop, camera.lens)) return;
   if (camera.lens.width == show.width && camera.lens.height == show.height) return;
   section.fault(key,
                 fmt::format("gives a picture of {}x{}, but the show is {}x{}: set camera.crop, or "
@@ -210,6 +202,17 @@ calibrate::Pose read_fixed_pose(Section table) {
   const calibrate::Pose pose = read_way(table);
   table.finish();
   return pose;
+}
+
+bool crop_lens(Section& section, const std::array<int, 4>& crop, calibrate::Lens& lens) {
+  const auto [x, y, width, height] = crop;
+  if (x + width > lens.width || y + height > lens.height) {
+    section.fault(
+        "crop", fmt::format("reaches beyond the lens's picture of {}x{}", lens.width, lens.height));
+    return false;
+  }
+  lens = calibrate::cropped(lens, x, y, width, height);
+  return true;
 }
 
 bool read_start(Section& section, const std::string& uri, std::int64_t& frame) {

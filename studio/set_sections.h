@@ -83,6 +83,9 @@ void read_rectangle(Section& section,
                     std::array<int, 2> picture,
                     std::optional<std::array<int, 4>>& rectangle);
 
+// The lens of a part of its picture. False if that is no part of it, and a fault was added.
+bool crop_lens(Section& section, const std::array<int, 4>& crop, calibrate::Lens& lens);
+
 RigContext read_rig_section(Section section, const std::filesystem::path& base);
 
 // The camera of the rig that `rig_camera` names, with faults for keys that it stands for. Nothing

@@ -31,6 +31,7 @@ std::unique_ptr<capture::Camera> open_video(const VideoSource& source) {
   options.base_dir = source.base_dir;
   options.alpha = source.alpha;
   options.response = source.response;
+  options.crop = source.crop;
   if (source.first > 0) options.frame = source.first;
   return capture::open_camera(source.uri, options);
 }
@@ -45,6 +46,7 @@ std::string words_for_held(const VideoSource& held,
     other += fmt::format(" with colour = \"{}\", not \"{}\"", capture::name_of(held.colour),
                          capture::name_of(asked.colour));
   }
+  if (held.crop != asked.crop) other += " with another crop";
   if (held.loop != asked.loop) other += " with another loop";
   if (held.first != asked.first) other += " with another frame";
   return fmt::format(

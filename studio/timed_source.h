@@ -1,6 +1,7 @@
 // A video that runs with the show: its newest picture at the show's time, and its last for ever.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -18,8 +19,9 @@ struct VideoSource {
   bool loop = false;
   std::int64_t first = 0;  // frame that it begins with
   capture::Transfer colour = capture::Transfer::rec1886;
-  bool alpha = false;      // as capture::CameraOptions
-  std::string response{};  // the same, in place of `colour`
+  bool alpha = false;                        // as capture::CameraOptions
+  std::string response{};                    // the same, in place of `colour`
+  std::optional<std::array<int, 4>> crop{};  // the same
   friend bool operator==(const VideoSource&, const VideoSource&) = default;
 };
 

@@ -8,6 +8,8 @@
 #include <span>
 
 #include "calibrate/lens.h"
+#include "capture/crop.h"
+#include "capture/png.h"
 #include "compositing/display.h"
 #include "studio/show.h"
 #include "tests/studio/made_show.h"
@@ -46,9 +48,12 @@ bool is_body(double aside, double up) {
 // again.
 class Walker final : public capture::Camera {
  public:
-  Walker(std::int64_t frames, std::int64_t pass) : frames_(frames), pass_(pass) {
-    info_.width = video_width;
-    info_.height = video_height;
+  Walker(std::int64_t frames, std::int64_t pass, const std::optional<std::array<int, 4>>& crop)
+      : crop_(capture::crop_within(crop, video_width, video_height)), frames_(frames), pass_(pass) {
+    info_.width = crop_.width;
+    info_.height = crop_.height;
+    info_.whole_width = video_width;
+    info_.whole_height = video_height;
     info_.rate = {25, 1};
     info_.frames = frames;
   }
@@ -84,6 +89,7 @@ class Walker final : public capture::Camera {
     frame.number = number_;
     frame.pass_first = number_ - number_ % pass_;
     frame.time = capture::time_of_frame(number_, info_.rate);
+    capture::cut(*image, crop_);
     frame.image = std::move(image);
     ++number_;
     return frame;
@@ -91,6 +97,7 @@ class Walker final : public capture::Camera {
 
  private:
   capture::CameraInfo info_;
+  capture::Crop crop_;
   std::int64_t frames_, pass_, number_ = 0;
 };
 
@@ -181,12 +188,13 @@ class PersonSetTest : public MadeShowTest {
   static void SetUpTestSuite() {
     MadeShowTest::SetUpTestSuite();
     // walker:FRAMES, or walker:FRAMES/THOSE OF A PASS
-    capture::register_camera("walker", [](std::string_view rest, const capture::CameraOptions&) {
+    capture::register_camera("walker", [](std::string_view rest,
+                                          const capture::CameraOptions& options) {
       const std::int64_t frames = std::stol(std::string(rest));
       const auto slash = rest.find('/');
       const bool loops = slash != std::string_view::npos;
       return std::make_unique<Walker>(
-          frames, loops ? std::stol(std::string(rest.substr(slash + 1))) : frames);
+          frames, loops ? std::stol(std::string(rest.substr(slash + 1))) : frames, options.crop);
     });
     capture::register_camera("pushed", [](std::string_view, const capture::CameraOptions&) {
       return std::make_unique<PushedCamera>();
@@ -300,6 +308,44 @@ TEST_F(PersonSetTest, GivesTheSameBitsWhateverTheTiming) {
 
 // Keyed before it is filtered, or after: where the person fills many pixels, the same. So it is
 // where its camera's pose is not known, and the billboard of what is keyed before is cut to it.
+// Its lens and its plate are those of the whole picture; masks may be.
+TEST_F(PersonSetTest, LooksTheSameInAPartOfItsVideo) {
+  const auto shown_with = [&](const std::string& key, const std::string& more) {
+    std::string section = walker;
+    section.replace(section.find("plate.exr\""), 10, "plate.exr\"" + key);
+    Show show(made_set("grey:4,25,0", section + more));
+    std::vector<capture::Image> pictures;
+    show.run([&](const ShownFrame& shown) {
+      const PersonStatus& person = shown.prepared.persons.at(0);
+      const calibrate::Vec3 feet = feet_at(static_cast<std::int64_t>(pictures.size()));
+      EXPECT_LT(calibrate::length(person.position - feet), 0.04);
+      pictures.push_back(capture::to_float(shown.result->rgba));
+    });
+    EXPECT_EQ(pictures.size(), 4U);
+    return pictures;
+  };
+  // White above the head, which is in the way of nobody.
+  std::vector<std::uint8_t> mask(std::size_t{video_width} * video_height * 3);
+  std::fill_n(mask.begin(), 3 * video_width * 20, std::uint8_t{255});
+  capture::write_png(dir_ / "mask.png", video_width, video_height, 3, mask);
+  const std::string masked = ", garbage = \"mask.png\"";
+  const auto whole = shown_with(masked, ""),
+             part = shown_with(masked, "crop = [120, 30, 200, 330]\n");
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    double difference = 0;
+    for (std::size_t i = 0; i < whole[n].pixels.size(); ++i) {
+      difference += std::abs(whole[n].pixels[i] - part[n].pixels[i]);
+    }
+    EXPECT_LT(difference / static_cast<double>(whole[n].pixels.size()), 1e-3) << n;
+  }
+  try {
+    made_set("grey:4,25,0", std::string(walker) + "crop = [300, 0, 200, 300]\n");
+    FAIL();
+  } catch (const SetError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("reaches beyond the lens's picture of 480x360"));
+  }
+}
+
 TEST_F(PersonSetTest, LooksTheSameKeyedByFramesAndByTexels) {
   for (const std::string camera : {"lens = ", "height = 2.4\n#"}) {
     SCOPED_TRACE(camera);
