@@ -77,6 +77,37 @@ TEST(LiveVideo, IsTheSameColdAndWarmAndTakesNoRays) {
   }
 }
 
+// All light a million times as strong for a frame, and back: nothing is left of it.
+TEST(LiveVideo, IsAsItWasAfterLightThatJumpsByAMillion) {
+  MadeRoom room(96, 72);
+  for (render::DirectionalLight& light : room.job.lights.lights) light.planned = light.irradiance;
+  render::KeptTransport kept;
+  const auto shown_at = [&](float gain) {
+    capture::Image frame = made_video(90, 160, 0);
+    for (float& value : frame.pixels) value *= gain;
+    room.show(frame);
+    for (std::size_t i = 0; i < room.job.lights.lights.size(); ++i) {
+      room.job.lights.lights[i].irradiance = room.job.lights.lights[i].planned * gain;
+    }
+    FrameResult cold = render_room(room), warm = render_room(room, &kept);
+    EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << gain;
+    for (const capture::Half half : warm.rgba.pixels) {
+      EXPECT_TRUE(std::isfinite(float_from_half(half))) << gain;
+    }
+    return warm;
+  };
+  const FrameResult before = shown_at(1), jumped = shown_at(1e6F), after = shown_at(1);
+  EXPECT_GT(jumped.statistics.clamped_values, 0U);
+  EXPECT_EQ(after.rgba.pixels, before.rgba.pixels);
+  EXPECT_EQ(jumped.statistics.primary_rays + after.statistics.primary_rays, 0U);
+  // Brighter in proportion where halves hold it, and nowhere by more.
+  for (std::size_t i = 0; i < before.rgba.pixels.size(); ++i) {
+    if (i % 4 == 3) continue;
+    const float was = float_from_half(before.rgba.pixels[i]);
+    EXPECT_LE(float_from_half(jumped.rgba.pixels[i]), 1e6F * (was + 1e-3F)) << i;
+  }
+}
+
 TEST(LiveVideo, DoesNotDependOnTilesOrThreads) {
   MadeRoom room(96, 72);
   room.job.effort.tile_size = 96;
