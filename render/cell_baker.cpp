@@ -102,7 +102,7 @@ bool CellBaker::find(int stage, bool past_pictures) {
   grey_.fill({});
   grey_of_further_.fill({});
   painted_diffuse_.fill({});
-  for (PaintedOfPixel& pixel : painted_of_pixel_) pixel.count = pixel.next = 0;
+  painted_count_.fill(0), painted_turn_.fill(0);
   lights_.clear();
   lamps_.clear();
   bent_.clear();
@@ -143,7 +143,7 @@ bool CellBaker::find(int stage, bool past_pictures) {
 void CellBaker::clear_answer(ShadePoint& p) {
   p.radiance = p.diffuse = p.light_normal = p.plate_share = p.environment_share = {};
   p.catches_shadow = p.catches_lamps = false;
-  p.video = p.paint = {};
+  p.video.index = p.paint.index = -1;
   p.painted = not_painted;
 }
 

@@ -157,10 +157,7 @@ class CellBaker final : public RaySink {
     std::uint16_t slot, video;
     float weight;  // of its points together
   };
-  struct PaintedOfPixel {
-    std::size_t count = 0, next = 0;
-    std::array<PaintedSlot, CellTransport::most_painted_of_pixel> slots;
-  };
+  using PaintedOfPixel = std::array<PaintedSlot, CellTransport::most_painted_of_pixel>;
 
   // Of points: the irradiance that is planned.
   struct Light {
@@ -500,6 +497,7 @@ class CellBaker final : public RaySink {
   std::array<Vec3f, cell_pixels> grey_, grey_of_further_;
   std::array<Vec3f, cell_pixels> painted_diffuse_;  // of centres, planned_diffuse() times share
   std::array<PaintedOfPixel, cell_pixels> painted_of_pixel_;
+  std::array<std::uint8_t, cell_pixels> painted_count_, painted_turn_;  // of each pixel's
   std::array<float, CellTransport::most_painted> painted_weights_;
   LookUp looked_up_{};                   // last, in this cell
   const ShadePoint* pushing_ = nullptr;  // who pushed last, and how many rays

@@ -94,8 +94,8 @@ void CellBaker::pack_live_places() {
   t.bent.assign(bent.begin(), bent.end());
   const auto videos = video_.join();
   t.video.assign(videos.begin(), videos.end());
-  for (const PaintedOfPixel& pixel : painted_of_pixel_) {
-    for (const PaintedSlot& slot : std::span(pixel.slots).first(pixel.count)) {
+  for (std::size_t k = 0; k < cell_pixels; ++k) {
+    for (const PaintedSlot& slot : std::span(painted_of_pixel_[k]).first(painted_count_[k])) {
       painted_weights_[slot.number] = slot.weight;
     }
   }

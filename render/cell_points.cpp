@@ -63,7 +63,9 @@ void CellBaker::add_tested(std::span<const std::uint16_t> point_at) {
     }
   }
   settle_picture_lights(first_picture_light);
-  sort_tested(point_at);
+  if (std::ranges::any_of(point_at, [&](std::uint16_t i) { return catches(points_[i]); })) {
+    sort_tested(point_at);
+  }
   for (std::size_t k = 0; k < point_at.size(); ++k) {
     const ShadePoint& p = points_[point_at[k]];
     catcher_of_receiver_[k] = bent_of_receiver_[k] = no_catcher;

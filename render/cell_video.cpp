@@ -52,21 +52,22 @@ void CellBaker::paint(ShadePoint& p) {
 CellBaker::PaintedSlot* CellBaker::painted_slot(const ShadePoint& p) {
   constexpr std::size_t enough = 4;  // of the same kind
   PaintedOfPixel& own = painted_of_pixel_[p.pixel];
+  std::uint8_t& taken = painted_count_[p.pixel];
   const auto slot = static_cast<std::uint16_t>(target_of(p));
   const auto video = static_cast<std::uint16_t>(p.paint.index);
   std::array<PaintedSlot*, CellTransport::most_painted_of_pixel> alike;
   std::size_t count = 0;
-  for (PaintedSlot& other : std::span(own.slots).first(own.count)) {
+  for (PaintedSlot& other : std::span(own).first(taken)) {
     if (other.slot == slot && other.video == video) alike[count++] = &other;
   }
-  if (count < enough && own.count < own.slots.size()) {
+  if (count < enough && taken < own.size()) {
     std::vector<CellTransport::Painted>& painted = transport_->painted;
-    PaintedSlot& added = own.slots[own.count++];
+    PaintedSlot& added = own[taken++];
     added = {static_cast<std::uint16_t>(painted.size()), slot, video, 0};
     painted.push_back({0, 0, slot});
     return &added;
   }
-  return count > 0 ? alike[own.next++ % count] : nullptr;
+  return count > 0 ? alike[painted_turn_[p.pixel]++ % count] : nullptr;
 }
 
 void CellBaker::add_painted_centre(const ShadePoint& p) {
