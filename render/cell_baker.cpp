@@ -354,7 +354,7 @@ void CellBaker::collect(const ShadePoint& p) {
   }
   const Vec3f share = p.throughput * p.plate_share;
   if (p.kind == RayKind::bent && !p.catches_shadow && share != Vec3f{}) {
-    add_bent(p, share, lit);
+    add_bent(p, share, unshaded);
   }
   if (p.kind != RayKind::camera) return;
   if (!p.catches_shadow) {

@@ -66,7 +66,7 @@ class CellBaker final : public RaySink {
   static constexpr int ring_size = MetCentres::side;
   static constexpr int around = 4 * (ring_size - 1);  // pixels around a cell
   static constexpr std::uint16_t nowhere = 0xFFFF;    // no receiver
-  static constexpr std::uint32_t no_catcher = ~0U, lit = ~0U;
+  static constexpr std::uint32_t no_catcher = ~0U, unshaded = ~0U;
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;

@@ -23,7 +23,8 @@ void CellBaker::leave_bent(
   Vec3f sees_environment = p.environment_share;
   if (p.plate_share != Vec3f{}) {
     const float width_rad = std::sqrt(length(spread.a) * length(spread.b));
-    if (!add_plate(slot, target, direction, width_rad, direction, weight * p.plate_share, lit)) {
+    if (!add_plate(slot, target, direction, width_rad, direction, weight * p.plate_share,
+                   unshaded)) {
       sees_environment += p.plate_share;
     }
   }
@@ -67,7 +68,7 @@ bool CellBaker::add_plate(std::size_t slot,
       weight, static_cast<float>((q->x + 0.5) * shrunk - 0.5),
       static_cast<float>((q->y + 0.5) * shrunk - 0.5), static_cast<std::uint16_t>(target),
       static_cast<std::uint16_t>(frame_->first_plate_level + static_cast<std::size_t>(level))};
-  if (shadow_point == lit) {
+  if (shadow_point == unshaded) {
     bent_.add(term);
   } else {
     transport_->bent_shaded.push_back({term, shadow_point});

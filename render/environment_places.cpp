@@ -57,24 +57,14 @@ std::span<PlaceTerm> EnvironmentPlaces::join_wider(const FurtherSamples& samples
 
 // Wider ones only if it is known of how many samples a slot is.
 void EnvironmentPlaces::join(const FurtherSamples* samples) {
-  sort_by_slot(places_);
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < places_.size();) {
-    of_slot_.clear();
-    const std::uint16_t slot = places_[i].slot;
-    for (; i < places_.size() && places_[i].slot == slot; ++i) {
-      of_slot_.push_back({texels_of(places_[i]), places_[i]});
-    }
+  change_slots(places_, of_slot_, [&](std::uint16_t slot) {
     join_places(of_slot_);
     if (of_slot_.size() > most_places_of_slot && halve_faint()) join_places(of_slot_);
-    if (samples) {
-      const bool of_further = slot >= cell_pixels && slot < slots;
-      const int count = of_further ? samples->count(slot - cell_pixels) : 1;
-      join_wider_of_slot(static_cast<float>(count));
-    }
-    for (const KeyedPlace& place : of_slot_) places_[kept++] = place.term;
-  }
-  places_.resize(kept);
+    if (!samples) return;
+    const bool of_further = slot >= cell_pixels && slot < slots;
+    const int count = of_further ? samples->count(slot - cell_pixels) : 1;
+    join_wider_of_slot(static_cast<float>(count));
+  });
 }
 
 // The same place in texels twice as wide, if there are any. Only those of some weight are joined.

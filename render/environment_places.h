@@ -11,7 +11,6 @@
 #include "render/environment_terms.h"
 #include "render/further_samples.h"
 #include "render/place_terms.h"
-#include "render/slot_order.h"
 
 namespace render {
 

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/slot_order.h"
-
 namespace render {
 
 using calibrate::Vec3f;
@@ -57,18 +55,7 @@ void PlaceTerms::add(const PlaceTerm& place) {
 }
 
 std::span<const PlaceTerm> PlaceTerms::join() {
-  sort_by_slot(terms_);
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < terms_.size();) {
-    of_slot_.clear();
-    const std::uint16_t slot = terms_[i].slot;
-    for (; i < terms_.size() && terms_[i].slot == slot; ++i) {
-      of_slot_.push_back({texels_of(terms_[i]), terms_[i]});
-    }
-    join_places(of_slot_);
-    for (const KeyedPlace& place : of_slot_) terms_[kept++] = place.term;
-  }
-  terms_.resize(kept);
+  change_slots(terms_, of_slot_, [&](std::uint16_t) { join_places(of_slot_); });
   return terms_;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "render/place_term.h"
+#include "render/slot_order.h"
 
 namespace render {
 
@@ -25,6 +26,24 @@ void join_into(PlaceTerm& to, const PlaceTerm& from);
 // Those that lie between the same texels become one, but for what takes light away; all in the
 // order of their texels.
 void join_places(std::vector<KeyedPlace>& of_slot);
+
+// Brings terms into the order of their slots, and gives `change` those of each slot in turn, to be
+// made others, not more.
+template <class F>
+void change_slots(std::vector<PlaceTerm>& terms, std::vector<KeyedPlace>& of_slot, F&& change) {
+  sort_by_slot(terms);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < terms.size();) {
+    of_slot.clear();
+    const std::uint16_t slot = terms[i].slot;
+    for (; i < terms.size() && terms[i].slot == slot; ++i) {
+      of_slot.push_back({texels_of(terms[i]), terms[i]});
+    }
+    change(slot);
+    for (const KeyedPlace& place : of_slot) terms[kept++] = place.term;
+  }
+  terms.resize(kept);
+}
 
 // Those of live textures, collected while a cell is found. Many rays through glass, or of many
 // samples, look nearly the same way: so they are joined time and again. Once its memory has grown,

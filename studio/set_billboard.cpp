@@ -70,12 +70,7 @@ void read_camera(Section& section, const SetContext& context, PersonCamera& came
   read_colour(section, camera.colour);
   std::optional<RigCamera> of_rig;
   if (section.has("rig_camera")) {
-    of_rig = read_rig_camera(section, context);
-    if (of_rig) {
-      camera.lens = of_rig->lens;
-      camera.cam_from_set = of_rig->cam_from_set;
-      camera.response = of_rig->response;
-    }
+    of_rig = read_rig_camera(section, context, camera.lens, camera.cam_from_set, camera.response);
   } else {
     if (auto lens = read_lens_key(section, {0, 0}, context.base)) camera.lens = *lens;
     if (auto table = section.table("pose")) camera.cam_from_set = read_fixed_pose(*table);

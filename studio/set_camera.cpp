@@ -357,12 +357,7 @@ ProbeSettings read_probe_section(Section section, const SetContext& context) {
   read_probe_source(section, context.base, probe);
   std::optional<RigCamera> of_rig;
   if (section.has("rig_camera")) {
-    of_rig = read_rig_camera(section, context);
-    if (of_rig) {
-      probe.lens = of_rig->lens;
-      probe.probe_from_set = of_rig->cam_from_set;
-      probe.response = of_rig->response;
-    }
+    of_rig = read_rig_camera(section, context, probe.lens, probe.probe_from_set, probe.response);
   } else {
     read_own_probe(section, context, probe);
   }

@@ -92,4 +92,18 @@ std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& con
   return camera;
 }
 
+std::optional<RigCamera> read_rig_camera(Section& section,
+                                         const SetContext& context,
+                                         std::optional<calibrate::Lens>& lens,
+                                         calibrate::Pose& cam_from_set,
+                                         std::string& response) {
+  auto camera = read_rig_camera(section, context);
+  if (camera) {
+    lens = camera->lens;
+    cam_from_set = camera->cam_from_set;
+    response = camera->response;
+  }
+  return camera;
+}
+
 }  // namespace studio

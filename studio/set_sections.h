@@ -91,6 +91,12 @@ RigContext read_rig_section(Section section, const std::filesystem::path& base);
 // The camera of the rig that `rig_camera` names, with faults for keys that it stands for. Nothing
 // if there is no such key, or it is bad and a fault was added.
 std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& context);
+// The same, put where it belongs.
+std::optional<RigCamera> read_rig_camera(Section& section,
+                                         const SetContext& context,
+                                         std::optional<calibrate::Lens>& lens,
+                                         calibrate::Pose& cam_from_set,
+                                         std::string& response);
 
 // The pose of a camera that stays where it is: position, and look_at or rotation.
 calibrate::Pose read_fixed_pose(Section table);

@@ -89,8 +89,10 @@ void make_plate(const KeyOptions& options, Console& console) {
     throw std::invalid_argument(options.out + ": plates are OpenEXR files, name it *.exr");
   }
   const VideoSource source = source_of(options, options.what.back());
-  spare_files(files_of(source.uri, "the plate's own footage"), options.out);
-  spare_files(files_of(source.uri, "the plate's own footage"), console.figures_file());
+  std::vector<ReadFile> files = files_of(source.uri, "the plate's own footage");
+  if (!options.response.empty()) files.push_back({"the camera's response", options.response});
+  spare_files(files, options.out);
+  spare_files(files, console.figures_file());
   const auto camera = open_video(source);
   PlateMaker maker(options);
   const std::int64_t wanted = options.frames.value_or(plate_frames);

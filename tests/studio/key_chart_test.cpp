@@ -49,7 +49,11 @@ TEST(KeyChart, HasViewsOfABillboardThatErrAsIsStated) {
   for (const StressorSample& sample : views.samples) {
     if (sample.status != "ok") continue;
     ASSERT_TRUE(sample.reported_error);
-    EXPECT_LT(sample.error, *sample.reported_error + 0.02) << sample.value;
+    // What is stated is the mean of a step; this is one moment of it.
+    EXPECT_LE(sample.error, *sample.reported_error + 0.005) << sample.value;
+    if (sample.value > 0) {
+      EXPECT_GT(sample.error, 0.2 * *sample.reported_error) << sample.value;
+    }
   }
 }
 

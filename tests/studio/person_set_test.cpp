@@ -306,8 +306,6 @@ TEST_F(PersonSetTest, GivesTheSameBitsWhateverTheTiming) {
   EXPECT_EQ(pictures_of(0), pictures_of(20));
 }
 
-// Keyed before it is filtered, or after: where the person fills many pixels, the same. So it is
-// where its camera's pose is not known, and the billboard of what is keyed before is cut to it.
 // Its lens and its plate are those of the whole picture; masks may be.
 TEST_F(PersonSetTest, LooksTheSameInAPartOfItsVideo) {
   const auto shown_with = [&](const std::string& key, const std::string& more) {
@@ -346,6 +344,8 @@ TEST_F(PersonSetTest, LooksTheSameInAPartOfItsVideo) {
   }
 }
 
+// Keyed before it is filtered, or after: where the person fills many pixels, the same. So it is
+// where its camera's pose is not known, and the billboard of what is keyed before is cut to it.
 TEST_F(PersonSetTest, LooksTheSameKeyedByFramesAndByTexels) {
   for (const std::string camera : {"lens = ", "height = 2.4\n#"}) {
     SCOPED_TRACE(camera);
