@@ -21,6 +21,9 @@ namespace compositing {
 // catches light: it shows where no virtual object is seen before it or behind it, as far as the
 // next one that does occlude.
 //
+// One that mirrors show (Instance::mirrored) is in them what the plate shows at its place, times
+// (1 - lost/E) there; beyond the picture, the environment.
+//
 // Debevec, "Rendering Synthetic Objects into Real Scenes", SIGGRAPH 1998, section 5 (differential
 // rendering), as ratios instead of differences: the plate's own texture stays under the shadow.
 void register_shaders();

@@ -66,7 +66,8 @@ class CellBaker final : public RaySink {
   static constexpr int ring_size = MetCentres::side;
   static constexpr int around = 4 * (ring_size - 1);  // pixels around a cell
   static constexpr std::uint16_t nowhere = 0xFFFF;    // no receiver
-  static constexpr std::uint32_t no_catcher = ~0U, unshaded = ~0U;
+  static constexpr std::uint32_t no_catcher = ~0U, unshaded = ~0U,
+                                 first_mirrored = CellTransport::ShadedPlate::first_mirrored;
 
   struct QueuedRay {
     Vec3f origin, direction, throughput;
@@ -303,6 +304,8 @@ class CellBaker final : public RaySink {
   void mark_passed(std::size_t count);
   void bounce();
   void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
+  void meet_plate(const QueuedRay& ray, std::size_t stream_index);
+  bool meets_plate(const QueuedRay& ray, std::size_t stream_index) const;
 
   // cell_cut_rays.cpp
   void note_cut_ray(const ShadePoint& from, Vec3f throughput, LookUp& sees, bool rough);
@@ -312,6 +315,7 @@ class CellBaker final : public RaySink {
 
   // cell_mirrored.cpp
   void choose_first();
+  bool may_be_lit_as_centres(const ShadePoint& p) const;
   CellMask find_mirrored(int count, std::span<const std::uint8_t> glossy);
   bool mirrors_smoothly(std::size_t first) const;
   void receive_mirrored(int count, std::span<const std::uint8_t> glossy);
@@ -363,18 +367,19 @@ class CellBaker final : public RaySink {
   void leave_bent(
       std::size_t slot, std::size_t target, Vec3f direction, const Spread& spread, Vec3f weight);
   void add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point);
-  bool add_plate(std::size_t slot,
-                 std::size_t target,
-                 Vec3f from_camera,
-                 float width_rad,
-                 Vec3f planned_direction,
-                 Vec3f weight,
-                 std::uint32_t shadow_point);
+  float add_plate(std::size_t slot,
+                  std::size_t target,
+                  Vec3f from_camera,
+                  float width_rad,
+                  Vec3f planned_direction,
+                  Vec3f weight,
+                  std::uint32_t shadow_point);
 
   // cell_pack.cpp
   void pack();
   void pack_bases();
   void pack_places();
+  void join_shaded_places();
   void pack_live_places();
 
   // cell_lobes.cpp
@@ -480,6 +485,7 @@ class CellBaker final : public RaySink {
   LightTerms lights_, lamps_;
   EnvironmentPlaces places_;
   PlaceTerms bent_, video_, paint_;  // of slots; the last of painted ones
+  std::vector<KeyedPlace> shaded_of_point_;
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;

@@ -1,4 +1,4 @@
-// What rays that clear bodies bent see of the plate.
+// What rays that clear bodies bent, or mirrors sent on, see of the plate.
 #include <algorithm>
 #include <cmath>
 
@@ -23,10 +23,9 @@ void CellBaker::leave_bent(
   Vec3f sees_environment = p.environment_share;
   if (p.plate_share != Vec3f{}) {
     const float width_rad = std::sqrt(length(spread.a) * length(spread.b));
-    if (!add_plate(slot, target, direction, width_rad, direction, weight * p.plate_share,
-                   unshaded)) {
-      sees_environment += p.plate_share;
-    }
+    const float seen =
+        add_plate(slot, target, direction, width_rad, direction, weight * p.plate_share, unshaded);
+    sees_environment += p.plate_share * (1 - seen);
   }
   if (sees_environment != Vec3f{}) {
     add_environment(slot, target, direction, 0, spread, false, weight * sees_environment);
@@ -37,30 +36,31 @@ void CellBaker::leave_bent(
 void CellBaker::add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point) {
   const Vec3f from_camera = p.hit.position - frame_->camera;
   const float distance_m = length(from_camera);
-  const float width_rad = p.footprint_m / std::max(distance_m, 1e-6F);
-  if (!add_plate(p.slot, target_of(p), from_camera, width_rad, p.incoming, weight, shadow_point)) {
-    add_environment(p.slot, target_of(p), p.incoming, 0, {}, false, weight);
+  const float width_rad = std::hypot(p.footprint_m, p.blur_m) / std::max(distance_m, 1e-6F);
+  const float seen =
+      add_plate(p.slot, target_of(p), from_camera, width_rad, p.incoming, weight, shadow_point);
+  if (seen < 1) {
+    add_environment(p.slot, target_of(p), p.incoming, 0, {}, false, weight * (1 - seen));
   }
 }
 
-// False if the camera does not see that way.
-bool CellBaker::add_plate(std::size_t slot,
-                          std::size_t target,
-                          Vec3f from_camera,
-                          float width_rad,
-                          Vec3f planned_direction,
-                          Vec3f weight,
-                          std::uint32_t shadow_point) {
-  if (!frame_->lens) return false;
+// As far as the camera sees that way; how much of it that is.
+float CellBaker::add_plate(std::size_t slot,
+                           std::size_t target,
+                           Vec3f from_camera,
+                           float width_rad,
+                           Vec3f planned_direction,
+                           Vec3f weight,
+                           std::uint32_t shadow_point) {
+  if (!frame_->lens) return 0;
   const auto q =
       calibrate::project(*frame_->lens, calibrate::to_double(frame_->turn.to_camera(from_camera)));
-  const auto& whole = frame_->plate_levels.front();
-  if (!q || !(q->x >= -0.5 && q->x <= whole.width - 0.5) ||
-      !(q->y >= -0.5 && q->y <= whole.height - 0.5)) {
-    return false;
-  }
+  const auto& whole = frame_->plate_levels->all().front();
+  const float seen = q ? plate_share_at(whole, q->x, q->y) : 0;
+  if (!(seen > 0)) return 0;
+  weight = weight * seen;
   const float width_px = width_rad / frame_->pixel_angle;
-  const int last = static_cast<int>(frame_->plate_levels.size()) - 1;
+  const int last = static_cast<int>(frame_->plate_levels->all().size()) - 1;
   const int level =
       width_px > 1 ? std::min(static_cast<int>(std::lround(std::log2(width_px))), last) : 0;
   const double shrunk = 1.0 / (1 << level);
@@ -74,7 +74,7 @@ bool CellBaker::add_plate(std::size_t slot,
     transport_->bent_shaded.push_back({term, shadow_point});
   }
   samples_[slot].added += weight * planned_radiance(look_up(planned_direction, 0, {}, false));
-  return true;
+  return seen;
 }
 
 }  // namespace render

@@ -10,14 +10,28 @@
 namespace render {
 namespace {
 
-bool sees_stand_ins(RayKind kind) { return kind == RayKind::camera || kind == RayKind::bent; }
+// What rays of a kind see, that surfaces send on.
+unsigned mask_of(RayKind kind) {
+  switch (kind) {
+    case RayKind::camera:
+    case RayKind::bent:
+      return mask_virtual | mask_stand_in;
+    case RayKind::reflection:
+      return mask_virtual | mask_mirrored;
+    case RayKind::difference:  // the plate shows already what real surfaces mirror of each other
+    case RayKind::shadow:
+      return mask_virtual;
+  }
+  return mask_virtual;
+}
 
 }  // namespace
 
 // The space that the stream's rays passed, up to what they met.
 void CellBaker::mark_passed(std::size_t count) {
   const RayStream& s = stream_;
-  const unsigned sees_through = frame_->inputs.scene->has_standing_back() ? mask_stand_in : 0U;
+  const unsigned sees_through =
+      frame_->inputs.scene->has_standing_back() ? mask_stand_in | mask_mirrored : 0U;
   for (std::size_t i = 0; i < count; ++i) {
     // A real surface may let a ray see what is behind it.
     const float far_m = s.mask[i] & sees_through ? ray_far : s.far_m[i];
@@ -42,6 +56,26 @@ void CellBaker::meet_surroundings(const QueuedRay& ray, std::size_t i) {
   }
 }
 
+// What a ray that asks sees of the plate, in whatever shadow.
+void CellBaker::meet_plate(const QueuedRay& ray, std::size_t i) {
+  ShadePoint p{};
+  set_point(p, static_cast<int>(i), ray.pixel, ray.slot);
+  arrive_bounced(p, ray.steps, ray.spread, ray.roughness, ray.one_of_many, stream_.far_m[i]);
+  p.behind = ray.behind;
+  add_bent(p, ray.throughput, unshaded);
+}
+
+// Whether a mirrored ray meets a stand-in, and sees the plate there.
+bool CellBaker::meets_plate(const QueuedRay& ray, std::size_t i) const {
+  const Scene& scene = *frame_->inputs.scene;
+  if (!scene.has_mirrored() || ray.kind != RayKind::reflection ||
+      stream_.geom[i] == RTC_INVALID_GEOMETRY_ID) {
+    return false;
+  }
+  const auto met = scene.surface_of(stream_.geom[i], stream_.prim[i], stream_.inst[i]);
+  return scene.description().instances[met.instance].kind == ObjectKind::stand_in;
+}
+
 void CellBaker::bounce() {
   while (!queue_.empty()) {
     const std::size_t n = std::min<std::size_t>(queue_.size(), stream_rays);
@@ -56,7 +90,7 @@ void CellBaker::bounce() {
       stream_.ox[i] = q.origin.x, stream_.oy[i] = q.origin.y, stream_.oz[i] = q.origin.z;
       stream_.dx[i] = q.direction.x, stream_.dy[i] = q.direction.y, stream_.dz[i] = q.direction.z;
       stream_.near_m[i] = 0;
-      stream_.mask[i] = sees_stand_ins(q.kind) ? mask_virtual | mask_stand_in : mask_virtual;
+      stream_.mask[i] = mask_of(q.kind);
     }
     trace(static_cast<int>(n), false, RayKind::reflection, std::numeric_limits<float>::infinity());
     if (grid_) mark_passed(n);
@@ -67,8 +101,13 @@ void CellBaker::bounce() {
       QueuedRay& q = queue_[from + i];
       const bool hit = stream_.geom[i] != RTC_INVALID_GEOMETRY_ID;
       const std::size_t target = target_of(q);
+      const bool in_plate = meets_plate(q, i);
       if (hit && q.asks) {
-        meet_surroundings(q, i);
+        if (in_plate) {
+          meet_plate(q, i);
+        } else {
+          meet_surroundings(q, i);
+        }
         continue;
       }
       const auto see_straight_on = [&](std::size_t to, Vec3f weight) {
@@ -78,7 +117,7 @@ void CellBaker::bounce() {
           add_environment(q.slot, to, q.sees, q.roughness, q.spread, q.one_of_many, weight);
         }
       };
-      const OpenLobe lobe = q.by_lights ? open_lobes_.at(q.pixel) : OpenLobe{};
+      const OpenLobe lobe = q.by_lights && !in_plate ? open_lobes_.at(q.pixel) : OpenLobe{};
       const float left = 1 - lobe.by_lights();
       if (left < 1) see_straight_on(target, q.throughput * (1 - left));
       q.throughput = q.throughput * left;
@@ -116,7 +155,10 @@ void CellBaker::bounce() {
         is_first_[static_cast<std::size_t>(count - 1)] = q.first;
       }
       p.media = q.media;
-      p.kind = q.kind == RayKind::difference ? RayKind::reflection : q.kind;
+      // The plate shows as behind clear bodies.
+      p.kind = in_plate                        ? RayKind::bent
+               : q.kind == RayKind::difference ? RayKind::reflection
+                                               : q.kind;
       p.depth = q.depth;
       p.behind = behind;
       p.path = q.path;

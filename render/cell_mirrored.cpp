@@ -1,5 +1,6 @@
 // The light of what centres mirror, or see through something clear.
 #include <algorithm>
+#include <numbers>
 
 #include "render/cell_baker.h"
 
@@ -7,6 +8,7 @@ namespace render {
 namespace {
 
 constexpr float reach_of_neighbours = 1.5F;  // by their cones
+constexpr float grey_plate = 0.2F / std::numbers::pi_v<float>;
 
 Vec3f lesser(Vec3f a, Vec3f b) {
   return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)};
@@ -30,18 +32,25 @@ void CellBaker::choose_first() {
   std::partition(queue_.begin(), queue_.end(), [](const QueuedRay& ray) { return !ray.first; });
 }
 
-// Which pixels' centres mirror what may get its light as centres do: those of 4x4 pixels that see
-// one smooth surface there, which mirrors no light itself, nor catches shadows.
+// Dull surfaces, and the plate in shadows; but for caustics each has a point of its own.
+bool CellBaker::may_be_lit_as_centres(const ShadePoint& p) const {
+  if (p.catches_lamps) return false;
+  return p.catches_shadow ? p.kind == RayKind::bent && !frame_->caustics : p.diffuse != Vec3f{};
+}
+
+// Which pixels' centres mirror what may get its light as centres do: all that see the plate there,
+// for what their lights are would be kept one by one; and those of 4x4 pixels that see one smooth
+// surface, which mirrors no light itself.
 CellMask CellBaker::find_mirrored(int count, std::span<const std::uint8_t> glossy) {
   mirrored_at_.fill(nowhere);
   CellMask found{};
   bool any = false;
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const ShadePoint& p = points_[i];
-    const bool dull = p.diffuse != Vec3f{} && !glossy[i] && !p.catches_shadow && !p.catches_lamps;
-    if (!is_first_[i] || !dull) continue;
+    if (!is_first_[i] || glossy[i] || !may_be_lit_as_centres(p)) continue;
     mirrored_at_[p.pixel] = static_cast<std::uint16_t>(i);
     any = true;
+    if (p.catches_shadow) found[p.pixel / 64] |= std::uint64_t{1} << (p.pixel % 64);
   }
   for (std::size_t block = 0; any && block < 16; ++block) {
     const std::size_t first = block / 4 * 4 * cell_size + block % 4 * 4;
@@ -86,7 +95,12 @@ void CellBaker::receive_mirrored(int count, std::span<const std::uint8_t> glossy
     if (!has_own && !glossy[i] && share_mirrored(i)) points[n++] = static_cast<std::uint16_t>(i);
   }
   for (const std::uint16_t i : std::span(points).first(n)) shares_mirrored_[i] = 1;
-  if (n > 0 && !frame_->planned_table->lamps.empty()) receive_lamps(std::span(points).first(n));
+  const auto end = std::remove_if(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(n),
+                                  [&](std::uint16_t i) { return points_[i].catches_shadow; });
+  const auto lit = static_cast<std::size_t>(end - points.begin());
+  if (lit > 0 && !frame_->planned_table->lamps.empty()) {
+    receive_lamps(std::span(points).first(lit));
+  }
 }
 
 // Finds who sees which light, and notes it.
@@ -112,6 +126,7 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
   CellTransport::Mirrored& to = t.mirrored.emplace_back();
   to.nx = r.nx, to.ny = r.ny, to.nz = r.nz;
   to.slot.fill(0);
+  to.any_shadow = false;
   to.diffuse.r.fill(0), to.diffuse.g.fill(0), to.diffuse.b.fill(0);
   for (std::size_t k = 0; k < cell_pixels; ++k) {
     if (!in(mirrored, k)) continue;
@@ -120,6 +135,10 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
     light_of_point_[mirrored_at_[k]] = {open, r.light.arriving(k), {}};
     to.diffuse.put(k, p.throughput * p.diffuse);
     to.slot[k] = matte_target_of(p);
+    if (p.catches_shadow) {
+      to.any_shadow = true;
+      add_bent(p, p.throughput * p.plate_share, first_mirrored + static_cast<std::uint32_t>(k));
+    }
     const float reach_m = reach_of_neighbours * (length(p.steps.a) + length(p.steps.b));
     mirrored_hits_[k] = {p.hit.instance, p.hit.material, reach_m,
                          p.light_normal, p.hit.position, light_of_point_[mirrored_at_[k]]};
@@ -131,10 +150,7 @@ void CellBaker::light_mirrored(const CellMask& mirrored) {
 bool CellBaker::share_mirrored(std::size_t point) {
   const CellMask& mirrored = transport_->mirrored_receiving;
   const ShadePoint& p = points_[point];
-  if (p.depth == 0 || mirrored == CellMask{} || p.diffuse == Vec3f{} || p.catches_shadow ||
-      p.catches_lamps) {
-    return false;
-  }
+  if (p.depth == 0 || mirrored == CellMask{} || !may_be_lit_as_centres(p)) return false;
   const int px = static_cast<int>(p.pixel % cell_size), py = static_cast<int>(p.pixel / cell_size);
   std::size_t nearest = cell_pixels;
   float least = 0;
@@ -157,10 +173,13 @@ bool CellBaker::share_mirrored(std::size_t point) {
     }
   }
   if (nearest == cell_pixels || !(least < mirrored_hits_[nearest].reach_m)) return false;
-  if (largest(p.throughput * planned_diffuse(p) * (upper - lower)) > effort_.glint_contrast) {
-    return false;
-  }
+  const Vec3f answer = p.catches_shadow ? p.plate_share * grey_plate : planned_diffuse(p);
+  if (largest(p.throughput * answer * (upper - lower)) > effort_.glint_contrast) return false;
   light_of_point_[point] = mirrored_hits_[nearest].light;
+  if (p.catches_shadow) {
+    add_bent(p, p.throughput * p.plate_share, first_mirrored + static_cast<std::uint32_t>(nearest));
+    return true;
+  }
   transport_->shared.push_back({matte_target_of(p), static_cast<std::uint16_t>(nearest),
                                 CellTransport::SharedTerm::Of::mirrored_light,
                                 p.throughput * p.diffuse});

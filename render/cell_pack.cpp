@@ -87,11 +87,34 @@ void CellBaker::pack_places() {
   }
 }
 
+// Places of the plate that one slot sees in the shadow at one point become fewer, as bent_ makes
+// them.
+void CellBaker::join_shaded_places() {
+  std::vector<CellTransport::ShadedPlate>& terms = transport_->bent_shaded;
+  const auto key = [](const CellTransport::ShadedPlate& t) {
+    return std::uint64_t{t.term.slot} << 32 | t.point;
+  };
+  std::ranges::stable_sort(terms, {}, key);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < terms.size();) {
+    const std::uint64_t same = key(terms[i]);
+    const std::uint32_t point = terms[i].point;
+    shaded_of_point_.clear();
+    for (; i < terms.size() && key(terms[i]) == same; ++i) {
+      shaded_of_point_.push_back({texels_of(terms[i].term), terms[i].term});
+    }
+    if (shaded_of_point_.size() > 1) join_places(shaded_of_point_);
+    for (const KeyedPlace& place : shaded_of_point_) terms[kept++] = {place.term, point};
+  }
+  terms.resize(kept);
+}
+
 // Of the plate, and of live textures.
 void CellBaker::pack_live_places() {
   CellTransport& t = *transport_;
   const auto bent = bent_.join();
   t.bent.assign(bent.begin(), bent.end());
+  join_shaded_places();
   const auto videos = video_.join();
   t.video.assign(videos.begin(), videos.end());
   for (std::size_t k = 0; k < cell_pixels; ++k) {

@@ -41,7 +41,7 @@ bool CellBaker::hides_pictures(int index) const {
 // How far along one of the stream's rays pictures show: up to what hides them.
 float CellBaker::picture_end(int index, Vec3f from, Vec3f direction) const {
   const auto i = static_cast<std::size_t>(index);
-  const bool stands_in = (stream_.mask[i] & mask_stand_in) != 0 &&
+  const bool stands_in = (stream_.mask[i] & (mask_stand_in | mask_mirrored)) != 0 &&
                          stream_.geom[i] != RTC_INVALID_GEOMETRY_ID && !hides_pictures(index);
   if (!stands_in) return stream_.far_m[i];
   // Nothing virtual is behind it, or the ray had passed it.

@@ -52,6 +52,10 @@ void light_mirrored(const CellTransport& cell,
     if (!in(cell.mirrored_receiving, k)) continue;
     const Vec3f arriving = w.mirrored.arriving(k);
     w.mirrored_arriving.put(k, arriving);
+    if (m.any_shadow) {
+      const Vec3f open = w.mirrored.open(k);
+      w.mirrored_passing.put(k, passing(open, open - arriving));
+    }
     picture.added[m.slot[k]] += four_of(m.diffuse.at(k) * arriving);
   }
 }
@@ -148,11 +152,11 @@ Vec3f passed_of(Vec3f passed, float stands_for) {
   return stands_for == 1 ? passed : all - (all - passed) * stands_for;
 }
 
-Vec3f lost_of(const CellTransport& cell, const CellTransport::ShadowLight& s) {
+// What is lost of such a light; not of one of which all passes.
+Four lost_of(const CellTransport& cell, const CellTransport::ShadowLight& s) {
   using Light = CellTransport::ShadowLight;
-  if (s.tint == Light::passes) return {};
-  if (s.tint == Light::blocked) return {s.open, s.open, s.open};
-  return cell.shadow_tints[s.tint - std::size_t{Light::first_tint}] * s.open;
+  if (s.tint == Light::blocked) return four_of({s.open, s.open, s.open});
+  return four_of(cell.shadow_tints[s.tint - std::size_t{Light::first_tint}] * s.open);
 }
 
 // Shadows on points that are no centres.
@@ -166,20 +170,23 @@ void light_shadow_points(const CellTransport& cell,
   const bool dims = pictures && !pictures->shadowed_through.empty();
   std::size_t dimmed = 0;  // of the picture shadows, which are in order
   for (const CellTransport::ShadowPoint& point : cell.shadow_points) {
-    Vec3f open{}, lost{}, hidden{};
+    Four open_sum{}, lost_sum{}, hidden_sum{};
     for (std::uint32_t i = point.first; i < point.first + point.count; ++i) {
       const CellTransport::ShadowLight& s = cell.shadow_lights[i];
-      const Vec3f e = light.lights[s.light].irradiance;
-      const Vec3f gone = lost_of(cell, s);
-      open += e * s.open;
-      lost += e * gone;
+      const Four e = light.irradiances[s.light];
+      Four gone{};
+      open_sum += e * s.open;
+      if (s.tint != CellTransport::ShadowLight::passes) {
+        gone = lost_of(cell, s);
+        lost_sum += e * gone;
+      }
       if (dims && dimmed < cell.picture_shadows.size() && cell.picture_shadows[dimmed].slot == i) {
-        const Vec3f all{1, 1, 1};
-        hidden += e * (all * s.open - gone) * (all - pictures->shadowed_through[dimmed]) *
-                  cell.picture_shadows[dimmed].stands_for;
+        const Four through = four_of(pictures->shadowed_through[dimmed]);
+        hidden_sum += e * (s.open - gone) * (1 - through) * cell.picture_shadows[dimmed].stands_for;
         ++dimmed;
       }
     }
+    const Vec3f open = three_of(open_sum), lost = three_of(lost_sum), hidden = three_of(hidden_sum);
     // Not bounded: of several points some stand for all.
     const auto part = [](float gone, float all) { return all > 0 ? gone / all : 0.0F; };
     w.passing_at_points.push_back(passing(open, lost) - Vec3f{part(hidden.x, open.x),
@@ -220,6 +227,19 @@ void fill_blocks(const CellTransport::Blocks& blocks, CellPicture& picture) {
 void show_places(std::span<const PlaceTerm> places, const FrameLight& light, CellPicture& picture) {
   for (const PlaceTerm& p : places) {
     picture.added[p.slot] += four_of(p.weight * plate_at(*light.levels[p.level], p.x, p.y));
+  }
+}
+
+void show_shaded_places(const CellTransport& cell,
+                        const FrameLight& light,
+                        const RelightWorkspace& w,
+                        CellPicture& picture) {
+  constexpr std::uint32_t first_mirrored = CellTransport::ShadedPlate::first_mirrored;
+  for (const auto& [term, point] : cell.bent_shaded) {
+    const Vec3f passed = point < first_mirrored ? w.passing_at_points[point]
+                                                : w.mirrored_passing.at(point - first_mirrored);
+    picture.added[term.slot] +=
+        four_of(term.weight * passed * plate_at(*light.levels[term.level], term.x, term.y));
   }
 }
 
@@ -310,6 +330,13 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
     return here * (1 - u) + there * u;
   };
   return between(top) * (1 - v) + between(low) * v;
+}
+
+float plate_share_at(const capture::Image& plate, double x, double y) {
+  constexpr double faded = 1.0 / 16;  // of the shorter side
+  const double inside = std::min({x + 0.5, plate.width - 0.5 - x, y + 0.5, plate.height - 0.5 - y});
+  const double width = faded * std::min(plate.width, plate.height);
+  return static_cast<float>(std::clamp(inside / width, 0.0, 1.0));
 }
 
 void CellTransport::clear() {
@@ -423,10 +450,7 @@ void relight(const CellTransport& cell,
                                           added.subspan(slots + i * step).first<step>());
   }
   show_places(cell.bent, light, picture);
-  for (const auto& [term, point] : cell.bent_shaded) {
-    picture.added[term.slot] += four_of(term.weight * w.passing_at_points[point] *
-                                        plate_at(*light.levels[term.level], term.x, term.y));
-  }
+  show_shaded_places(cell, light, w, picture);
   show_places(cell.video, light, picture);
   show_painted(cell, light, picture);
   show_picture_rays(cell, pictures, picture);

@@ -56,6 +56,7 @@ struct CellTransport {
     alignas(64) std::array<float, cell_pixels> nx, ny, nz;
     ColourPlanes diffuse;  // radiance per irradiance, times its share
     std::array<std::uint16_t, cell_pixels> slot;
+    bool any_shadow = false;  // any is the plate, in shadows
   };
   // Centres that receive light: normals and answers; 0 elsewhere.
   struct Centres {
@@ -91,10 +92,12 @@ struct CellTransport {
     std::uint16_t lamp;
     Vec3f factor;
   };
-  // A term of the plate at a place that clear bodies show, less what its point loses of light.
+  // A term of the plate at a place that clear bodies or mirrors show, less what its point loses of
+  // light.
   struct ShadedPlate {
     PlaceTerm term;
-    std::uint32_t point;  // of shadow_points
+    std::uint32_t point;  // of shadow_points; or what a centre mirrors, first_mirrored + its pixel
+    static constexpr std::uint32_t first_mirrored = 1U << 31;
   };
   // The plate of a shadow point that clear bodies show is brighter by factor * intensity of a lamp,
   // of the light that is there.
@@ -270,6 +273,10 @@ inline Vec3f brightening(Vec3f open, Vec3f gathered) {
 
 // A picture's value at a place in its pixels, bilinear; the outermost go on beyond its edge.
 Vec3f plate_at(const capture::Image& level, float x, float y);
+// How much rays that see the plate elsewhere than behind their own pixel see of it at a place in
+// its pixels: nothing beyond its edge, where they see the environment, and less and less towards
+// it, so that no seam shows.
+float plate_share_at(const capture::Image& plate, double x, double y);
 
 // What live pictures do in a frame to a cell that was found without them.
 struct CellPictures {
@@ -298,7 +305,7 @@ struct RelightWorkspace {
   LightSums light, mirrored, soft;
   ColourPlanes lamps;
   // Irradiance, lamps' too; share that is seen of what is not lamps'.
-  ColourPlanes arriving, passing, mirrored_arriving;
+  ColourPlanes arriving, passing, mirrored_arriving, mirrored_passing;
   std::vector<Vec3f> caught;  // irradiance of lamps at catchers
   // At shadow points: irradiance, where nothing virtual is in the way; share of it that arrives.
   std::vector<Vec3f> open_at_points, passing_at_points;

@@ -123,14 +123,14 @@ DataKey light_key(const FrameContext& context, const DataKey& before) {
 }
 
 DataKey plate_levels_key(const FrameContext& context, const DataKey& before) {
-  if (context.plate_levels.empty()) return {};
+  if (!context.plate_levels) return {};
   constexpr int glanced = 4;  // of levels: some thousands of pixels
   Key key;
-  key.mix(
-      context.plate_levels[std::min<std::size_t>(glanced, context.plate_levels.size() - 1)].pixels);
+  const std::vector<capture::Image>& levels = context.plate_levels->all();
+  key.mix(levels[std::min<std::size_t>(glanced, levels.size() - 1)].pixels);
   const std::uint64_t glance = key.value();
   if (glance != before.glance) return {glance, glance};
-  key.mix(context.plate_levels.front().pixels);
+  key.mix(levels.front().pixels);
   return {glance, key.value()};
 }
 
@@ -199,30 +199,6 @@ void add_caustics(FrameContext& context, LightTable& planned) {
     lamp.intensity = context.job->lights.lights[light].irradiance;
     context.lamps.push_back(lamp);
   }
-}
-
-// The plate, and its halves until the shorter side is 1 pixel. Of odd sides the last row, or
-// column, is left out.
-std::vector<capture::Image> plate_levels_of(const capture::HalfImage& plate) {
-  std::vector<capture::Image> levels;
-  capture::Image& whole =
-      levels.emplace_back(capture::make_image(plate.height, plate.width, plate.channels));
-  std::ranges::transform(plate.pixels, whole.pixels.begin(), capture::float_from_half);
-  while (levels.back().width > 1 && levels.back().height > 1) {
-    const capture::Image& from = levels.back();
-    capture::Image to = capture::make_image(from.height / 2, from.width / 2, from.channels);
-    for (int y = 0; y < to.height; ++y) {
-      for (int x = 0; x < to.width; ++x) {
-        for (int c = 0; c < to.channels; ++c) {
-          to.at(y, x, c) =
-              0.25F * (from.at(2 * y, 2 * x, c) + from.at(2 * y, 2 * x + 1, c) +
-                       from.at(2 * y + 1, 2 * x, c) + from.at(2 * y + 1, 2 * x + 1, c));
-        }
-      }
-    }
-    levels.push_back(std::move(to));
-  }
-  return levels;
 }
 
 std::array<Effort, refinement_stages> efforts_of(const Effort& effort) {
@@ -330,10 +306,13 @@ void add_levels(FrameContext& context) {
       inputs.kept ? inputs.kept->bordered_levels() : std::make_shared<BorderedLevels>();
   bordered->begin(context.levels);
   context.bordered = bordered;
-  if (inputs.scene->has_glass() && inputs.plate != nullptr && inputs.lens != nullptr) {
-    context.plate_levels = plate_levels_of(*inputs.plate);
+  const bool bends = inputs.scene->has_glass() || inputs.scene->has_mirrored();
+  if (bends && inputs.plate != nullptr && inputs.lens != nullptr) {
+    const auto plate = inputs.kept ? inputs.kept->plate_levels() : std::make_shared<PlateLevels>();
+    plate->fill(*inputs.plate);
+    context.plate_levels = plate;
     context.lens = *inputs.lens;
-    for (const capture::Image& level : context.plate_levels) context.levels.push_back(&level);
+    for (const capture::Image& level : plate->all()) context.levels.push_back(&level);
   }
   add_videos(context);
 }

@@ -13,6 +13,7 @@
 #include "render/caustics.h"
 #include "render/cell_transport.h"
 #include "render/picture_stalls.h"
+#include "render/plate_levels.h"
 
 namespace render {
 
@@ -91,6 +92,7 @@ class KeptTransport {
   CausticFollower& caustics() { return caustics_; }
   // Of each frame in turn.
   const std::shared_ptr<BorderedLevels>& bordered_levels() const { return bordered_levels_; }
+  const std::shared_ptr<PlateLevels>& plate_levels() const { return plate_levels_; }
 
   // Of all cells, row by row, once anything has moved before a camera that stays; else empty.
   const std::vector<CellCone>& cones() const { return cones_; }
@@ -143,6 +145,7 @@ class KeptTransport {
 
   CausticFollower caustics_;
   std::shared_ptr<BorderedLevels> bordered_levels_ = std::make_shared<BorderedLevels>();
+  std::shared_ptr<PlateLevels> plate_levels_ = std::make_shared<PlateLevels>();
   std::shared_ptr<const Caustics> shown_caustics_;  // of the frame before
   FrameKeys keys_;
   bool light_stays_ = false;  // the same as in the frame before

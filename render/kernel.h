@@ -10,6 +10,7 @@
 #include "render/glowing_parts.h"
 #include "render/light_gather.h"
 #include "render/picture_stalls.h"
+#include "render/plate_levels.h"
 #include "render/ray_log.h"
 #include "render/refinement.h"
 #include "render/renderer.h"
@@ -44,9 +45,9 @@ struct FrameContext {
   int stage_of(int column, int row) const {
     return job->stages.empty() ? finished_stage : job->stages[cell_at(column, row)];
   }
-  // For rays that clear bodies bend: the plate, halved again and again, and the way to its pixels.
-  // Empty where the scene has none, or no plate is given.
-  std::vector<capture::Image> plate_levels;
+  // For rays that clear bodies bend, or mirrors send on: the plate, and the way to its pixels.
+  // Null where the scene has none, or no plate is given.
+  std::shared_ptr<const PlateLevels> plate_levels;
   std::size_t first_plate_level = 0;  // in `levels`
   std::optional<calibrate::Lens> lens;
   std::vector<std::size_t> first_video_levels;  // of each live texture, in `levels`

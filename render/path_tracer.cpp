@@ -98,18 +98,22 @@ struct LobeValue {
   Vec3f value;
   float density = 0;
 };
+struct LobeChoice {
+  bool diffuse = false, specular = true;
+};
 LobeValue lobe_value(const StandardSurface& surface,
                      const StandardWeights& weights,
                      const PathLobes& lobes,
                      Vec3f view,
                      Vec3f direction,
-                     bool with_diffuse) {
+                     LobeChoice of) {
   LobeValue result;
-  if (with_diffuse) {
+  if (of.diffuse) {
     const float d = std::max(0.0F, dot(surface.normal, direction)) / pi_f;
     result.value += weights.diffuse * d;
     result.density += lobes.diffuse * d;
   }
+  if (!of.specular) return result;
   if (weights.coat > 0 && !lobes.coat_mirror) {
     const float d = lobe_density(surface.coat_normal, view, surface.clearcoat_roughness, direction);
     result.value += Vec3f{weights.coat, weights.coat, weights.coat} * d;
@@ -131,11 +135,11 @@ LobeValue folded_lobe_value(const HitPoint& hit,
                             const PathLobes& lobes,
                             Vec3f view,
                             Vec3f direction,
-                            bool with_diffuse) {
-  LobeValue result = lobe_value(surface, weights, lobes, view, direction, with_diffuse);
+                            LobeChoice of) {
+  LobeValue result = lobe_value(surface, weights, lobes, view, direction, of);
   const Vec3f below = other_side(hit, direction);
   if (dot(surface.normal, below) > 0 || dot(surface.coat_normal, below) > 0) {
-    const LobeValue folded = lobe_value(surface, weights, lobes, view, below, with_diffuse);
+    const LobeValue folded = lobe_value(surface, weights, lobes, view, below, of);
     result.value += folded.value;
     result.density += folded.density;
   }
@@ -155,6 +159,7 @@ struct PathTracer::Walk {
   bool left_rough = false;      // was scattered by a diffuse surface
   bool left_diffuse = false;    // the last scattering was by a diffuse lobe
   bool sky_straight_on = true;  // whether the sky counts before the path was scattered
+  bool mirrors_plate = false;
   int depth = 0;
   bool met_virtual = false;
   Media media;
@@ -244,25 +249,33 @@ Vec3f PathTracer::environment_light(const HitPoint& hit,
                                     const StandardWeights& weights,
                                     const PathLobes& lobes,
                                     Vec3f view,
+                                    bool mirrors_plate,
                                     SampleSequence& numbers) const {
   const auto sky = environment_.sample(numbers.next_pair());
   if (!sky) return {};
   const Vec3f l = sky->direction;
   if (!(dot(hit.geometric_normal, l) > 0)) return {};
   const float cosine = dot(surface.normal, l);
-  const LobeValue lobe =
-      folded_lobe_value(hit, surface, weights, lobes, view, l, rules_.diffuse_bounces);
-  Vec3f value = lobe.value * (1 / (sky->density + lobe.density));
+  const auto value_of = [&](LobeChoice of) {
+    const LobeValue lobe = folded_lobe_value(hit, surface, weights, lobes, view, l, of);
+    return lobe.value * (1 / (sky->density + lobe.density));
+  };
+  const bool apart = mirrors_plate && rules_.diffuse_bounces;
+  Vec3f value = value_of({.diffuse = rules_.diffuse_bounces && !apart});
   // Diffuse light that is not followed comes from here alone.
   const Vec3f plain = rules_.diffuse_bounces || !(cosine > 0)
                           ? Vec3f{}
                           : weights.diffuse * (cosine / pi_f / sky->density);
-  if (value == Vec3f{} && plain == Vec3f{}) return {};
+  const Vec3f bounced = apart ? value_of({.diffuse = true, .specular = false}) : Vec3f{};
+  if (value == Vec3f{} && plain == Vec3f{} && bounced == Vec3f{}) return {};
   const Vec3f origin = offset_origin(hit, l);
   // Clear bodies bend what lobes see: paths find it there.
   const Vec3f passing =
       transmittance(scene_, origin, l, 0, ray_far, rules_.lobe_blockers | ray_glass_blocks);
-  value = times(value, passing);
+  // Where they see the plate, it is not the sky.
+  const bool in_plate = mirrors_plate && value != Vec3f{} &&
+                        transmittance(scene_, origin, l, 0, ray_far, mask_mirrored) == Vec3f{};
+  value = times(in_plate ? bounced : value + bounced, passing);
   if (plain != Vec3f{}) {
     const Vec3f plain_passing =
         rules_.caustics || !scene_.has_glass()
@@ -297,6 +310,7 @@ bool PathTracer::scatter(Walk& w,
   w.kind = RayKind::reflection;
   w.left_diffuse = by == PathLobe::diffuse;
   w.mask = rules_.scattered_mask;
+  if (w.mirrors_plate && !w.left_diffuse) w.mask |= mask_mirrored;
   w.sky_straight_on = true;
   const auto leave = [&](Vec3f direction) {
     w.direction = direction;
@@ -333,12 +347,18 @@ bool PathTracer::scatter(Walk& w,
   const float roughness = coat ? surface.clearcoat_roughness : specular ? surface.roughness : 1.0F;
   w.left_rough = w.left_rough || roughness >= caustic_roughness;
   direction = above(direction);
-  const LobeValue lobe =
-      folded_lobe_value(hit, surface, weights, lobes, view, direction, rules_.diffuse_bounces);
+  // Where only what lobes mirror sees the plate, each light has its own estimate.
+  const bool apart = w.mirrors_plate && rules_.diffuse_bounces;
+  const LobeChoice of{.diffuse = rules_.diffuse_bounces && (!apart || w.left_diffuse),
+                      .specular = !apart || !w.left_diffuse};
+  const LobeValue lobe = folded_lobe_value(hit, surface, weights, lobes, view, direction, of);
   if (!(lobe.density > 0)) return false;
   Vec3f glow = lobe.value;
-  if (!lamps_.empty() && rules_.diffuse_bounces)
-    glow = folded_lobe_value(hit, surface, weights, lobes, view, direction, false).value;
+  if (!lamps_.empty() && of.diffuse) {
+    glow = folded_lobe_value(hit, surface, weights, lobes, view, direction,
+                             {.diffuse = false, .specular = of.specular})
+               .value;
+  }
   w.glow_share = times(w.share, glow) * (1 / lobe.density);
   w.share = times(w.share, lobe.value) * (1 / lobe.density);
   w.density = lobe.density;
@@ -410,16 +430,25 @@ bool PathTracer::pass_layer(Walk& w, const HitPoint& hit, const Layer& layer) {
   return w.share != Vec3f{};
 }
 
+bool PathTracer::sees_plate(const Walk& w) const {
+  return (w.kind == RayKind::camera || w.kind == RayKind::bent) && !rules_.sees_background;
+}
+
+// Whether the path sees the plate where it meets a stand-in.
+bool PathTracer::ends_at(const Walk& w, const Instance& stand_in) const {
+  if (sees_plate(w)) return true;
+  return w.mirrors_plate && w.met_virtual && !w.left_diffuse && stand_in.mirrored;
+}
+
 void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
   for (; w.depth < rules_.max_depth; ++w.depth) {
     const auto met = closest_hit(scene_, w.origin, w.direction, 0, w.mask, w.kind);
-    const bool sees_plate =
-        (w.kind == RayKind::camera || w.kind == RayKind::bent) && !rules_.sees_background;
     if (!met) {
-      if (sees_plate)
-        w.result.end = CameraPath::End::background;
-      else
+      if (sees_plate(w)) {
+        w.result.ends.push_back({w.share, w.kind == RayKind::bent, std::nullopt, w.direction});
+      } else {
         add_sky(w, w.result.radiance);
+      }
       break;
     }
     const HitPoint hit =
@@ -429,10 +458,10 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
       w.share = times(w.share, passed);
       w.glow_share = times(w.glow_share, passed);
     }
-    const bool real = scene_.description().instances[hit.instance].kind == ObjectKind::stand_in;
-    if (real && sees_plate) {
-      w.result.end = CameraPath::End::stand_in;
-      w.result.hit = hit;
+    const Instance& instance = scene_.description().instances[hit.instance];
+    const bool real = instance.kind == ObjectKind::stand_in;
+    if (real && ends_at(w, instance)) {
+      w.result.ends.push_back({w.share, w.kind != RayKind::camera, hit, w.direction});
       break;
     }
     w.met_virtual = w.met_virtual || !real;
@@ -461,7 +490,7 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     w.result.radiance += times(w.glow_share, surface.emission);
     const bool split = w.kind == RayKind::camera && w.depth < split_depth;
     const PathLobes lobes(surface, weights, rules_.diffuse_bounces, split);
-    Vec3f light = environment_light(hit, surface, weights, lobes, view, numbers);
+    Vec3f light = environment_light(hit, surface, weights, lobes, view, w.mirrors_plate, numbers);
     if (!lamps_.empty() && weights.diffuse != Vec3f{})
       light += times(weights.diffuse, lamp_irradiance(hit, surface.normal)) * (1 / pi_f);
     if (rules_.caustics && !rules_.diffuse_bounces && weights.diffuse != Vec3f{})
@@ -479,6 +508,7 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
         ++part.depth;
         walk(part, numbers);
         w.result.radiance += part.result.radiance;
+        w.result.ends.insert(w.result.ends.end(), part.result.ends.begin(), part.result.ends.end());
         w.met_virtual = w.met_virtual || part.met_virtual;
       }
     }
@@ -488,9 +518,6 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     if (!scatter(w, hit, surface, weights, lobes, by, numbers)) break;
     if (!survives(w, numbers)) break;
   }
-  w.result.bent = w.kind == RayKind::bent;
-  w.result.through = w.share;
-  w.result.incoming = w.direction;
 }
 
 CameraPath PathTracer::camera_path(Vec3f origin, Vec3f direction, SampleSequence& numbers) const {
@@ -498,6 +525,7 @@ CameraPath PathTracer::camera_path(Vec3f origin, Vec3f direction, SampleSequence
   w.origin = origin;
   w.direction = direction;
   w.mask = rules_.camera_mask;
+  w.mirrors_plate = rules_.mirrors_plate && !rules_.sees_background && scene_.has_mirrored();
   walk(w, numbers);
   return std::move(w.result);
 }
@@ -511,8 +539,9 @@ PathTracer::Scattered PathTracer::scattered_path(Vec3f origin,
   w.direction = direction;
   w.mask = mask;
   w.kind = RayKind::reflection;
+  w.mirrors_plate = rules_.mirrors_plate && scene_.has_mirrored();
   walk(w, numbers);
-  return {w.result.radiance, w.met_virtual};
+  return {w.result.radiance, w.met_virtual, std::move(w.result.ends)};
 }
 
 Vec3f PathTracer::bent_irradiance(const HitPoint& hit,

@@ -18,6 +18,7 @@ namespace render {
 struct PathRules {
   bool diffuse_bounces = false;  // follow light between diffuse surfaces
   bool sees_background = false;  // a camera path that leaves the scene sees the environment
+  bool mirrors_plate = true;     // mirrored paths end at stand-ins that are (Instance::mirrored)
   unsigned camera_mask = mask_virtual | mask_stand_in;
   unsigned scattered_mask = mask_virtual;  // rays mirrored or scattered at a surface
   unsigned diffuse_blockers = mask_virtual | mask_real_blocker;  // of the environment and lamps
@@ -26,15 +27,18 @@ struct PathRules {
   int max_depth = 4096;
 };
 
-// A camera path's end: what it gathered, and what it sees straight on.
-struct CameraPath {
-  enum class End { nothing, background, stand_in };
-  Vec3f radiance;
-  Vec3f through{1, 1, 1};  // share of the light at the end that reaches the camera
-  End end = End::nothing;
-  bool bent = false;  // by a clear body: the plate is that of where it ends, not of its pixel
-  HitPoint hit;       // of the stand-in
+// Where a path sees the plate.
+struct PathEnd {
+  Vec3f through{1, 1, 1};  // share of the light there that reaches the start
+  bool bent = false;       // by a clear body or mirror: the plate is that of here, not of its pixel
+  std::optional<HitPoint> stand_in;  // that it met; or it left the scene
   Vec3f incoming;
+};
+
+// What a camera path gathered, and where it sees the plate: of one that parts at surfaces all ends.
+struct CameraPath {
+  Vec3f radiance;
+  std::vector<PathEnd> ends;
 };
 
 struct Layer;  // shader.h
@@ -64,10 +68,12 @@ class PathTracer {
              std::span<const VideoTexture* const> videos = {});
 
   CameraPath camera_path(Vec3f origin, Vec3f direction, SampleSequence& numbers) const;
-  // Radiance along a ray that left a real surface, and whether it met a virtual object.
+  // Radiance along a ray that left a real surface, and whether it met a virtual object. Where
+  // that mirrors the plate it ends.
   struct Scattered {
     Vec3f radiance;
     bool met = false;
+    std::vector<PathEnd> ends;
   };
   Scattered scattered_path(Vec3f origin,
                            Vec3f direction,
@@ -90,11 +96,14 @@ class PathTracer {
   void walk(Walk& w, SampleSequence& numbers) const;
   static bool survives(Walk& w, SampleSequence& numbers);
   void add_sky(const Walk& w, Vec3f& radiance) const;
+  bool sees_plate(const Walk& w) const;
+  bool ends_at(const Walk& w, const Instance& stand_in) const;
   Vec3f environment_light(const HitPoint& hit,
                           const StandardSurface& surface,
                           const StandardWeights& weights,
                           const PathLobes& lobes,
                           Vec3f view,
+                          bool mirrors_plate,
                           SampleSequence& numbers) const;
   void pass_glass(Walk& w, const HitPoint& hit, SampleSequence& numbers) const;
   std::optional<Layer> layer_at(const Walk& w, const HitPoint& hit) const;

@@ -48,7 +48,7 @@ class Sum {
 // What the samples of a pixel say about one stand-in.
 struct StandInSums {
   std::uint32_t instance = 0;
-  bool bent = false;  // seen through clear bodies: `plate` is what lies there
+  bool bent = false;  // seen through clear bodies, or in mirrors: `plate` is what lies there
   Sum plate;          // times share; open and lost are times it as well
   StandInParameters parameters;
   int count = 0;
@@ -59,22 +59,28 @@ struct StandInSums {
   Sum virtual_light;  // irradiance of lamps (and virtual objects); times share
 };
 
-// The plate, for paths that clear bodies bend.
+// The plate, for paths that clear bodies bend, or mirrors send on.
 class Plate {
  public:
   // `lens` null: nothing is seen of it.
   Plate(const capture::Image& plate, const calibrate::Lens* lens, const Pose& cam_from_set)
       : plate_(plate), lens_(lens), cam_from_set_(cam_from_set.R) {}
 
-  // In a direction from the camera, bilinear; nothing beyond the picture.
-  std::optional<Vec3f> seen(Vec3f from_camera) const {
+  // In a direction from the camera, bilinear, and how much of it is seen; nothing beyond the
+  // picture.
+  struct Seen {
+    Vec3f plate;
+    float share;
+  };
+  std::optional<Seen> seen(Vec3f from_camera) const {
     if (lens_ == nullptr) return std::nullopt;
     const auto q = calibrate::project(*lens_, cam_from_set_ * calibrate::to_double(from_camera));
     if (!q || !(q->x >= -0.5 && q->x <= plate_.width - 0.5) ||
         !(q->y >= -0.5 && q->y <= plate_.height - 0.5)) {
       return std::nullopt;
     }
-    return plate_at(plate_, static_cast<float>(q->x), static_cast<float>(q->y));
+    return Seen{plate_at(plate_, static_cast<float>(q->x), static_cast<float>(q->y)),
+                plate_share_at(plate_, q->x, q->y)};
   }
 
  private:
@@ -116,18 +122,7 @@ class Composite {
     }
     const CameraPath path = tracer_.camera_path(origin, *direction, numbers);
     p.added.add(path.radiance);
-    if (path.end == CameraPath::End::nothing) return;
-    if (path.bent) {
-      sample_bent(origin, path, numbers, p);
-      return;
-    }
-    p.seen += mean(path.through);
-    if (path.end == CameraPath::End::stand_in)
-      sample_stand_in(path, {}, numbers, p);
-    else if (environment_behind_)
-      p.added.add(times(path.through, tracer_.environment().radiance(path.incoming)));
-    else
-      p.background.add(path.through);
+    for (const PathEnd& end : path.ends) sample_end(origin, end, 0, numbers, p);
   }
 
   // (R, G, B, coverage) of a pixel from its `count` samples, where the lens is so sensitive.
@@ -166,63 +161,89 @@ class Composite {
     return lost > 0 && open > 0 ? static_cast<float>(std::max(0.0, 1 - lost / open)) : 1.0F;
   }
 
-  // What a path bent by clear bodies sees of the plate, or of the environment beside it.
-  void sample_bent(Vec3f origin, const CameraPath& path, SampleSequence& numbers, Pixel& p) const {
-    const bool met = path.end == CameraPath::End::stand_in;
-    const auto seen = environment_behind_
-                          ? std::nullopt
-                          : plate_.seen(met ? path.hit.position - origin : path.incoming);
-    if (seen && met) {
-      sample_stand_in(path, seen, numbers, p);
+  // `mirrors`: how many real surfaces on the way mirrored it.
+  void sample_end(
+      Vec3f origin, const PathEnd& end, int mirrors, SampleSequence& numbers, Pixel& p) const {
+    if (end.bent) {
+      sample_bent(origin, end, mirrors, numbers, p);
+      return;
+    }
+    p.seen += mean(end.through);
+    if (end.stand_in) {
+      sample_stand_in(origin, end, {}, mirrors, numbers, p);
+    } else if (environment_behind_) {
+      p.added.add(times(end.through, tracer_.environment().radiance(end.incoming)));
     } else {
-      p.added.add(
-          times(path.through, seen ? *seen : tracer_.environment().radiance(path.incoming)));
+      p.background.add(end.through);
     }
   }
 
-  // `bent`: the plate there, where clear bodies bent the path.
-  void sample_stand_in(const CameraPath& path,
+  // What a path bent by clear bodies, or mirrored, sees of the plate, or of the environment beside
+  // it.
+  void sample_bent(
+      Vec3f origin, const PathEnd& end, int mirrors, SampleSequence& numbers, Pixel& p) const {
+    const auto seen =
+        environment_behind_
+            ? std::nullopt
+            : plate_.seen(end.stand_in ? end.stand_in->position - origin : end.incoming);
+    const float share = seen ? seen->share : 0;
+    if (share < 1) {
+      p.added.add(times(end.through, tracer_.environment().radiance(end.incoming)) * (1 - share));
+    }
+    if (!(share > 0)) return;
+    if (end.stand_in) {
+      sample_stand_in(origin, end, seen->plate * share, mirrors, numbers, p);
+    } else {
+      p.added.add(times(end.through, seen->plate) * share);
+    }
+  }
+
+  // `bent`: what is seen of the plate there, where clear bodies bent the path, or mirrors sent it.
+  void sample_stand_in(Vec3f origin,
+                       const PathEnd& end,
                        std::optional<Vec3f> bent,
+                       int mirrors,
                        SampleSequence& numbers,
                        Pixel& p) const {
+    const HitPoint& hit = *end.stand_in;
     auto sums = std::find_if(p.stand_ins.begin(), p.stand_ins.end(), [&](const StandInSums& s) {
-      return s.instance == path.hit.instance && s.bent == bent.has_value();
+      return s.instance == hit.instance && s.bent == bent.has_value();
     });
     if (sums == p.stand_ins.end()) {
       sums = p.stand_ins.emplace(p.stand_ins.end());
-      sums->instance = path.hit.instance;
-      sums->parameters = stand_ins_[path.hit.material];
+      sums->instance = hit.instance;
+      sums->parameters = stand_ins_[hit.material];
       sums->bent = bent.has_value();
     }
     ++sums->count;
-    sums->through.add(path.through);
-    const Vec3f weight = bent ? times(path.through, *bent) : path.through;
+    sums->through.add(end.through);
+    const Vec3f weight = bent ? times(end.through, *bent) : end.through;
     if (bent) sums->plate.add(weight);
-    sample_irradiance(path, weight, numbers, *sums);
+    sample_irradiance(hit, weight, numbers, *sums);
     if (takes_caustics(*sums)) {
-      sums->gathered.add(
-          times(weight, tracer_.bent_irradiance(path.hit, path.hit.normal, numbers)));
+      sums->gathered.add(times(weight, tracer_.bent_irradiance(hit, hit.normal, numbers)));
     }
     if (sums->parameters.catches_light != 0 && !bent) {
-      Vec3f light = tracer_.lamp_irradiance(path.hit, path.hit.normal);
-      if (bounces_) light += tracer_.virtual_irradiance(path.hit, numbers);
-      sums->virtual_light.add(times(path.through, light));
+      Vec3f light = tracer_.lamp_irradiance(hit, hit.normal);
+      if (bounces_) light += tracer_.virtual_irradiance(hit, numbers);
+      sums->virtual_light.add(times(end.through, light));
     }
-    if (sums->parameters.catches_reflection != 0 && sums->parameters.reflectance > 0)
-      p.added.add(times(path.through, reflection(path, sums->parameters, numbers)));
+    const StandInParameters& parameters = sums->parameters;
+    if (parameters.catches_reflection != 0 && parameters.reflectance > 0) {
+      add_reflection(origin, end, parameters, mirrors, numbers, p);
+    }
   }
 
   bool takes_caustics(const StandInSums& sums) const {
     return tracer_.rules().caustics && (sums.bent || sums.parameters.catches_light != 0);
   }
 
-  void sample_irradiance(const CameraPath& path,
+  void sample_irradiance(const HitPoint& hit,
                          Vec3f weight,
                          SampleSequence& numbers,
                          StandInSums& sums) const {
     const auto sky = tracer_.environment().sample(numbers.next_pair());
     if (!sky) return;
-    const HitPoint& hit = path.hit;
     const float cosine = dot(hit.normal, sky->direction);
     if (!(cosine > 0) || !(dot(hit.geometric_normal, sky->direction) > 0)) return;
     const Vec3f origin = offset_origin(hit, hit.geometric_normal);
@@ -241,21 +262,32 @@ class Composite {
   }
 
   // F (L_hit - L_env) where the mirrored ray meets a virtual object.
-  Vec3f reflection(const CameraPath& path,
-                   const StandInParameters& parameters,
-                   SampleSequence& numbers) const {
-    const HitPoint& hit = path.hit;
-    const Vec3f view = -path.incoming;
+  void add_reflection(Vec3f origin,
+                      const PathEnd& end,
+                      StandInParameters parameters,
+                      int mirrors,
+                      SampleSequence& numbers,
+                      Pixel& p) const {
+    const HitPoint& hit = *end.stand_in;
+    const Vec3f view = -end.incoming;
     const float f = schlick(parameters.reflectance, std::abs(dot(hit.normal, view)));
     const Vec3f direction =
         parameters.roughness < mirror_roughness
             ? normalize(mirrored(view, hit.normal))
             : sample_lobe(hit.normal, view, parameters.roughness, numbers.next_pair());
-    if (!(dot(direction, hit.geometric_normal) > 0)) return {};
-    const auto seen =
+    if (!(dot(direction, hit.geometric_normal) > 0)) return;
+    auto seen =
         tracer_.scattered_path(offset_origin(hit, direction), direction, mask_virtual, numbers);
-    if (!seen.met) return {};
-    return (seen.radiance - tracer_.environment().radiance(direction)) * f;
+    if (!seen.met) return;
+    const Vec3f share = end.through * f;
+    p.added.add(times(share, seen.radiance - tracer_.environment().radiance(direction)));
+    // Between real and virtual mirrors light goes to and fro.
+    constexpr int most_mirrors = 16;
+    if (mirrors == most_mirrors) return;
+    for (PathEnd& mirrored_end : seen.ends) {
+      mirrored_end.through = times(mirrored_end.through, share);
+      sample_end(origin, mirrored_end, mirrors + 1, numbers, p);
+    }
   }
 
   const PathTracer& tracer_;

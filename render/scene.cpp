@@ -230,11 +230,11 @@ Facet facet_of(const Mesh& mesh,
       context, description.materials[hit.material], hit, incoming, kind, footprint_m);
 }
 
-// Whether a camera ray passes a real surface that hides nothing: it does where it meets something
-// virtual, on either side, before anything real that hides.
+// Whether a ray that sees the real world passes a real surface that hides nothing: it does where it
+// meets something virtual, on either side, before anything real that hides.
 bool Scene::Impl::stands_back(const RTCFilterFunctionNArguments* args, unsigned lane) const {
   const unsigned n = args->N;
-  if ((RTCRayN_mask(args->ray, n, lane) & mask_stand_in) == 0) return false;
+  if ((RTCRayN_mask(args->ray, n, lane) & (mask_stand_in | mask_mirrored)) == 0) return false;
   std::uint32_t met = 0;
   part(RTCHitN_geomID(args->hit, n, lane), RTCHitN_instID(args->hit, n, lane, 0), met);
   const Instance& real = description.instances[met];
@@ -446,6 +446,7 @@ const Glass* Scene::glass_of(std::uint32_t material) const {
 }
 bool Scene::has_glass() const { return impl_->compiled->has_glass; }
 bool Scene::has_standing_back() const { return impl_->compiled->stands_back; }
+bool Scene::has_mirrored() const { return impl_->compiled->has_mirrored; }
 bool Scene::has_moving() const { return impl_->compiled->two_level; }
 const BackgroundShader& Scene::background() const { return *impl_->compiled->background; }
 bool Scene::has_real_blockers() const { return impl_->compiled->real_blockers; }

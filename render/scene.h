@@ -28,9 +28,10 @@ enum class ObjectKind : std::uint8_t { virtual_object = 0, stand_in = 1 };
 // Embree ray masks. What a camera ray sees of the real world is mask_stand_in; of these, those that
 // hide virtual objects are mask_occluder too.
 inline constexpr unsigned mask_virtual = 1;       // virtual objects
-inline constexpr unsigned mask_stand_in = 2;      // stand-ins, seen by camera and reflection rays
+inline constexpr unsigned mask_stand_in = 2;      // stand-ins, seen as the camera sees them
 inline constexpr unsigned mask_real_blocker = 4;  // stand-ins that block real light
 inline constexpr unsigned mask_occluder = 8;
+inline constexpr unsigned mask_mirrored = 16;  // stand-ins that virtual mirrors show
 // In the mask of a shadow ray: clear bodies block it.
 inline constexpr unsigned ray_glass_blocks = 1U << 31;
 
@@ -41,6 +42,7 @@ struct Instance {
   ObjectKind kind = ObjectKind::virtual_object;
   bool blocks_light = true;  // stand-ins only: shadows cast by the real thing it stands for
   bool occludes = true;      // stand-ins only: hides virtual objects behind it
+  bool mirrored = false;     // stand-ins only: virtual mirrors show the plate there
   // It is likely to stand elsewhere in the next scene: held apart, so that this takes no building.
   bool moves = false;
   friend bool operator==(const Instance&, const Instance&) = default;
@@ -159,6 +161,7 @@ class Scene {
   bool has_moving() const;  // whether any instance does
   // Whether any stand-in hides nothing, so that rays which meet it may see what is behind.
   bool has_standing_back() const;
+  bool has_mirrored() const;  // whether any stand-in is
   const BackgroundShader& background() const;
   // Whether any stand-in blocks light; whether any surface lets some through.
   bool has_real_blockers() const;

@@ -5,7 +5,7 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x38435350;  // "PSC8"
+constexpr std::uint32_t scene_magic = 0x39435350;  // "PSC9"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);
@@ -100,6 +100,7 @@ std::vector<std::byte> serialize(const SceneDescription& scene) {
     out.put(instance.kind);
     out.put(static_cast<std::uint8_t>(instance.blocks_light));
     out.put(static_cast<std::uint8_t>(instance.occludes));
+    out.put(static_cast<std::uint8_t>(instance.mirrored));
     out.put(static_cast<std::uint8_t>(instance.moves));
   }
   return out.take();
@@ -125,7 +126,7 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
     material.shader = in.get_text();
     in.get_all(material.parameters);
   }
-  for (std::size_t n = in.get_count(count_size + 4 + 12 * 4 + 3); n > 0; --n) {
+  for (std::size_t n = in.get_count(count_size + 4 + 12 * 4 + 4); n > 0; --n) {
     Instance& instance = scene.instances.emplace_back();
     instance.name = in.get_text();
     in.get(instance.mesh);
@@ -136,6 +137,7 @@ SceneDescription parse_scene(std::span<const std::byte> bytes) {
     instance.kind = static_cast<ObjectKind>(kind);
     instance.blocks_light = in.get<std::uint8_t>() != 0;
     instance.occludes = in.get<std::uint8_t>() != 0;
+    instance.mirrored = in.get<std::uint8_t>() != 0;
     instance.moves = in.get<std::uint8_t>() != 0;
   }
   in.expect_end();

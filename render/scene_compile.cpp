@@ -14,7 +14,7 @@ constexpr std::size_t most_facets = 16;
 unsigned mask_of(const Instance& instance) {
   if (instance.kind == ObjectKind::virtual_object) return mask_virtual;
   return mask_stand_in | (instance.blocks_light ? mask_real_blocker : 0U) |
-         (instance.occludes ? mask_occluder : 0U);
+         (instance.occludes ? mask_occluder : 0U) | (instance.mirrored ? mask_mirrored : 0U);
 }
 
 // A box around a box that is moved.
@@ -95,6 +95,7 @@ void Scene::Compiled::build(const SceneDescription& description) {
       }
     }
     real_blockers |= instance.kind == ObjectKind::stand_in && instance.blocks_light;
+    has_mirrored |= instance.kind == ObjectKind::stand_in && instance.mirrored;
     if (mesh.rest) {  // also of one without triangles: its next shape may have some
       filters |= std::ranges::any_of(mesh.materials, [&](auto m) { return filtered[m] != 0; });
     } else if (mesh.triangles.empty()) {

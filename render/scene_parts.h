@@ -126,6 +126,7 @@ struct Scene::Compiled {
   std::size_t skipped = 0;
   bool two_level = false;  // something moves
   bool stands_back = false;
+  bool has_mirrored = false;
   bool real_blockers = false;
   bool filters = false;
   bool has_glass = false;

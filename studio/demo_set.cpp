@@ -110,7 +110,8 @@ std::string court_set(const render::MadeStudio& studio, const std::string& prefi
   text += car_section(studio) + lamp_sections(studio);
   text +=
       "[[stand_in]]\nname = \"court\"\nshape = \"plane\"\nsize = [16, 16]\n"
-      "pose = { position = [0, 1.8, 0] }\ncatches = [\"shadow\", \"light\"]\nalbedo = 0.16\n\n";
+      "pose = { position = [0, 1.8, 0] }\ncatches = [\"shadow\", \"light\"]\nalbedo = 0.16\n"
+      "mirrored = true  # in the paint: the ground that the camera sees, in the car's shadow\n\n";
   text += fmt::format(
       "[[stand_in]]\nname = \"crate\"\nshape = \"box\"\nsize = {}\n"
       "pose = {{ position = {}, yaw = {:.4f} }}\nblocks_light = true\n",
@@ -137,7 +138,8 @@ std::string park_set(const render::MadeStudio& studio, const std::string& prefix
   text +=
       "# The sun is low: the shadow is more than five times as long as the car is high.\n"
       "[[stand_in]]\nname = \"ground\"\nshape = \"plane\"\nsize = [24, 24]\n"
-      "pose = { position = [0, 1.8, 0] }\ncatches = [\"shadow\", \"light\"]\nalbedo = 0.16\n";
+      "pose = { position = [0, 1.8, 0] }\ncatches = [\"shadow\", \"light\"]\nalbedo = 0.16\n"
+      "mirrored = true\n";
   return text;
 }
 

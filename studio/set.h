@@ -149,6 +149,7 @@ struct StandInSettings {
   float roughness = 0.3F;
   bool blocks_light = false;
   bool occludes = true;
+  bool mirrored = false;  // virtual mirrors show the plate there
 };
 
 // A virtual lamp: a point that shines to all sides, or as a small disc that faces somewhere.

@@ -148,6 +148,7 @@ StandInSettings read_stand_in_section(Section section, const SetContext& context
   section.number("roughness", stand_in.roughness, share);
   section.boolean("blocks_light", stand_in.blocks_light);
   section.boolean("occludes", stand_in.occludes);
+  section.boolean("mirrored", stand_in.mirrored);
   section.finish();
   return stand_in;
 }

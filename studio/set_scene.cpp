@@ -203,6 +203,7 @@ void add_stand_in(SceneDescription& scene,
     part.kind = render::ObjectKind::stand_in;
     part.blocks_light = stand_in.blocks_light;
     part.occludes = stand_in.occludes;
+    part.mirrored = stand_in.mirrored;
     part.set_from_object = product(set_from_stand_in, part.set_from_object);
     scene.instances.push_back(std::move(part));
   }

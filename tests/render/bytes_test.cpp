@@ -56,6 +56,7 @@ SceneDescription made_scene() {
   instance.kind = ObjectKind::stand_in;
   instance.blocks_light = false;
   instance.occludes = false;
+  instance.mirrored = true;
   scene.instances.push_back(instance);
   scene.videos = {"news", ""};
   scene.version = 9;

@@ -136,6 +136,7 @@ reflectance = 0.05
 roughness = 0.1
 blocks_light = true
 occludes = false
+mirrored = true
 [[lamp]]
 position = [0, 0, 2]
 facing = [0, 0, -0.9]
@@ -199,6 +200,7 @@ timecode = "10:00:00:00"
   EXPECT_TRUE(set.stand_ins[0].catches_reflection);
   EXPECT_TRUE(set.stand_ins[0].blocks_light);
   EXPECT_FALSE(set.stand_ins[0].occludes);
+  EXPECT_TRUE(set.stand_ins[0].mirrored);
   ASSERT_EQ(set.lamps.size(), 1U);
   EXPECT_FLOAT_EQ(set.lamps[0].intensity[2], 3);
   EXPECT_EQ(set.lamps[0].facing, (calibrate::Vec3{0, 0, -1}));

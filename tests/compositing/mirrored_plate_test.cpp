@@ -1,0 +1,293 @@
+// Virtual mirrors that show the plate where a stand-in is (Instance::mirrored).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "calibrate/lens.h"
+#include "calibrate/pose.h"
+#include "made_shot.h"
+#include "render/kept_transport.h"
+#include "render/reference.h"
+#include "render/renderer.h"
+
+namespace compositing::mirrored_plate_test {
+namespace {
+
+using render::Vec3f;
+
+calibrate::Lens lens_of(const MadeShot& shot) {
+  const int w = shot.directions.width, h = shot.directions.height;
+  return {"pinhole", w, h, {1.1 * w, 1.1 * w, (w - 1) / 2.0, (h - 1) / 2.0}};
+}
+
+render::StandardParameters metal(float roughness) {
+  render::StandardParameters metal;
+  metal.metallic = 1;
+  metal.roughness = roughness;
+  std::fill_n(metal.base_color, 3, 1.0F);
+  return metal;
+}
+
+render::StandardParameters coated_paint() {
+  render::StandardParameters paint;
+  paint.base_color[1] = paint.base_color[2] = 0.1F;
+  paint.clearcoat = 1;
+  return paint;
+}
+
+// A ball of some material, and a thin glass one, on a real floor of light and dark squares.
+MadeShot shot_of(const render::StandardParameters& ball,
+                 bool mirrored,
+                 render::StandInParameters real = {}) {
+  render::SceneDescription scene = shot_scene();
+  scene.materials[0] = make_stand_in_material("floor", real);
+  scene.materials[1] = render::make_standard_material("ball", ball);
+  scene.instances[0].mirrored = mirrored;
+  MadeShot shot = made_shot(160, 120, scene);
+  const calibrate::Pose set_from_cam = calibrate::inverse(shot.job.cam_from_set);
+  capture::Image plate = capture::make_image(120, 160, 3);
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      const std::size_t i = shot.directions.index(y, x);
+      const calibrate::Vec3 v =
+          set_from_cam.R *
+          calibrate::Vec3{shot.directions.x[i], shot.directions.y[i], shot.directions.z[i]};
+      const calibrate::Vec3 at = set_from_cam.t + v * (-set_from_cam.t.z / v.z);
+      const bool light = (static_cast<int>(std::floor(2 * at.x) + std::floor(2 * at.y)) & 1) == 0;
+      const float floor = light ? 0.7F : 0.25F;
+      plate.at(y, x, 0) = v.z < 0 ? floor : 0.5F;
+      plate.at(y, x, 1) = v.z < 0 ? 0.8F * floor : 0.7F;
+      plate.at(y, x, 2) = v.z < 0 ? 0.6F * floor : 0.9F;
+    }
+  }
+  shot.plate = capture::to_half(plate);
+  return shot;
+}
+
+capture::Image rendered(const MadeShot& shot, render::KeptTransport* kept = nullptr) {
+  const calibrate::Lens lens = lens_of(shot);
+  render::FrameInputs inputs = shot.inputs();
+  inputs.lens = &lens;
+  inputs.kept = kept;
+  render::FrameResult result;
+  render_frame(inputs, shot.job, shot.plate, result);
+  return capture::to_float(result.rgba);
+}
+
+// A mirror as a wall: its picture of the floor is the plate where the mirrored ray falls, and of
+// what the camera does not see, the environment.
+TEST(MirroredPlate, IsWhatAFlatMirrorShowsOfTheFloor) {
+  constexpr int width = 160, height = 120;
+  constexpr float back = 1.5F;  // how far away the wall stands
+  render::SceneDescription scene = shot_scene(false);
+  render::StandInParameters real;
+  real.catches_shadow = real.catches_light = 0;
+  scene.materials[0] = make_stand_in_material("floor", real);
+  scene.instances[0].mirrored = true;
+  scene.materials[1] = render::make_standard_material("silver", metal(0));
+  auto wall = std::make_shared<render::Mesh>();
+  wall->positions = {{-3, back, 0}, {3, back, 0}, {3, back, 3}, {-3, back, 3}};
+  wall->triangles = {{0, 1, 2}, {0, 2, 3}};
+  wall->materials = {1};
+  scene.meshes.push_back(wall);
+  scene.instances.emplace_back().mesh = 1;
+  MadeShot shot = made_shot(width, height, scene);
+  shot.environment = made_sky(32, 2, 3);
+  const Vec3f eye{0, -2.5F, 1.2F};
+  shot.job.cam_from_set = calibrate::look_at(calibrate::to_double(eye), {0, 0, 0.2}, 0);
+  capture::Image plate = capture::make_image(height, width, 3);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      plate.at(y, x, 0) = static_cast<float>(x) / width;
+      plate.at(y, x, 1) = static_cast<float>(y) / height;
+      plate.at(y, x, 2) = 0.5F;
+    }
+  }
+  shot.plate = capture::to_half(plate);
+  const capture::Image picture = rendered(shot);
+  const calibrate::Lens lens = lens_of(shot);
+  const calibrate::Pose set_from_cam = calibrate::inverse(shot.job.cam_from_set);
+  int in_plate = 0, beside = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const std::size_t i = shot.directions.index(y, x);
+      Vec3f v = calibrate::to_float(set_from_cam.R * calibrate::Vec3{shot.directions.x[i],
+                                                                     shot.directions.y[i],
+                                                                     shot.directions.z[i]});
+      const Vec3f at_wall = eye + v * ((back - eye.y) / v.y);
+      if (!(at_wall.z > 0.05F && at_wall.z < 2.9F && std::abs(at_wall.x) < 2.9F)) continue;
+      v.y = -v.y;
+      if (!(v.z < -0.01F)) continue;
+      const Vec3f at_floor = at_wall + v * (-at_wall.z / v.z);
+      if (std::max(std::abs(at_floor.x), std::abs(at_floor.y)) > 19) continue;
+      const auto q =
+          calibrate::project(lens, shot.job.cam_from_set.R * calibrate::to_double(at_floor - eye));
+      const double inside =
+          q ? std::min({q->x + 0.5, width - 0.5 - q->x, q->y + 0.5, height - 0.5 - q->y}) : -1.0;
+      constexpr double seam = height / 16.0;
+      if (inside > seam + 1) {
+        ++in_plate;
+        EXPECT_NEAR(picture.at(y, x, 0), q->x / width, 0.006) << x << " " << y;
+        EXPECT_NEAR(picture.at(y, x, 1), q->y / height, 0.006) << x << " " << y;
+        EXPECT_NEAR(picture.at(y, x, 2), 0.5, 0.003) << x << " " << y;
+      } else if (inside < -1) {
+        ++beside;
+        EXPECT_NEAR(picture.at(y, x, 2), 2, 0.01) << x << " " << y;
+      } else {  // and no seam between
+        EXPECT_GT(picture.at(y, x, 2), 0.49F);
+        EXPECT_LT(picture.at(y, x, 2), 2.01F);
+      }
+    }
+  }
+  EXPECT_GT(in_plate, 1400);
+  EXPECT_GT(beside, 500);
+}
+
+// Under the shadows of what stands there.
+TEST(MirroredPlate, IsAsTheReferenceHasIt) {
+  for (const auto& [what, ball, most] :
+       {std::tuple("mirror", metal(0), 0.03), std::tuple("rough metal", metal(0.3F), 0.04),
+        std::tuple("paint", coated_paint(), 0.04)}) {
+    const MadeShot shot = shot_of(ball, true);
+    const calibrate::Lens lens = lens_of(shot);
+    render::FrameInputs inputs = shot.inputs();
+    inputs.lens = &lens;
+    const capture::Image plate = capture::to_float(shot.plate);
+    const capture::Image truth = render_reference(inputs, shot.job, plate, {.samples = 128});
+    const capture::Image mask = render::affected_mask(truth, plate);
+    const auto off = [&](const capture::Image& picture) {
+      return render::picture_error(picture, truth, mask).relative_rms;
+    };
+    const double error = off(rendered(shot));
+    EXPECT_LT(error, most) << what;
+    EXPECT_GT(off(rendered(shot_of(ball, false))), 1.1 * error) << what;
+    ::testing::Test::RecordProperty(std::string("error_") + what, std::to_string(error));
+  }
+}
+
+// Of a real mirror, too: a floor that mirrors the ball that mirrors the floor.
+TEST(MirroredPlate, IsAsTheReferenceHasItToAndFro) {
+  render::StandInParameters real;
+  real.catches_reflection = 1;
+  real.reflectance = 0.5F;
+  const MadeShot shot = shot_of(metal(0), true, real);
+  const calibrate::Lens lens = lens_of(shot);
+  render::FrameInputs inputs = shot.inputs();
+  inputs.lens = &lens;
+  const capture::Image plate = capture::to_float(shot.plate);
+  const capture::Image truth = render_reference(inputs, shot.job, plate, {.samples = 128});
+  const capture::Image mask = render::affected_mask(truth, plate);
+  const double error = render::picture_error(rendered(shot), truth, mask).relative_rms;
+  EXPECT_LT(error, 0.04);
+  ::testing::Test::RecordProperty("error", std::to_string(error));
+}
+
+// Light that bounces is found apart from what lobes mirror: neither twice nor not at all.
+TEST(MirroredPlate, LeavesBouncedLightOfTheReferenceAsItIs) {
+  render::StandardParameters chalk;
+  chalk.specular = 0;
+  for (const bool blocks : {false, true}) {
+    MadeShot shots[2] = {shot_of(chalk, false), shot_of(chalk, true)};
+    capture::Image pictures[2];
+    for (int i = 0; i < 2; ++i) {
+      render::SceneDescription scene = shots[i].scene->description();
+      scene.instances[0].blocks_light = blocks;
+      scene.instances.pop_back();  // the glass ball, which mirrors
+      shots[i].scene = std::make_unique<render::Scene>(scene);
+      const calibrate::Lens lens = lens_of(shots[i]);
+      render::FrameInputs inputs = shots[i].inputs();
+      inputs.lens = &lens;
+      pictures[i] = render_reference(inputs, shots[i].job, capture::to_float(shots[i].plate),
+                                     {.samples = 32, .bounces = true});
+    }
+    double sum = 0, off = 0;
+    for (std::size_t i = 0; i < pictures[0].pixels.size(); ++i) {
+      sum += pictures[0].pixels[i];
+      off += pictures[1].pixels[i] - pictures[0].pixels[i];
+    }
+    EXPECT_LT(std::abs(off), 0.001 * sum) << blocks;
+  }
+}
+
+// A plate that goes on, and things that move over the floor that a ball mirrors.
+TEST(MirroredPlate, IsTheSameWarmAndCold) {
+  MadeShot shot = shot_of(coated_paint(), true);
+  render::SceneDescription scene = shot.scene->description();
+  scene.materials.push_back(render::make_standard_material("chrome", metal(0.05F)));
+  scene.materials.push_back(render::make_standard_material("chalk", {}));
+  for (const std::uint32_t material : {3U, 4U}) {
+    scene.meshes.push_back(made_ball({0, 0, 0.25F}, 0.25F, material));
+    render::Instance& ball = scene.instances.emplace_back();
+    ball.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
+    ball.moves = true;
+  }
+  for (const bool occludes : {true, false}) {
+    scene.instances[0].occludes = occludes;
+    shot.scene = std::make_unique<render::Scene>(scene);
+    render::KeptTransport kept;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> somewhere(-1.2F, 0.9F);
+    for (int frame = 0; frame < 8; ++frame) {
+      for (capture::Half& half : shot.plate.pixels) {
+        half = capture::half_from_float(0.1F + 0.9F * capture::float_from_half(half));
+      }
+      if (frame % 3 != 2) {
+        auto& place = scene.instances[static_cast<std::size_t>(3 + frame % 2)].set_from_object;
+        place[3] = somewhere(random), place[7] = somewhere(random);
+        shot.scene = std::make_unique<render::Scene>(scene, *shot.scene);
+      }
+      const capture::Image warm = rendered(shot, &kept);
+      EXPECT_EQ(warm.pixels, rendered(shot).pixels) << occludes << " " << frame;
+    }
+  }
+}
+
+// Where nothing tells where the plate is seen, mirrors show the environment.
+TEST(MirroredPlate, IsTheEnvironmentWithoutALens) {
+  const MadeShot mirrored = shot_of(metal(0), true), plain = shot_of(metal(0), false);
+  render::FrameResult with, without;
+  render_frame(mirrored.inputs(), mirrored.job, mirrored.plate, with);
+  render_frame(plain.inputs(), plain.job, plain.plate, without);
+  const capture::Image a = capture::to_float(with.rgba), b = capture::to_float(without.rgba);
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    ASSERT_NEAR(a.pixels[i], b.pixels[i], 0.05) << i;
+}
+
+// A wall that mirrors show hides in them what is behind it.
+TEST(MirroredPlate, HidesWhatIsBehindRealThings) {
+  render::SceneDescription scene = shot_scene(false);
+  scene.materials[1] = render::make_standard_material("silver", metal(0));
+  render::StandardParameters glow;
+  std::fill_n(glow.emission, 3, 5.0F);
+  scene.materials.push_back(render::make_standard_material("lamp", glow));
+  const auto add_wall = [&](float y, float top, std::uint32_t material) {
+    auto wall = std::make_shared<render::Mesh>();
+    wall->positions = {{-4, y, 0}, {4, y, 0}, {4, y, top}, {-4, y, top}};
+    wall->triangles = {{0, 1, 2}, {0, 2, 3}};
+    wall->materials = {material};
+    scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size());
+    scene.meshes.push_back(wall);
+  };
+  add_wall(1.5F, 3, 1);  // the mirror
+  add_wall(-6, 3, 3);    // what glows behind the camera
+  add_wall(-5, 3, 0);    // a real wall before that
+  render::Instance& real = scene.instances.back();
+  real.kind = render::ObjectKind::stand_in;
+  real.blocks_light = false;
+  const auto brightest = [&](bool mirrored) {
+    scene.instances.back().mirrored = mirrored;
+    MadeShot shot = made_shot(64, 48, scene);
+    shot.job.cam_from_set = calibrate::look_at({0, -2.5, 1.2}, {0, 1.5, 1.2}, 0);
+    const capture::Image picture = rendered(shot);
+    return *std::ranges::max_element(picture.pixels);
+  };
+  EXPECT_GT(brightest(false), 4);
+  EXPECT_LT(brightest(true), 1.1F);
+}
+
+}  // namespace
+}  // namespace compositing::mirrored_plate_test
