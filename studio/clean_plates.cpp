@@ -97,7 +97,20 @@ capture::Image read_picture(const std::string& path,
 }
 
 std::string needs_plate(const std::string& uri) {
-  return uri + " is live and needs a clean plate: platelight key plate CAMERA -o plate.exr";
+  return uri +
+         " is live and needs a clean plate: platelight key plate CAMERA -o plate.exr, or plate = "
+         "\"take\"";
+}
+
+std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate) {
+  constexpr double much_elsewhere = 0.1;
+  const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
+  if (elsewhere >= 1) return "the plate has no colour, and is no screen";
+  if (!(elsewhere > much_elsewhere)) return std::nullopt;
+  return fmt::format(
+      "{:.0f} % of the plate is not screen: if somebody is in the picture, take it anew; what else "
+      "it is, a garbage mask is to cut away",
+      100 * elsewhere);
 }
 
 std::string words_for_shift(float right_px, float down_px) {

@@ -25,6 +25,9 @@ capture::Image read_picture(const std::string& path,
                             capture::Transfer transfer,
                             const ShownPart& shown = {});
 
+// What speaks against a plate as one of a screen, in words; nothing of a good one.
+std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate);
+
 // What to do about a live source without a plate.
 std::string needs_plate(const std::string& uri);
 

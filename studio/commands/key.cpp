@@ -33,13 +33,12 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::int64_t plate_frames = 50;
-constexpr double much_elsewhere = 0.1;  // share of a plate that is no screen
-constexpr int plate_footage = 480;      // frames that a clip without a plate is judged by
+constexpr int plate_footage = 480;  // frames that a clip without a plate is judged by
 
 struct KeyOptions {
   std::vector<std::string> what;
   std::string out, plate, response, colour = "Rec.1886", method = "screen", effort = "full";
-  bool person = false;
+  bool person = false, plain_ratio = false, steady_light = false;
   std::optional<std::int64_t> frames, first;
   std::optional<double> screen, core, edge, despill, smoothing;
   KeyMaskFiles masks;
@@ -116,17 +115,12 @@ void make_plate(const KeyOptions& options, Console& console) {
   if (plate.knows_noise) tags.noise = {plate.noise_gain, plate.noise_floor};
   tags.transfer = name_of_light(source);
   capture::write_exr(options.out, plate.light, tags);
-  const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
   const bool by_screen = options.method == "screen";
-  const bool screen = by_screen && elsewhere < 1;
+  const bool screen = by_screen && compositing::screen_share(plate.light, plate.colour) > 0;
   const std::string_view colour = screen ? compositing::name_of(plate.colour) : "no";
-  if (by_screen && elsewhere >= 1) {
-    console.warn("the plate has no colour, and is no screen: --method difference needs none");
-  } else if (by_screen && elsewhere > much_elsewhere) {
-    console.warn(fmt::format(
-        "{:.0f} % of the plate is not screen: if somebody is in the picture, take it anew or with "
-        "--person; what else it is, a garbage mask is to cut away",
-        100 * elsewhere));
+  if (const auto doubts = by_screen ? doubts_of_plate(plate) : std::nullopt) {
+    console.warn(*doubts + (screen ? "; --person is for plates that somebody is in"
+                                   : ": --method difference needs none"));
   }
   Json figures{{"frames", frames},
                {"lost", bad},
@@ -158,6 +152,8 @@ compositing::KeySettings settings_of(const KeyOptions& options) {
   take(options.edge, settings.edge);
   take(options.despill, settings.despill);
   take(options.smoothing, settings.smoothing);
+  settings.learned = !options.plain_ratio;
+  settings.follows_light = !options.steady_light;
   if (options.effort == "quick") settings.effort = compositing::KeyEffort::quick;
   return settings;
 }
@@ -388,6 +384,10 @@ Command key_command() {
         arguments.option("--edge", o->edge, -1, 1, "thinner to fuller");
         arguments.option("--despill", o->despill, 0, 2, "none, 1 all of the likely spill, up to 2");
         arguments.option("--smoothing", o->smoothing, 0, 4, "of alpha over frames");
+        arguments.flag("--plain-ratio", o->plain_ratio,
+                       "in place of the learned table, for screens unlike any");
+        arguments.flag("--steady-light", o->steady_light,
+                       "the light is the plate's: no gain is measured in the frames");
         arguments.choice("--effort", o->effort, {"full", "quick"},
                          "for a frame; quick is for screens of one primary");
         return [o](Console& console) { key(*o, console); };

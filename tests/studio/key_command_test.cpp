@@ -253,6 +253,41 @@ TEST_F(KeyCommand, IsUnsureOfAScreenAtTheCamerasLimit) {
   EXPECT_THAT(keyed.err, HasSubstr("the key is unsure (clipped) in 4 of 4 frames"));
 }
 
+// A lamp has dimmed since the plate was taken.
+TEST_F(KeyCommand, FollowsTheLightOrNotAndKeysByTheTableOrNot) {
+  const compositing::MadeClip clip(compositing::made_scene("plain"), 4, 90, 160);
+  for (int i = 0; i < 4; ++i) {
+    compositing::MadePicture dim = clip.frame(i).seen;
+    for (std::uint8_t& code : dim.codes) code = static_cast<std::uint8_t>(code * 9 / 10);
+    write_picture("dim", i, dim);
+  }
+  ASSERT_EQ(
+      run("key plate " + in("empty_%04d.png") + " --colour sRGB -o " + in("plate.exr")).status, 0);
+  const auto alpha_of = [&](const std::string& flags) {
+    const Outcome keyed = run("key " + in("dim_%04d.png") + " --colour sRGB --plate " +
+                              in("plate.exr") + " -o " + in("keyed") + flags);
+    EXPECT_EQ(keyed.status, 0) << keyed.err;
+    const capture::Image last = capture::read_exr(in("keyed/frame.000003.exr"));
+    std::vector<float> alpha;
+    for (std::size_t i = 3; i < last.pixels.size(); i += 4) alpha.push_back(last.pixels[i]);
+    return alpha;
+  };
+  const auto error_of = [&](const std::vector<float>& alpha) {
+    double squares = 0;
+    for (std::size_t i = 0; i < alpha.size(); ++i) {
+      squares += std::pow(alpha[i] - truth_.pixels[4 * i + 3], 2);
+    }
+    return squares / static_cast<double>(alpha.size());
+  };
+  const std::vector<float> followed = alpha_of("");
+  const double error = error_of(followed);
+  EXPECT_LT(error, 2e-3);
+  EXPECT_GT(error_of(alpha_of(" --steady-light")), 3 * error);
+  const std::vector<float> plain = alpha_of(" --plain-ratio");
+  EXPECT_NE(plain, followed);
+  EXPECT_LT(error_of(plain), 0.02);
+}
+
 TEST_F(KeyCommand, SaysThatAGreyWallIsNoScreen) {
   capture::write_png(dir_ / "grey.png", 40, 20, 3, std::vector<std::uint8_t>(2400, 130));
   const Outcome plate =
