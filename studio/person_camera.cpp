@@ -23,6 +23,7 @@ using compositing::Feet;
 // Feet are looked for in a matte whose longer side is at most so long.
 constexpr int matte_side = 640;
 constexpr capture::Rational rate_of_unknown{25, 1};
+constexpr std::size_t shots_of_plate = 50;
 
 // Alpha of a keyed picture, area-averaged `shrink` times smaller.
 capture::Image matte_of(const compositing::KeyedFrame& keyed, int shrink) {
@@ -141,24 +142,82 @@ PersonCameraFeed::PersonCameraFeed(const PersonCamera& settings,
   }
   if (!s.key) return;
   try {
-    const capture::CameraInfo& info = source_->info();
-    if (s.key->plate.empty() && info.live) {
-      throw std::invalid_argument(needs_plate(s.source));
-    }
-    const ShownPart shown = shown_part(info, source);
-    auto plate =
-        read_clean_plate(s.key->plate, source, s.key->settings.method, s.key->footage, shown);
-    if (plate.light.width != info.width || plate.light.height != info.height) {
-      throw std::invalid_argument(
-          fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", s.key->plate,
-                      plate.light.width, plate.light.height, s.source, info.width, info.height));
-    }
-    keyer_.emplace(std::move(plate), s.key->settings,
-                   read_key_masks(s.key->masks, info.width, info.height, shown));
-    by_texel_ = s.key->by_texel && !options.needs_matte;
+    begin_key(source, before);
   } catch (const std::exception& error) {
     faults.add(s.key->place, error.what());
   }
+}
+
+// The plate as the set has it.
+compositing::CleanPlate PersonCameraFeed::read_plate(const VideoSource& source,
+                                                     const ShownPart& shown) const {
+  const KeyChoice& key = *settings_.key;
+  const capture::CameraInfo& info = source_->info();
+  if (key.plate.empty() && info.live) throw std::invalid_argument(needs_plate(settings_.source));
+  auto plate = read_clean_plate(key.plate, source, key.settings.method, key.footage, shown);
+  if (plate.light.width != info.width || plate.light.height != info.height) {
+    throw std::invalid_argument(fmt::format(
+        "the clean plate {} is {}x{}, but the video {} is {}x{}", key.plate, plate.light.width,
+        plate.light.height, settings_.source, info.width, info.height));
+  }
+  return plate;
+}
+
+void PersonCameraFeed::begin_key(const VideoSource& source, const PersonCameraFeed* before) {
+  const KeyChoice& key = *settings_.key;
+  const capture::CameraInfo& info = source_->info();
+  const ShownPart shown = shown_part(info, source);
+  by_texel_ = key.by_texel && !options_.needs_matte;
+  if (!key.takes_plate) {
+    auto plate = read_plate(source, shown);
+    keyer_.emplace(std::move(plate), key.settings,
+                   read_key_masks(key.masks, info.width, info.height, shown));
+    return;
+  }
+  compositing::KeyMasks masks = read_key_masks(key.masks, info.width, info.height, shown);
+  const bool goes_on = before && before->settings_.key && before->settings_.key->takes_plate &&
+                       before->settings_.key->take == key.take;
+  if (const auto taken = goes_on ? before->taken_->get() : nullptr) {
+    taken_ = before->taken_;
+    keyer_.emplace(*taken, key.settings, std::move(masks));
+    return;
+  }
+  taking_.emplace(compositing::PlateShots(), std::move(masks));
+  key_ = "its plate is being taken";
+  confidence_ = 0;
+  notes_.push_back(fmt::format(
+      "takes its plate of the next {} frames: nobody may be in the picture", shots_of_plate));
+}
+
+void PersonCameraFeed::TakenPlate::put(const compositing::CleanPlate& plate) {
+  const std::lock_guard lock(mutex_);
+  plate_ = std::make_shared<const compositing::CleanPlate>(plate);
+}
+
+std::shared_ptr<const compositing::CleanPlate> PersonCameraFeed::TakenPlate::get() const {
+  const std::lock_guard lock(mutex_);
+  return plate_;
+}
+
+// One more frame of the empty screen; after the last one the key begins.
+void PersonCameraFeed::take_plate() {
+  taking_->shots.add(*image_);
+  if (taking_->shots.count() < shots_of_plate) return;
+  const compositing::KeySettings& settings = settings_.key->settings;
+  const compositing::CleanPlate plate = taking_->shots.average();
+  const bool by_screen = settings.method == compositing::KeyMethod::screen;
+  const auto doubts = by_screen ? doubts_of_plate(plate) : std::nullopt;
+  notes_.push_back(doubts ? "has its plate, but " + *doubts : std::string("has its plate"));
+  keyer_.emplace(plate, settings, std::move(taking_->masks));
+  taken_->put(plate);
+  taking_.reset();
+}
+
+std::vector<std::string> PersonCameraFeed::take_notes() {
+  std::vector<std::string> notes = source_->take_notes();
+  notes.insert(notes.end(), notes_.begin(), notes_.end());
+  notes_.clear();
+  return notes;
 }
 
 bool PersonCameraFeed::serves(const PersonCamera& settings, const Options& options) const {
@@ -192,10 +251,11 @@ void PersonCameraFeed::advance(capture::Time time) {
   pass_ = newest.pass_first;
   image_ = newest.image;
   time_ = newest.time;
+  if (taking_ && newest.status == capture::FrameStatus::good) take_plate();
 }
 
 bool PersonCameraFeed::show() {
-  if (image_ == shown_) return false;
+  if (image_ == shown_ || taking_) return false;
   key_frame();
   shown_ = image_;
   return true;

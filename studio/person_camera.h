@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,7 +16,9 @@
 #include "compositing/keyed_texture.h"
 #include "compositing/keyer.h"
 #include "compositing/picture_window.h"
+#include "compositing/plate_footage.h"
 #include "render/live_picture.h"
+#include "studio/clean_plates.h"
 #include "studio/file_times.h"
 #include "studio/set.h"
 #include "studio/timed_source.h"
@@ -67,7 +70,10 @@ class PersonCameraFeed {
   // How old its picture is at the time that was asked for last, and how long a frame lasts.
   capture::Time age() const { return source_->age(); }
   capture::Time period() const { return period_; }
-  std::vector<std::string> take_notes() { return source_->take_notes(); }
+  std::vector<std::string> take_notes();
+  // Whether the plate is not there yet: it is being taken of the frames that come, and nobody is
+  // shown.
+  bool takes_plate() const { return taking_.has_value(); }
 
   // Keys the newest frame, unless it is already. True if it did.
   bool show();
@@ -81,13 +87,34 @@ class PersonCameraFeed {
   // How far the picture has gone from its plate, if the camera was moved: right and down, pixels.
   std::optional<std::array<float, 2>> moved_px() const { return moved_px_; }
   const compositing::Feet& feet() const { return feet_; }
-  bool sees_nobody() const { return has_matte_ && feet_.status == compositing::FeetStatus::absent; }
+  bool sees_nobody() const {
+    return taking_ || (has_matte_ && feet_.status == compositing::FeetStatus::absent);
+  }
   // Edges of the person, and of all that may be its, in pixels: left, top, right, bottom. The whole
   // picture where there is no matte.
   std::array<float, 4> person_box() const;
   std::array<float, 4> outline() const;
 
  private:
+  // A plate that was taken on air, for those that go on with the same settings of it: they are made
+  // while this one runs.
+  class TakenPlate {
+   public:
+    void put(const compositing::CleanPlate& plate);
+    std::shared_ptr<const compositing::CleanPlate> get() const;
+
+   private:
+    mutable std::mutex mutex_;
+    std::shared_ptr<const compositing::CleanPlate> plate_;
+  };
+  struct PlateTaking {
+    compositing::PlateShots shots;
+    compositing::KeyMasks masks;
+  };
+
+  compositing::CleanPlate read_plate(const VideoSource& source, const ShownPart& shown) const;
+  void begin_key(const VideoSource& source, const PersonCameraFeed* before);
+  void take_plate();
   void key_frame();
   void show_keyed(std::shared_ptr<const compositing::KeyedTexture> texture);
   void look_for_person(const compositing::KeyedFrame& keyed);
@@ -100,6 +127,9 @@ class PersonCameraFeed {
   VideoSource opened_;  // as source_ was
   std::shared_ptr<TimedSource> source_;
   std::optional<compositing::Keyer> keyer_;
+  std::optional<PlateTaking> taking_;
+  std::shared_ptr<TakenPlate> taken_ = std::make_shared<TakenPlate>();
+  std::vector<std::string> notes_;
   float aspect_ = 1;
   capture::Time period_{}, time_{};
   std::shared_ptr<const capture::Image> image_, shown_;  // newest; that the picture was made from

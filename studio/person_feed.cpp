@@ -253,7 +253,8 @@ void PersonFeed::show(Person& person, std::size_t index) {
   const auto moved = camera.feed.moved_px();
   if (moved && !camera.moved) {
     person.notes.push_back(fmt::format(
-        "{}: its camera was moved: {}. Take the plate anew (platelight key plate), and its pose",
+        "{}: its camera was moved: {}. Take the plate anew (platelight key plate, or plate = "
+        "\"take\" and another number of `take`), and its pose",
         person.name_of(index), words_for_shift((*moved)[0], (*moved)[1])));
   }
   camera.moved = moved.has_value();

@@ -187,7 +187,9 @@ struct VideoSettings {
 // How a person is cut out of a video.
 struct KeyChoice {
   std::string plate;                   // file of the empty screen; "" = from the footage alone:
-  std::array<int, 2> footage{0, 479};  // these of its frames, first and last
+  std::array<int, 2> footage{0, 479};  // these of its frames, first and last;
+  bool takes_plate = false;            // or from the video's next frames, before which nobody is;
+  std::int64_t take = 0;               // of another number, anew
   KeyMaskFiles masks;
   bool by_texel = false;  // filtered, then keyed where rays see it; else whole frames are keyed
   compositing::KeySettings settings;

@@ -27,9 +27,12 @@ KeyChoice read_key(Section table, const SetContext& context) {
   key.place = table.place_of("plate");
   std::string plate = "auto";
   table.text("plate", plate);
-  if (plate != "auto") table.file("plate", context.base, key.plate);
+  key.takes_plate = plate == "take";
+  if (plate != "auto" && !key.takes_plate) table.file("plate", context.base, key.plate);
+  table.integer("take", key.take, 0, 1'000'000'000);
+  table.of_use_only(key.takes_plate, "take", "plate = \"take\"");
   if (table.integers("footage", key.footage, 0, 1'000'000'000)) {
-    if (!key.plate.empty()) table.fault("footage", "is for plate = \"auto\"");
+    if (plate != "auto") table.fault("footage", "is for plate = \"auto\"");
     if (key.footage[1] < key.footage[0]) table.fault("footage", "ends before it begins");
   }
   std::string method = "screen";

@@ -1,0 +1,152 @@
+// Plates that a show takes of its persons' cameras itself.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+#include <string>
+#include <vector>
+
+#include "capture/camera.h"
+#include "studio/person_feed.h"
+#include "studio/set.h"
+#include "tests/made_files.h"
+#include "tests/studio/made_show.h"
+
+namespace studio::taken_plate_test {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// A green screen of 64x48 with a little noise, whose light is `light`. From frame 60 to 89 a red
+// thing stands before it; from frame 100 on the light is half, and from 170 on the thing is back.
+class Stage final : public capture::Camera {
+ public:
+  Stage() {
+    info_.width = 64;
+    info_.height = 48;
+    info_.rate = {25, 1};
+  }
+  const capture::CameraInfo& info() const override { return info_; }
+  capture::CameraStatistics statistics() const override { return {}; }
+  std::optional<capture::Frame> next() override {
+    auto image = std::make_shared<capture::Image>(capture::make_image(48, 64));
+    const bool there = (number_ >= 60 && number_ < 90) || number_ >= 170;
+    const float light = number_ < 100 ? 1.0F : 0.5F;
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        const bool red = there && x > 20 && x < 40 && y > 10;
+        const std::array colour =
+            red ? std::array{0.4F, 0.05F, 0.05F} : std::array{0.05F, 0.4F, 0.08F};
+        for (int c = 0; c < 3; ++c) {
+          image->at(y, x, c) = light * colour[static_cast<std::size_t>(c)] + noise_(random_);
+        }
+      }
+    }
+    capture::Frame frame;
+    frame.image = std::move(image);
+    frame.number = number_;
+    frame.time = capture::time_of_frame(number_++, info_.rate);
+    return frame;
+  }
+
+ private:
+  capture::CameraInfo info_;
+  std::mt19937 random_{3};
+  std::uniform_real_distribution<float> noise_{0, 0.002F};
+  std::int64_t number_ = 0;
+};
+
+class TakenPlate : public MadeShowTest {
+ protected:
+  static void SetUpTestSuite() {
+    MadeShowTest::SetUpTestSuite();
+    capture::register_camera("stage", [](std::string_view, const capture::CameraOptions&) {
+      return std::make_unique<Stage>();
+    });
+  }
+  Set set_with(const std::string& key) const {
+    return made_set("grey:500,25,0",
+                    "[[billboard]]\nname = \"she\"\nposition = [0, -1, 0]\nheight = 1.7\n"
+                    "source = \"stage:\"\n[billboard.key]\nplate = \"take\"\n" +
+                        key);
+  }
+};
+
+// Pictures up to one frame; how it is keyed then.
+PersonStatus show_until(PersonFeed& feed, const Set& set, int& from, int to) {
+  PersonStatus status;
+  for (; from <= to; ++from) {
+    status =
+        feed.at(capture::time_of_frame(from, {25, 1}), set.camera.pose.cam_from_set).front().status;
+  }
+  return status;
+}
+
+TEST_F(TakenPlate, IsOfTheFirstFramesAndThenKeys) {
+  const Set set = set_with("");
+  PersonFeed feed(set, std::nullopt, false);
+  int at = 0;
+  PersonStatus status = show_until(feed, set, at, 20);
+  EXPECT_EQ(status.key, "its plate is being taken");
+  EXPECT_EQ(status.confidence, 0);
+  EXPECT_THAT(
+      feed.take_notes(),
+      ElementsAre("she takes its plate of the next 50 frames: nobody may be in the picture"));
+  status = show_until(feed, set, at, 75);
+  EXPECT_EQ(status.key, "good");
+  EXPECT_GT(status.confidence, 0.9F);
+  EXPECT_THAT(feed.take_notes(), ElementsAre("she has its plate"));
+}
+
+// The screen's light is another, for good: the plate is taken anew while the show runs.
+TEST_F(TakenPlate, IsTakenAnewForAnotherNumberAndElseStays) {
+  const Set set = set_with("");
+  PersonFeed feed(set, std::nullopt, false);
+  int at = 0;
+  show_until(feed, set, at, 75);
+  feed.take_notes();
+
+  const Set despilled = set_with("despill = 2\n");
+  PersonFeed goes_on(despilled, std::nullopt, false, &feed);
+  goes_on.take_over();
+  EXPECT_EQ(show_until(goes_on, despilled, at, 80).key, "good");
+  EXPECT_THAT(goes_on.take_notes(), IsEmpty());
+
+  show_until(goes_on, despilled, at, 105);
+  const Set anew = set_with("take = 1\n");
+  PersonFeed again(anew, std::nullopt, false, &goes_on);
+  again.take_over();
+  EXPECT_EQ(show_until(again, anew, at, 150).key, "its plate is being taken");
+  EXPECT_EQ(show_until(again, anew, at, 180).key, "good");
+  EXPECT_THAT(again.take_notes(), ElementsAre(HasSubstr("of the next 50"), "she has its plate"));
+}
+
+TEST_F(TakenPlate, TellsThatSomebodyMayHaveBeenInThePicture) {
+  const Set set = set_with("");
+  PersonFeed feed(set, capture::Time{0}, false);
+  int at = 170;
+  show_until(feed, set, at, 240);
+  EXPECT_THAT(feed.take_notes(), Contains(HasSubstr("she has its plate, but")));
+}
+
+TEST_F(TakenPlate, IsReadFromTheSet) {
+  const Set set = set_with("take = 7\n");
+  const KeyChoice& key = *set.persons.front().cameras.front().key;
+  EXPECT_TRUE(key.takes_plate);
+  EXPECT_EQ(key.take, 7);
+  EXPECT_THAT(key.plate, IsEmpty());
+  try {
+    made_set("grey:500,25,0",
+             "[[billboard]]\nposition = [0, -1, 0]\nheight = 1.7\nsource = \"stage:\"\n"
+             "[billboard.key]\ntake = 7\n");
+    FAIL();
+  } catch (const SetError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("take"));
+  }
+}
+
+}  // namespace
+}  // namespace studio::taken_plate_test
