@@ -29,15 +29,18 @@ void blur_screen(Image& light) {
   pass(light.height, light.width, [&](int x, int y, int c) -> float& { return light.at(y, x, c); });
 }
 
-float screen_share(const Image& light, ScreenColour colour) {
+float screen_share(const Image& light,
+                   ScreenColour colour,
+                   std::span<const std::uint8_t> garbage) {
   const ScreenLight key = find_key(spread_pixels(light), colour);
   if (key.excess <= 0) return 0;
-  const std::size_t pixels = light.pixels.size() / 3;
-  std::size_t screen = 0;
-  for (std::size_t i = 0; i < pixels; ++i) {
+  std::size_t pixels = 0, screen = 0;
+  for (std::size_t i = 0; i < light.pixels.size() / 3; ++i) {
+    if (!garbage.empty() && garbage[i] == 255) continue;
+    ++pixels;
     screen += is_screen(screen_light(clean_light(&light.pixels[3 * i]), colour), key) ? 1 : 0;
   }
-  return static_cast<float>(screen) / static_cast<float>(pixels);
+  return pixels > 0 ? static_cast<float>(screen) / static_cast<float>(pixels) : 1.0F;
 }
 
 ScreenColour mean_colour(const Image& light) {

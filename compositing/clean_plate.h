@@ -50,8 +50,10 @@ CleanPlate average_plate(std::span<const capture::Image> frames);
 void blur_screen(capture::Image& light);
 
 // How much of a plate looks as its screen does, 0..1; 0 of a grey one. (height, width, 3), not
-// empty.
-float screen_share(const capture::Image& light, ScreenColour colour);
+// empty. `garbage`: (height, width), 255 = does not count, or empty.
+float screen_share(const capture::Image& light,
+                   ScreenColour colour,
+                   std::span<const std::uint8_t> garbage = {});
 
 // The colour of a picture's mean. (height, width, 3), not empty.
 ScreenColour mean_colour(const capture::Image& light);

@@ -111,6 +111,7 @@ bool CellBaker::find(int stage, bool past_pictures) {
   places_.clear(*frame.planned, frame.planned_levels);
   compact_shares_.clear();
   lamps_apart_.fill(0);
+  sees_mirrored_.fill(0);
   is_first_.fill(0);
   sent_.fill(0);
   looked_up_.direction = {};
@@ -296,6 +297,7 @@ void CellBaker::shade_points(int count, bool grid) {
       p->catches_shadow = p->catches_lamps = false;
     }
   });
+  if (!grid) find_plate(count);
   receive(count, grid);
   find_open_sky(count, grid);
   if (grid) {

@@ -79,11 +79,12 @@ class CellBaker final : public RaySink {
     std::uint8_t depth;
     std::uint16_t behind;  // the picture ray that its path began with last, or none
     bool one_of_many;      // of rays all over a rough lobe: its compact light is found apart
-    bool lamps_apart;  // and so are the lamps that it mirrors: it does not see what glows by them
-    bool beyond_cut;   // followed by chance: what is straight on is counted, for all that are not
-    bool first;        // that a centre sent on, or the brightest of several
-    bool asks;         // it is cut, and only asks whether anything is in its way
-    bool by_lights;    // in a lobe of whose light `open_lobes_` tells as well
+    bool lamps_apart;    // and so are the lamps that it mirrors: it does not see what glows by them
+    bool beyond_cut;     // followed by chance: what is straight on is counted, for all that are not
+    bool first;          // that a centre sent on, or the brightest of several
+    bool asks;           // it is cut, and only asks whether anything is in its way
+    bool by_lights;      // in a lobe of whose light `open_lobes_` tells as well
+    bool sees_mirrored;  // what is virtual has turned it: stand-ins that are mirrored show
     std::uint32_t path;
     Media media;
   };
@@ -159,6 +160,17 @@ class CellBaker final : public RaySink {
     float weight;  // of its points together
   };
   using PaintedOfPixel = std::array<PaintedSlot, CellTransport::most_painted_of_pixel>;
+
+  // How a ray that is not straight on sees the plate, and what it sees where it does not.
+  struct PlateView {
+    Vec3f sees;  // the environment, there
+    float roughness = 0;
+    Spread spread;
+    bool one_of_many = false;
+    bool mirrored = false;  // else bent
+    float share = 0;        // of the plate
+    double x = 0, y = 0;    // in its pixels
+  };
 
   // Of points: the irradiance that is planned.
   struct Light {
@@ -306,6 +318,15 @@ class CellBaker final : public RaySink {
   void meet_surroundings(const QueuedRay& ray, std::size_t stream_index);
   void meet_plate(const QueuedRay& ray, std::size_t stream_index);
   bool meets_plate(const QueuedRay& ray, std::size_t stream_index) const;
+  unsigned mask_of(const QueuedRay& ray) const;
+  static PlateView view_of(const QueuedRay& ray) {
+    return {.sees = ray.sees,
+            .roughness = ray.roughness,
+            .spread = ray.spread,
+            .one_of_many = ray.one_of_many,
+            .mirrored = true};
+  }
+  bool is_behind_mirrored(const ShadePoint& p, Vec3f direction, float far_m);
 
   // cell_cut_rays.cpp
   void note_cut_ray(const ShadePoint& from, Vec3f throughput, LookUp& sees, bool rough);
@@ -318,6 +339,8 @@ class CellBaker final : public RaySink {
   bool may_be_lit_as_centres(const ShadePoint& p) const;
   CellMask find_mirrored(int count, std::span<const std::uint8_t> glossy);
   bool mirrors_smoothly(std::size_t first) const;
+  void find_near_plate(std::size_t first, CellMask& found) const;
+  static bool mirror_alike(const ShadePoint& a, const ShadePoint& b);
   void receive_mirrored(int count, std::span<const std::uint8_t> glossy);
   void light_mirrored(const CellMask& mirrored);
   void receive_lamps(std::span<const std::uint16_t> points);
@@ -366,14 +389,20 @@ class CellBaker final : public RaySink {
   // cell_bent.cpp
   void leave_bent(
       std::size_t slot, std::size_t target, Vec3f direction, const Spread& spread, Vec3f weight);
+  void find_plate(int count);
+  void find_plate(std::optional<calibrate::Vec2> q, PlateView& view) const;
+  calibrate::Vec3 from_camera(const ShadePoint& p) const;
   void add_bent(const ShadePoint& p, Vec3f weight, std::uint32_t shadow_point);
-  float add_plate(std::size_t slot,
-                  std::size_t target,
-                  Vec3f from_camera,
-                  float width_rad,
-                  Vec3f planned_direction,
-                  Vec3f weight,
-                  std::uint32_t shadow_point);
+  void add_bent(const ShadePoint& p,
+                Vec3f weight,
+                std::uint32_t shadow_point,
+                const PlateView& view);
+  void add_plate(std::size_t slot,
+                 std::size_t target,
+                 const PlateView& view,
+                 float width_rad,
+                 Vec3f weight,
+                 std::uint32_t shadow_point);
 
   // cell_pack.cpp
   void pack();
@@ -455,9 +484,11 @@ class CellBaker final : public RaySink {
   std::array<Light, stream_rays> light_of_point_;
   std::array<ShadePoint*, stream_rays> group_;
   std::array<std::uint8_t, stream_rays> done_;
-  std::array<std::uint8_t, stream_rays> lamps_apart_;   // of the rays that met the points
-  std::array<std::uint8_t, stream_rays> is_first_;      // as QueuedRay::first, of the points
-  std::array<std::uint16_t, cell_pixels> mirrored_at_;  // point that a centre mirrors, or nowhere
+  std::array<std::uint8_t, stream_rays> lamps_apart_;    // of the rays that met the points
+  std::array<std::uint8_t, stream_rays> sees_mirrored_;  // the same
+  std::array<PlateView, stream_rays> plate_views_;       // of points that see the plate so
+  std::array<std::uint8_t, stream_rays> is_first_;       // as QueuedRay::first, of the points
+  std::array<std::uint16_t, cell_pixels> mirrored_at_;   // point that a centre mirrors, or nowhere
   // What centres mirror, where the transport has its light.
   struct MirroredHit {
     std::uint32_t instance, material;
@@ -486,6 +517,8 @@ class CellBaker final : public RaySink {
   EnvironmentPlaces places_;
   PlaceTerms bent_, video_, paint_;  // of slots; the last of painted ones
   std::vector<KeyedPlace> shaded_of_point_;
+  std::vector<std::uint16_t> seen_elsewhere_;  // points; and where they are from the camera
+  std::vector<calibrate::Vec3> places_elsewhere_;
   std::array<std::uint32_t, stream_rays> catcher_of_receiver_;
   std::array<std::uint32_t, stream_rays> bent_of_receiver_;  // shadow points of bent plate
   std::vector<Lobe> lobes_;

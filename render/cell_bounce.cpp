@@ -2,39 +2,31 @@
 #include <algorithm>
 #include <limits>
 
+#include "calibrate/lens.h"
 #include "render/cell_baker.h"
 #include "render/cones.h"
 #include "render/embree_context.h"
 #include "render/trace.h"
 
 namespace render {
-namespace {
-
-// What rays of a kind see, that surfaces send on.
-unsigned mask_of(RayKind kind) {
-  switch (kind) {
-    case RayKind::camera:
-    case RayKind::bent:
-      return mask_virtual | mask_stand_in;
-    case RayKind::reflection:
-      return mask_virtual | mask_mirrored;
-    case RayKind::difference:  // the plate shows already what real surfaces mirror of each other
-    case RayKind::shadow:
-      return mask_virtual;
-  }
-  return mask_virtual;
+// What a ray sees that surfaces send on. Of those from real surfaces, the plate shows already what
+// they mirror of each other.
+unsigned CellBaker::mask_of(const QueuedRay& ray) const {
+  if (ray.kind == RayKind::camera || ray.kind == RayKind::bent) return mask_virtual | mask_stand_in;
+  return ray.sees_mirrored ? mask_virtual | mask_mirrored : mask_virtual;
 }
-
-}  // namespace
 
 // The space that the stream's rays passed, up to what they met.
 void CellBaker::mark_passed(std::size_t count) {
   const RayStream& s = stream_;
-  const unsigned sees_through =
-      frame_->inputs.scene->has_standing_back() ? mask_stand_in | mask_mirrored : 0U;
+  const bool stands_back = frame_->inputs.scene->has_standing_back();
   for (std::size_t i = 0; i < count; ++i) {
     // A real surface may let a ray see what is behind it.
-    const float far_m = s.mask[i] & sees_through ? ray_far : s.far_m[i];
+    const bool met = s.geom[i] != RTC_INVALID_GEOMETRY_ID;
+    const bool on = stands_back &&
+                    ((s.mask[i] & mask_stand_in) != 0 || ((s.mask[i] & mask_mirrored) != 0 && met &&
+                                                          !hides_pictures(static_cast<int>(i))));
+    const float far_m = on ? ray_far : s.far_m[i];
     grid_->mark_line({s.ox[i], s.oy[i], s.oz[i]}, {s.dx[i], s.dy[i], s.dz[i]}, far_m,
                      transport_->reach.passed);
   }
@@ -62,14 +54,24 @@ void CellBaker::meet_plate(const QueuedRay& ray, std::size_t i) {
   set_point(p, static_cast<int>(i), ray.pixel, ray.slot);
   arrive_bounced(p, ray.steps, ray.spread, ray.roughness, ray.one_of_many, stream_.far_m[i]);
   p.behind = ray.behind;
-  add_bent(p, ray.throughput, unshaded);
+  PlateView view = view_of(ray);
+  if (frame_->lens) find_plate(calibrate::project(*frame_->lens, from_camera(p)), view);
+  add_bent(p, ray.throughput, unshaded, view);
+}
+
+// A light, or lamp, that what lobes mirror of the plate hides: there the plate shows it, if at all.
+bool CellBaker::is_behind_mirrored(const ShadePoint& p, Vec3f direction, float far_m) {
+  const Scene& scene = *frame_->inputs.scene;
+  if (!scene.has_mirrored()) return false;
+  ++statistics_->shadow_rays;
+  return transmittance(scene, offset_origin(p.hit, direction), direction, 0, far_m, mask_mirrored,
+                       gather_.pictures) == Vec3f{};
 }
 
 // Whether a mirrored ray meets a stand-in, and sees the plate there.
 bool CellBaker::meets_plate(const QueuedRay& ray, std::size_t i) const {
   const Scene& scene = *frame_->inputs.scene;
-  if (!scene.has_mirrored() || ray.kind != RayKind::reflection ||
-      stream_.geom[i] == RTC_INVALID_GEOMETRY_ID) {
+  if (!ray.sees_mirrored || stream_.geom[i] == RTC_INVALID_GEOMETRY_ID) {
     return false;
   }
   const auto met = scene.surface_of(stream_.geom[i], stream_.prim[i], stream_.inst[i]);
@@ -90,7 +92,7 @@ void CellBaker::bounce() {
       stream_.ox[i] = q.origin.x, stream_.oy[i] = q.origin.y, stream_.oz[i] = q.origin.z;
       stream_.dx[i] = q.direction.x, stream_.dy[i] = q.direction.y, stream_.dz[i] = q.direction.z;
       stream_.near_m[i] = 0;
-      stream_.mask[i] = mask_of(q.kind);
+      stream_.mask[i] = mask_of(q);
     }
     trace(static_cast<int>(n), false, RayKind::reflection, std::numeric_limits<float>::infinity());
     if (grid_) mark_passed(n);
@@ -151,6 +153,9 @@ void CellBaker::bounce() {
             p.throughput * passed_through(*frame_->inputs.scene, q.media, stream_.far_m[i]);
       }
       if (hit) {
+        const auto k = static_cast<std::size_t>(count - 1);
+        sees_mirrored_[k] = q.sees_mirrored;
+        plate_views_[k] = in_plate ? view_of(q) : PlateView{.sees = q.direction, .spread = {}};
         lamps_apart_[static_cast<std::size_t>(count - 1)] = q.lamps_apart;
         is_first_[static_cast<std::size_t>(count - 1)] = q.first;
       }
@@ -168,6 +173,7 @@ void CellBaker::bounce() {
     shade_points(count, false);
   }
   lamps_apart_.fill(0);
+  sees_mirrored_.fill(0);
   is_first_.fill(0);
 }
 

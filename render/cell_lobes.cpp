@@ -226,6 +226,9 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
     ray.throughput = ray.throughput * (1 / followed);
     ray.spread = cone;
   }
+  const bool turned = ray.direction != from.incoming || sees_mirrored_[index_of(from)] != 0;
+  const bool sees_mirrored =
+      turned && ray.kind == RayKind::reflection && frame_->inputs.scene->has_mirrored();
   ++sent_[from.pixel];
   queue_.push_back({.origin = ray.origin,
                     .direction = ray.direction,
@@ -245,6 +248,7 @@ void CellBaker::push(const ShadePoint& from, const NewRay& asked) {
                     .first = false,
                     .asks = asks,
                     .by_lights = by_lights,
+                    .sees_mirrored = sees_mirrored,
                     .path = next_path(from.path, pushed_),
                     .media = media});
 }
@@ -419,10 +423,11 @@ void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share)
   const float density = compact_density(lobe, light) * lobe.share;
   if (!(density > 0)) return;
   const ShadePoint& p = *lobe.point;
+  const Vec3f direction = frame_->planned_table->lights[light].direction;
+  if (!lobe.difference && is_behind_mirrored(p, direction, ray_far)) return;
   const Vec3f weight = lobe.throughput * share * density;
   if (past_pictures_) {
-    add_light_past_pictures(p, target_of(p), frame_->planned_table->lights[light].direction, light,
-                            weight);
+    add_light_past_pictures(p, target_of(p), direction, light, weight);
   } else {
     lights_.add(
         {static_cast<std::uint16_t>(target_of(p)), static_cast<std::uint16_t>(light), weight});

@@ -38,9 +38,9 @@ bool CellBaker::may_be_lit_as_centres(const ShadePoint& p) const {
   return p.catches_shadow ? p.kind == RayKind::bent && !frame_->caustics : p.diffuse != Vec3f{};
 }
 
-// Which pixels' centres mirror what may get its light as centres do: all that see the plate there,
-// for what their lights are would be kept one by one; and those of 4x4 pixels that see one smooth
-// surface, which mirrors no light itself.
+// Which pixels' centres mirror what may get its light as centres do: those of 4x4 pixels that see
+// one smooth surface there, which mirrors no light itself; of the plate, some of these are enough,
+// for else its lights are kept one by one.
 CellMask CellBaker::find_mirrored(int count, std::span<const std::uint8_t> glossy) {
   mirrored_at_.fill(nowhere);
   CellMask found{};
@@ -50,29 +50,51 @@ CellMask CellBaker::find_mirrored(int count, std::span<const std::uint8_t> gloss
     if (!is_first_[i] || glossy[i] || !may_be_lit_as_centres(p)) continue;
     mirrored_at_[p.pixel] = static_cast<std::uint16_t>(i);
     any = true;
-    if (p.catches_shadow) found[p.pixel / 64] |= std::uint64_t{1} << (p.pixel % 64);
   }
   for (std::size_t block = 0; any && block < 16; ++block) {
     const std::size_t first = block / 4 * 4 * cell_size + block % 4 * 4;
-    if (mirrors_smoothly(first)) found[first / 64] |= block4 << (first % 64);
+    if (mirrors_smoothly(first)) {
+      found[first / 64] |= block4 << (first % 64);
+    } else {
+      find_near_plate(first, found);
+    }
   }
   return found;
 }
 
-bool CellBaker::mirrors_smoothly(std::size_t first) const {
+// Of a block that mirrors the plate in part, what lies together.
+void CellBaker::find_near_plate(std::size_t first, CellMask& found) const {
+  constexpr std::size_t worth_it = 5;
+  std::array<std::size_t, 16> near;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < 16; ++i) {
+    const std::size_t k = first + i / 4 * cell_size + i % 4;
+    if (mirrored_at_[k] == nowhere || !points_[mirrored_at_[k]].catches_shadow) continue;
+    if (count == 0 || mirror_alike(points_[mirrored_at_[near[0]]], points_[mirrored_at_[k]])) {
+      near[count++] = k;
+    }
+  }
+  if (count < worth_it) return;
+  for (const std::size_t k : std::span(near).first(count)) {
+    found[k / 64] |= std::uint64_t{1} << (k % 64);
+  }
+}
+
+// Whether two pixels of a block see one smooth surface, near by.
+bool CellBaker::mirror_alike(const ShadePoint& a, const ShadePoint& b) {
   constexpr float apart = 8;  // how far pixels of a block are, at most, by their cones
+  const float wide_m = apart * (length(a.steps.a) + length(a.steps.b));
+  return a.hit.instance == b.hit.instance && a.hit.material == b.hit.material &&
+         dot(a.light_normal, b.light_normal) > alike_normals &&
+         length(b.hit.position - a.hit.position) < wide_m;
+}
+
+bool CellBaker::mirrors_smoothly(std::size_t first) const {
   if (mirrored_at_[first] == nowhere) return false;
   const ShadePoint& a = points_[mirrored_at_[first]];
-  const float wide_m = apart * (length(a.steps.a) + length(a.steps.b));
   for (std::size_t i = 1; i < 16; ++i) {
     const std::size_t k = first + i / 4 * cell_size + i % 4;
-    if (mirrored_at_[k] == nowhere) return false;
-    const ShadePoint& b = points_[mirrored_at_[k]];
-    if (a.hit.instance != b.hit.instance || a.hit.material != b.hit.material ||
-        !(dot(a.light_normal, b.light_normal) > alike_normals) ||
-        !(length(b.hit.position - a.hit.position) < wide_m)) {
-      return false;
-    }
+    if (mirrored_at_[k] == nowhere || !mirror_alike(a, points_[mirrored_at_[k]])) return false;
   }
   return true;
 }

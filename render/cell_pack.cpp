@@ -94,7 +94,7 @@ void CellBaker::join_shaded_places() {
   const auto key = [](const CellTransport::ShadedPlate& t) {
     return std::uint64_t{t.term.slot} << 32 | t.point;
   };
-  std::ranges::stable_sort(terms, {}, key);
+  std::ranges::sort(terms, {}, key);
   std::size_t kept = 0;
   for (std::size_t i = 0; i < terms.size();) {
     const std::uint64_t same = key(terms[i]);

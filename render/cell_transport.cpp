@@ -332,9 +332,10 @@ Vec3f plate_at(const capture::Image& level, float x, float y) {
   return between(top) * (1 - v) + between(low) * v;
 }
 
-float plate_share_at(const capture::Image& plate, double x, double y) {
+float plate_share_at(const capture::Image& plate, double x, double y, bool mirrored) {
   constexpr double faded = 1.0 / 16;  // of the shorter side
   const double inside = std::min({x + 0.5, plate.width - 0.5 - x, y + 0.5, plate.height - 0.5 - y});
+  if (!mirrored) return inside >= 0 ? 1 : 0;
   const double width = faded * std::min(plate.width, plate.height);
   return static_cast<float>(std::clamp(inside / width, 0.0, 1.0));
 }

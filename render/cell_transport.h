@@ -274,9 +274,9 @@ inline Vec3f brightening(Vec3f open, Vec3f gathered) {
 // A picture's value at a place in its pixels, bilinear; the outermost go on beyond its edge.
 Vec3f plate_at(const capture::Image& level, float x, float y);
 // How much rays that see the plate elsewhere than behind their own pixel see of it at a place in
-// its pixels: nothing beyond its edge, where they see the environment, and less and less towards
-// it, so that no seam shows.
-float plate_share_at(const capture::Image& plate, double x, double y);
+// its pixels: nothing beyond its edge, where they see the environment; and, `mirrored`, less and
+// less towards it, so that no seam shows.
+float plate_share_at(const capture::Image& plate, double x, double y, bool mirrored);
 
 // What live pictures do in a frame to a cell that was found without them.
 struct CellPictures {

@@ -306,10 +306,11 @@ void add_levels(FrameContext& context) {
       inputs.kept ? inputs.kept->bordered_levels() : std::make_shared<BorderedLevels>();
   bordered->begin(context.levels);
   context.bordered = bordered;
-  const bool bends = inputs.scene->has_glass() || inputs.scene->has_mirrored();
+  const bool bends = (inputs.scene->has_glass() || inputs.scene->has_mirrored()) &&
+                     inputs.scene->description().background != "environment";
   if (bends && inputs.plate != nullptr && inputs.lens != nullptr) {
     const auto plate = inputs.kept ? inputs.kept->plate_levels() : std::make_shared<PlateLevels>();
-    plate->fill(*inputs.plate);
+    plate->fill(*inputs.plate, *inputs.directions);
     context.plate_levels = plate;
     context.lens = *inputs.lens;
     for (const capture::Image& level : plate->all()) context.levels.push_back(&level);

@@ -37,7 +37,7 @@ struct DataKey {
 struct FrameKeys {
   std::uint64_t transport = 0;  // all that cells' transport depends on, but things that move
   DataKey light;                // what lights it, but live textures and the plate
-  DataKey plate_levels;         // the plate as clear bodies show it
+  DataKey plate_levels;         // the plate as clear bodies and mirrors show it
 };
 
 // While camera, lens, light directions and effort stay, a frame under other light takes no ray; and
@@ -69,7 +69,7 @@ class KeptTransport {
   // where the cell is not kept, or if the memory is used up.
   LitCell* place_lit(int column, int row);
   const FrameKeys& keys() const { return keys_; }
-  // Whether any cell was kept that clear bodies show the plate in.
+  // Whether any cell was kept that shows the plate in clear bodies or mirrors.
   bool bends_plate() const { return bends_plate_; }
 
   // Of all cells, row by row: the stage that they are kept at, or `none`.

@@ -400,6 +400,7 @@ void PathTracer::pass_glass(Walk& w, const HitPoint& hit, SampleSequence& number
     w.share = only(w.share, 1 / chance);
   }
   if (w.kind == RayKind::camera) w.kind = RayKind::bent;
+  if (w.mirrors_plate && w.kind == RayKind::reflection && !w.left_diffuse) w.mask |= mask_mirrored;
   w.density = certain;
   const float ratio = crossing.ratio[channel];
   if (numbers.next() < fresnel(-dot(w.direction, hit.normal), ratio)) {
@@ -445,7 +446,8 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     const auto met = closest_hit(scene_, w.origin, w.direction, 0, w.mask, w.kind);
     if (!met) {
       if (sees_plate(w)) {
-        w.result.ends.push_back({w.share, w.kind == RayKind::bent, std::nullopt, w.direction});
+        w.result.ends.push_back(
+            {w.share, w.kind == RayKind::bent, false, std::nullopt, w.direction});
       } else {
         add_sky(w, w.result.radiance);
       }
@@ -461,7 +463,8 @@ void PathTracer::walk(Walk& w, SampleSequence& numbers) const {
     const Instance& instance = scene_.description().instances[hit.instance];
     const bool real = instance.kind == ObjectKind::stand_in;
     if (real && ends_at(w, instance)) {
-      w.result.ends.push_back({w.share, w.kind != RayKind::camera, hit, w.direction});
+      w.result.ends.push_back(
+          {w.share, w.kind != RayKind::camera, w.kind == RayKind::reflection, hit, w.direction});
       break;
     }
     w.met_virtual = w.met_virtual || !real;
@@ -525,7 +528,7 @@ CameraPath PathTracer::camera_path(Vec3f origin, Vec3f direction, SampleSequence
   w.origin = origin;
   w.direction = direction;
   w.mask = rules_.camera_mask;
-  w.mirrors_plate = rules_.mirrors_plate && !rules_.sees_background && scene_.has_mirrored();
+  w.mirrors_plate = !rules_.sees_background && scene_.has_mirrored();
   walk(w, numbers);
   return std::move(w.result);
 }
@@ -539,7 +542,7 @@ PathTracer::Scattered PathTracer::scattered_path(Vec3f origin,
   w.direction = direction;
   w.mask = mask;
   w.kind = RayKind::reflection;
-  w.mirrors_plate = rules_.mirrors_plate && scene_.has_mirrored();
+  w.mirrors_plate = scene_.has_mirrored();
   walk(w, numbers);
   return {w.result.radiance, w.met_virtual, std::move(w.result.ends)};
 }

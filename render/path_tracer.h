@@ -18,7 +18,6 @@ namespace render {
 struct PathRules {
   bool diffuse_bounces = false;  // follow light between diffuse surfaces
   bool sees_background = false;  // a camera path that leaves the scene sees the environment
-  bool mirrors_plate = true;     // mirrored paths end at stand-ins that are (Instance::mirrored)
   unsigned camera_mask = mask_virtual | mask_stand_in;
   unsigned scattered_mask = mask_virtual;  // rays mirrored or scattered at a surface
   unsigned diffuse_blockers = mask_virtual | mask_real_blocker;  // of the environment and lamps
@@ -31,6 +30,7 @@ struct PathRules {
 struct PathEnd {
   Vec3f through{1, 1, 1};  // share of the light there that reaches the start
   bool bent = false;       // by a clear body or mirror: the plate is that of here, not of its pixel
+  bool mirrored = false;   // by the latter
   std::optional<HitPoint> stand_in;  // that it met; or it left the scene
   Vec3f incoming;
 };

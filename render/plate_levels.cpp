@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <span>
+#include <stdexcept>
 
 #include "capture/parallel_loop.h"
 
@@ -33,7 +34,13 @@ void for_each_row(const capture::Image& image, F&& row) {
 
 }  // namespace
 
-void PlateLevels::fill(const capture::HalfImage& plate) {
+void PlateLevels::fill(const capture::HalfImage& plate, const calibrate::DirectionTable& lens) {
+  const std::size_t pixels = static_cast<std::size_t>(std::max(plate.width, 0)) *
+                             static_cast<std::size_t>(std::max(plate.height, 0));
+  if (pixels == 0 || plate.channels != 3 || plate.pixels.size() != 3 * pixels ||
+      plate.width != lens.width || plate.height != lens.height) {
+    throw std::invalid_argument("the plate must have three channels and the lens's size");
+  }
   std::size_t count = 1;
   for (int side = std::min(plate.width, plate.height); side > 1; side /= 2) ++count;
   levels_.resize(count);
@@ -45,6 +52,10 @@ void PlateLevels::fill(const capture::HalfImage& plate) {
     const std::size_t first = whole.index(y, 0);
     capture::floats_from_halves(std::span(plate.pixels).subspan(first, values),
                                 &whole.pixels[first]);
+    for (int x = 0; !lens.sensitivity.empty() && x < plate.width; ++x) {
+      const float by = 1 / sensitivity_of_plate(lens.sensitivity[lens.index(y, x)]);
+      for (int c = 0; c < 3; ++c) whole.at(y, x, c) *= by;
+    }
   });
   for (std::size_t i = 1; i < count; ++i) {
     const capture::Image& from = levels_[i - 1];

@@ -13,6 +13,7 @@
 #include "render/environment_sampler.h"
 #include "render/path_tracer.h"
 #include "render/pixel_rays.h"
+#include "render/plate_levels.h"
 #include "render/sample_budget.h"
 #include "render/sample_sequence.h"
 #include "render/stand_in_parameters.h"
@@ -72,7 +73,7 @@ class Plate {
     Vec3f plate;
     float share;
   };
-  std::optional<Seen> seen(Vec3f from_camera) const {
+  std::optional<Seen> seen(Vec3f from_camera, bool mirrored) const {
     if (lens_ == nullptr) return std::nullopt;
     const auto q = calibrate::project(*lens_, cam_from_set_ * calibrate::to_double(from_camera));
     if (!q || !(q->x >= -0.5 && q->x <= plate_.width - 0.5) ||
@@ -80,7 +81,7 @@ class Plate {
       return std::nullopt;
     }
     return Seen{plate_at(plate_, static_cast<float>(q->x), static_cast<float>(q->y)),
-                plate_share_at(plate_, q->x, q->y)};
+                plate_share_at(plate_, q->x, q->y, mirrored)};
   }
 
  private:
@@ -137,7 +138,7 @@ class Composite {
                  passing(s.lost.z(), s.open.z())};
       share += brightening(s.open.over(1), s.gathered.over(1));
       if (s.bent) {
-        rgb += times(s.plate.over(n), share);
+        rgb += times(s.plate.over(n), share) * sensitivity;
         continue;
       }
       rgb += times(plate, times(s.through.over(n), share));
@@ -185,12 +186,16 @@ class Composite {
     const auto seen =
         environment_behind_
             ? std::nullopt
-            : plate_.seen(end.stand_in ? end.stand_in->position - origin : end.incoming);
+            : plate_.seen(end.stand_in ? end.stand_in->position - origin : end.incoming,
+                          end.mirrored);
     const float share = seen ? seen->share : 0;
     if (share < 1) {
       p.added.add(times(end.through, tracer_.environment().radiance(end.incoming)) * (1 - share));
     }
-    if (!(share > 0)) return;
+    if (!(share > 0)) {
+      if (end.stand_in) add_reflection(origin, end, mirrors, numbers, p);
+      return;
+    }
     if (end.stand_in) {
       sample_stand_in(origin, end, seen->plate * share, mirrors, numbers, p);
     } else {
@@ -228,10 +233,7 @@ class Composite {
       if (bounces_) light += tracer_.virtual_irradiance(hit, numbers);
       sums->virtual_light.add(times(end.through, light));
     }
-    const StandInParameters& parameters = sums->parameters;
-    if (parameters.catches_reflection != 0 && parameters.reflectance > 0) {
-      add_reflection(origin, end, parameters, mirrors, numbers, p);
-    }
+    add_reflection(origin, end, mirrors, numbers, p);
   }
 
   bool takes_caustics(const StandInSums& sums) const {
@@ -262,13 +264,11 @@ class Composite {
   }
 
   // F (L_hit - L_env) where the mirrored ray meets a virtual object.
-  void add_reflection(Vec3f origin,
-                      const PathEnd& end,
-                      StandInParameters parameters,
-                      int mirrors,
-                      SampleSequence& numbers,
-                      Pixel& p) const {
+  void add_reflection(
+      Vec3f origin, const PathEnd& end, int mirrors, SampleSequence& numbers, Pixel& p) const {
     const HitPoint& hit = *end.stand_in;
+    const StandInParameters& parameters = stand_ins_[hit.material];
+    if (parameters.catches_reflection == 0 || !(parameters.reflectance > 0)) return;
     const Vec3f view = -end.incoming;
     const float f = schlick(parameters.reflectance, std::abs(dot(hit.normal, view)));
     const Vec3f direction =
@@ -377,7 +377,14 @@ capture::Image render_reference(const FrameInputs& inputs,
   }
   const EnvironmentSampler environment(*inputs.environment);
   const PathTracer tracer(*inputs.scene, environment, lamps, rules, inputs.videos);
-  const Plate behind_glass(plate, inputs.lens, job.cam_from_set);
+  capture::Image undimmed = plate;
+  for (int y = 0; !directions.sensitivity.empty() && y < plate.height; ++y) {
+    for (int x = 0; x < plate.width; ++x) {
+      const float by = 1 / sensitivity_of_plate(directions.sensitivity[directions.index(y, x)]);
+      for (int c = 0; c < 3; ++c) undimmed.at(y, x, c) *= by;
+    }
+  }
+  const Plate behind_glass(undimmed, inputs.lens, job.cam_from_set);
   const Composite composite(tracer, bounces, behind_glass);
   const PixelRays rays(directions, job.cam_from_set);
   const auto pixel_of = [&](int x, int y, std::uint32_t index, std::uint32_t seed, int first,

@@ -29,8 +29,8 @@ struct FrameInputs {
   // The frames of the scene's live textures, one for each of SceneDescription::videos.
   std::span<const VideoTexture* const> videos = {};
   KeptTransport* kept = nullptr;  // a cache, or null: the same bits, slower
-  // For what clear bodies show of the plate: all of it, and the job's lens. Null: they show the
-  // environment in its place.
+  // For what clear bodies and mirrors show of the plate: all of it, and the job's lens. Null: they
+  // show the environment in its place.
   const capture::HalfImage* plate = nullptr;
   const calibrate::Lens* lens = nullptr;
   // What keeps cells that show live pictures from being found anew while these stay within them;

@@ -25,7 +25,8 @@ enum class RayKind : std::uint8_t {
   camera,  // from the camera, or straight on through something thin: what it sees is the picture
   bent,    // turned by clear bodies since, or mirrored by what is virtual to where a stand-in shows
            // in mirrors: sees what the camera does, and the plate elsewhere
-  reflection,  // mirrored or scattered in a narrow lobe: sees virtual objects and the environment
+  reflection,  // mirrored or scattered in a narrow lobe: sees virtual objects, stand-ins that are
+               // mirrored (as a bent one), and the environment
   difference,  // a reflection on a real surface: counts only as (what it hits - environment)
   shadow,
 };

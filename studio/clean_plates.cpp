@@ -97,16 +97,15 @@ capture::Image read_picture(const std::string& path,
 }
 
 std::string needs_plate(const std::string& uri) {
-  return uri +
-         " is live and needs a clean plate: platelight key plate CAMERA -o plate.exr, or plate = "
-         "\"take\"";
+  return uri + " is live and needs a clean plate: platelight key plate CAMERA -o plate.exr";
 }
 
-std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate) {
-  constexpr double much_elsewhere = 0.1;
-  const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour);
+std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate,
+                                           std::span<const std::uint8_t> garbage,
+                                           double much) {
+  const double elsewhere = 1 - compositing::screen_share(plate.light, plate.colour, garbage);
   if (elsewhere >= 1) return "the plate has no colour, and is no screen";
-  if (!(elsewhere > much_elsewhere)) return std::nullopt;
+  if (!(elsewhere > much)) return std::nullopt;
   return fmt::format(
       "{:.0f} % of the plate is not screen: if somebody is in the picture, take it anew; what else "
       "it is, a garbage mask is to cut away",

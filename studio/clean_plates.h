@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "capture/camera.h"
@@ -25,8 +27,11 @@ capture::Image read_picture(const std::string& path,
                             capture::Transfer transfer,
                             const ShownPart& shown = {});
 
-// What speaks against a plate as one of a screen, in words; nothing of a good one.
-std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate);
+// What speaks against a plate as one of a screen, in words; nothing of a good one. `garbage`:
+// (height, width), 255 = does not count, or empty; `much`: more of it that is no screen is told.
+std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate,
+                                           std::span<const std::uint8_t> garbage = {},
+                                           double much = 0.1);
 
 // What to do about a live source without a plate.
 std::string needs_plate(const std::string& uri);

@@ -2,6 +2,7 @@
 #include "studio/person_camera.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -23,7 +24,6 @@ using compositing::Feet;
 // Feet are looked for in a matte whose longer side is at most so long.
 constexpr int matte_side = 640;
 constexpr capture::Rational rate_of_unknown{25, 1};
-constexpr std::size_t shots_of_plate = 50;
 
 // Alpha of a keyed picture, area-averaged `shrink` times smaller.
 capture::Image matte_of(const compositing::KeyedFrame& keyed, int shrink) {
@@ -153,7 +153,8 @@ compositing::CleanPlate PersonCameraFeed::read_plate(const VideoSource& source,
                                                      const ShownPart& shown) const {
   const KeyChoice& key = *settings_.key;
   const capture::CameraInfo& info = source_->info();
-  if (key.plate.empty() && info.live) throw std::invalid_argument(needs_plate(settings_.source));
+  if (key.plate.empty() && info.live)
+    throw std::invalid_argument(needs_plate(settings_.source) + ", or plate = \"take\"");
   auto plate = read_clean_plate(key.plate, source, key.settings.method, key.footage, shown);
   if (plate.light.width != info.width || plate.light.height != info.height) {
     throw std::invalid_argument(fmt::format(
@@ -163,54 +164,83 @@ compositing::CleanPlate PersonCameraFeed::read_plate(const VideoSource& source,
   return plate;
 }
 
+// Files that are too short for a plate to be taken of them are told before the show.
+void PersonCameraFeed::check_length() const {
+  const capture::CameraInfo& info = source_->info();
+  const std::int64_t left = info.frames - settings_.first;
+  const bool repeats = settings_.loop && info.frames > 1;
+  if (info.live || info.frames <= 0 || repeats ||
+      left >= static_cast<std::int64_t>(shots_of_plate)) {
+    return;
+  }
+  throw std::invalid_argument(
+      fmt::format("a plate is taken of {} frames, but {} has {} from its beginning on",
+                  shots_of_plate, settings_.source, std::max<std::int64_t>(left, 0)));
+}
+
+void PersonCameraFeed::make_keyer(const compositing::CleanPlate& plate,
+                                  compositing::KeyMasks masks) {
+  keyer_ = std::make_unique<compositing::Keyer>(plate, settings_.key->settings, std::move(masks));
+}
+
 void PersonCameraFeed::begin_key(const VideoSource& source, const PersonCameraFeed* before) {
   const KeyChoice& key = *settings_.key;
   const capture::CameraInfo& info = source_->info();
   const ShownPart shown = shown_part(info, source);
   by_texel_ = key.by_texel && !options_.needs_matte;
   if (!key.takes_plate) {
-    auto plate = read_plate(source, shown);
-    keyer_.emplace(std::move(plate), key.settings,
-                   read_key_masks(key.masks, info.width, info.height, shown));
+    const auto plate = read_plate(source, shown);
+    make_keyer(plate, read_key_masks(key.masks, info.width, info.height, shown));
     return;
   }
-  compositing::KeyMasks masks = read_key_masks(key.masks, info.width, info.height, shown);
-  const bool goes_on = before && before->settings_.key && before->settings_.key->takes_plate &&
-                       before->settings_.key->take == key.take;
-  if (const auto taken = goes_on ? before->taken_->get() : nullptr) {
-    taken_ = before->taken_;
-    keyer_.emplace(*taken, key.settings, std::move(masks));
-    return;
+  masks_ = read_key_masks(key.masks, info.width, info.height, shown);
+  const KeyChoice* const was = before && before->settings_.key ? &*before->settings_.key : nullptr;
+  if (was && was->takes_plate && was->take == key.take) {
+    taking_ = before->taking_;
+    if (const auto plate = taking_->plate()) {
+      make_keyer(*plate, std::move(masks_));
+      return;
+    }
+  } else {
+    check_length();
+    const bool by_screen = key.settings.method == compositing::KeyMethod::screen;
+    taking_ = std::make_shared<PlateTaking>(masks_.garbage, by_screen, !info.live);
+    notes_.push_back(fmt::format(
+        "takes its plate of the next {} frames: nobody may be in the picture", shots_of_plate));
   }
-  taking_.emplace(compositing::PlateShots(), std::move(masks));
   key_ = "its plate is being taken";
   confidence_ = 0;
-  notes_.push_back(fmt::format(
-      "takes its plate of the next {} frames: nobody may be in the picture", shots_of_plate));
 }
 
-void PersonCameraFeed::TakenPlate::put(const compositing::CleanPlate& plate) {
-  const std::lock_guard lock(mutex_);
-  plate_ = std::make_shared<const compositing::CleanPlate>(plate);
+// A plate that fails leaves its person out, and the show goes on.
+void PersonCameraFeed::go_on_with_plate(bool good) {
+  if (plate_failed_) return;
+  try {
+    take_plate(good);
+  } catch (const std::exception& error) {
+    plate_failed_ = true;
+    notes_.push_back(fmt::format("has no plate: {}", error.what()));
+  }
 }
 
-std::shared_ptr<const compositing::CleanPlate> PersonCameraFeed::TakenPlate::get() const {
-  const std::lock_guard lock(mutex_);
-  return plate_;
-}
-
-// One more frame of the empty screen; after the last one the key begins.
-void PersonCameraFeed::take_plate() {
-  taking_->shots.add(*image_);
-  if (taking_->shots.count() < shots_of_plate) return;
-  const compositing::KeySettings& settings = settings_.key->settings;
-  const compositing::CleanPlate plate = taking_->shots.average();
-  const bool by_screen = settings.method == compositing::KeyMethod::screen;
-  const auto doubts = by_screen ? doubts_of_plate(plate) : std::nullopt;
-  notes_.push_back(doubts ? "has its plate, but " + *doubts : std::string("has its plate"));
-  keyer_.emplace(plate, settings, std::move(taking_->masks));
-  taken_->put(plate);
-  taking_.reset();
+// One more frame of the empty screen; after the last one the key begins, which takes a moment.
+void PersonCameraFeed::take_plate(bool good) {
+  if (good) taking_->add(image_);
+  const auto plate = taking_->plate();
+  if (!plate) return;
+  if (!coming_keyer_.valid()) {
+    coming_keyer_ = std::async(
+        std::launch::async, [plate, settings = settings_.key->settings, masks = masks_]() mutable {
+          return std::make_unique<compositing::Keyer>(*plate, settings, std::move(masks));
+        });
+  }
+  if (!source_->info().live) coming_keyer_.wait();
+  if (coming_keyer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  keyer_ = coming_keyer_.get();
+  masks_ = {};
+  if (const auto doubts = taking_->take_doubts()) {
+    notes_.push_back(doubts->empty() ? "has its plate" : "has its plate, but " + *doubts);
+  }
 }
 
 std::vector<std::string> PersonCameraFeed::take_notes() {
@@ -251,11 +281,11 @@ void PersonCameraFeed::advance(capture::Time time) {
   pass_ = newest.pass_first;
   image_ = newest.image;
   time_ = newest.time;
-  if (taking_ && newest.status == capture::FrameStatus::good) take_plate();
+  if (takes_plate()) go_on_with_plate(newest.status == capture::FrameStatus::good);
 }
 
 bool PersonCameraFeed::show() {
-  if (image_ == shown_ || taking_) return false;
+  if (image_ == shown_ || takes_plate()) return false;
   key_frame();
   shown_ = image_;
   return true;

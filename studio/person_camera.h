@@ -3,8 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <future>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,10 +16,10 @@
 #include "compositing/keyed_texture.h"
 #include "compositing/keyer.h"
 #include "compositing/picture_window.h"
-#include "compositing/plate_footage.h"
 #include "render/live_picture.h"
 #include "studio/clean_plates.h"
 #include "studio/file_times.h"
+#include "studio/plate_taking.h"
 #include "studio/set.h"
 #include "studio/timed_source.h"
 
@@ -73,7 +73,7 @@ class PersonCameraFeed {
   std::vector<std::string> take_notes();
   // Whether the plate is not there yet: it is being taken of the frames that come, and nobody is
   // shown.
-  bool takes_plate() const { return taking_.has_value(); }
+  bool takes_plate() const { return taking_ && !keyer_; }
 
   // Keys the newest frame, unless it is already. True if it did.
   bool show();
@@ -87,34 +87,19 @@ class PersonCameraFeed {
   // How far the picture has gone from its plate, if the camera was moved: right and down, pixels.
   std::optional<std::array<float, 2>> moved_px() const { return moved_px_; }
   const compositing::Feet& feet() const { return feet_; }
-  bool sees_nobody() const {
-    return taking_ || (has_matte_ && feet_.status == compositing::FeetStatus::absent);
-  }
+  bool sees_nobody() const { return has_matte_ && feet_.status == compositing::FeetStatus::absent; }
   // Edges of the person, and of all that may be its, in pixels: left, top, right, bottom. The whole
   // picture where there is no matte.
   std::array<float, 4> person_box() const;
   std::array<float, 4> outline() const;
 
  private:
-  // A plate that was taken on air, for those that go on with the same settings of it: they are made
-  // while this one runs.
-  class TakenPlate {
-   public:
-    void put(const compositing::CleanPlate& plate);
-    std::shared_ptr<const compositing::CleanPlate> get() const;
-
-   private:
-    mutable std::mutex mutex_;
-    std::shared_ptr<const compositing::CleanPlate> plate_;
-  };
-  struct PlateTaking {
-    compositing::PlateShots shots;
-    compositing::KeyMasks masks;
-  };
-
   compositing::CleanPlate read_plate(const VideoSource& source, const ShownPart& shown) const;
   void begin_key(const VideoSource& source, const PersonCameraFeed* before);
-  void take_plate();
+  void check_length() const;
+  void make_keyer(const compositing::CleanPlate& plate, compositing::KeyMasks masks);
+  void go_on_with_plate(bool good);
+  void take_plate(bool good);
   void key_frame();
   void show_keyed(std::shared_ptr<const compositing::KeyedTexture> texture);
   void look_for_person(const compositing::KeyedFrame& keyed);
@@ -126,9 +111,11 @@ class PersonCameraFeed {
   bool by_texel_ = false;
   VideoSource opened_;  // as source_ was
   std::shared_ptr<TimedSource> source_;
-  std::optional<compositing::Keyer> keyer_;
-  std::optional<PlateTaking> taking_;
-  std::shared_ptr<TakenPlate> taken_ = std::make_shared<TakenPlate>();
+  std::unique_ptr<compositing::Keyer> keyer_;
+  std::shared_ptr<PlateTaking> taking_;  // of plates that are taken
+  bool plate_failed_ = false;
+  compositing::KeyMasks masks_;  // for the key, once the plate is there
+  std::future<std::unique_ptr<compositing::Keyer>> coming_keyer_;
   std::vector<std::string> notes_;
   float aspect_ = 1;
   capture::Time period_{}, time_{};

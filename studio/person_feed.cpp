@@ -315,6 +315,11 @@ void PersonFeed::update(Person& person, capture::Time time) {
 // Leaves a camera out, or takes it back.
 void PersonFeed::judge(Person& person, std::size_t index, capture::Time time) {
   Person::Camera& camera = person.cameras[index];
+  if (camera.feed.takes_plate()) {  // which was told
+    camera.out_for = "its plate is being taken";
+    camera.well.reset();
+    return;
+  }
   const char* wrong = camera.late                 ? "its picture is late"
                       : camera.feed.sees_nobody() ? "it sees nobody"
                                                   : nullptr;
@@ -383,7 +388,9 @@ void PersonFeed::tell(Person& person) {
                     "{:.3f} m",
                     status.name, words_for(now), now.view_rad / degree, now.error_m));
   }
-  if (!now.holds && status.holds) {
+  const bool takes_plates = std::ranges::any_of(
+      person.cameras, [](const Person::Camera& camera) { return camera.feed.takes_plate(); });
+  if (!now.holds && status.holds && !takes_plates) {
     person.notes.push_back(fmt::format(
         "{}: seen {:.0f} degrees off camera {}, nothing holds the error of {:g} m: {} has {:.3f} "
         "m, the hull would have {:.3f} m",

@@ -18,8 +18,9 @@ namespace studio {
 // How a person is keyed, where it stands and what it is shown as, for people.
 struct PersonStatus {
   std::string name;
-  float confidence = 1;         // of the key, 0..1; of several cameras, the least
-  std::string key = "none";     // what lowers it most: compositing::name_of; "none" = no key
+  float confidence = 1;  // of the key, 0..1; of several cameras, the least
+  // What lowers it most: compositing::name_of; "none" = no key; or "its plate is being taken".
+  std::string key = "none";
   std::string feet = "placed";  // compositing::name_of, or "placed" by the set
   bool held = false;            // stands where the feet were seen last
   bool stands = true;           // it has a place: by the set, or once its feet were seen

@@ -60,6 +60,10 @@ std::uint64_t hash_of(const std::vector<std::string>& lines) {
 std::string set_digest(const std::string& set_path) {
   std::vector<std::string> told;
   tell_values(read_toml(set_path), "", told);
+  // When a plate was taken does not matter.
+  std::erase_if(told, [](const std::string& line) {
+    return line.substr(0, line.find(' ')).ends_with(".key.take");
+  });
   for (const auto& [name, value] : settings_of({})) {
     std::erase_if(told, [start = "effort." + name + " "](const std::string& line) {
       return line.starts_with(start);

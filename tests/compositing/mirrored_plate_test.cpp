@@ -246,15 +246,110 @@ TEST(MirroredPlate, IsTheSameWarmAndCold) {
   }
 }
 
-// Where nothing tells where the plate is seen, mirrors show the environment.
+// Where nothing tells where the plate is seen, mirrors show the environment, as wide as they are:
+// a lamp in it that is below the horizon, too.
 TEST(MirroredPlate, IsTheEnvironmentWithoutALens) {
-  const MadeShot mirrored = shot_of(metal(0), true), plain = shot_of(metal(0), false);
-  render::FrameResult with, without;
-  render_frame(mirrored.inputs(), mirrored.job, mirrored.plate, with);
-  render_frame(plain.inputs(), plain.job, plain.plate, without);
-  const capture::Image a = capture::to_float(with.rgba), b = capture::to_float(without.rgba);
-  for (std::size_t i = 0; i < a.pixels.size(); ++i)
-    ASSERT_NEAR(a.pixels[i], b.pixels[i], 0.05) << i;
+  for (const float roughness : {0.0F, 0.3F}) {
+    MadeShot shots[2] = {shot_of(metal(roughness), true), shot_of(metal(roughness), false)};
+    capture::Image pictures[2];
+    for (int i = 0; i < 2; ++i) {
+      capture::Image& sky = shots[i].environment.radiance;
+      for (int y = 0; y < sky.height; ++y) {
+        for (int x = 0; x < sky.width; ++x) {
+          const bool lamp = y > 20 && y < 24 && x % 16 < 3;
+          for (int c = 0; c < 3; ++c)
+            sky.at(y, x, c) = lamp ? 8.0F : 0.2F + 0.01F * static_cast<float>(y % 7);
+        }
+      }
+      render::smooth_for_reflections(shots[i].environment);
+      render::FrameResult result;
+      render_frame(shots[i].inputs(), shots[i].job, shots[i].plate, result);
+      pictures[i] = capture::to_float(result.rgba);
+    }
+    double off = 0, sum = 0;
+    for (std::size_t i = 0; i < pictures[0].pixels.size(); ++i) {
+      off += std::pow(pictures[0].pixels[i] - pictures[1].pixels[i], 2);
+      sum += std::pow(pictures[1].pixels[i], 2);
+    }
+    EXPECT_LT(std::sqrt(off / sum), 0.01) << roughness;
+  }
+}
+
+// Light of the plate is that of its place, not of the pixel that shows it.
+TEST(MirroredPlate, KnowsTheLensVignetting) {
+  MadeShot shot = shot_of(metal(0), true), even = shot_of(metal(0), true);
+  calibrate::DirectionTable& lens = shot.directions;
+  lens.sensitivity.assign(lens.x.size(), 1.0F);
+  capture::Image dimmed = capture::to_float(shot.plate);
+  for (int y = 0; y < lens.height; ++y) {
+    for (int x = 0; x < lens.width; ++x) {
+      const double r = std::hypot(x - 79.5, y - 59.5) / 100;
+      const float by = lens.sensitivity[lens.index(y, x)] = static_cast<float>(1 - 0.6 * r * r);
+      for (int c = 0; c < 3; ++c) dimmed.at(y, x, c) *= by;
+    }
+  }
+  shot.plate = capture::to_half(dimmed);
+  const capture::Image picture = rendered(shot), expected = rendered(even);
+  const calibrate::Lens model = lens_of(shot);
+  render::FrameInputs inputs = shot.inputs();
+  inputs.lens = &model;
+  const capture::Image truth = render_reference(inputs, shot.job, dimmed, {.samples = 64});
+  double off = 0, off_truth = 0, sum = 0;
+  for (int y = 0; y < lens.height; ++y) {
+    for (int x = 0; x < lens.width; ++x) {
+      const float by = lens.sensitivity[lens.index(y, x)];
+      for (int c = 0; c < 3; ++c) {
+        const float right = expected.at(y, x, c) * by;
+        off += std::pow(picture.at(y, x, c) - right, 2);
+        off_truth += std::pow(picture.at(y, x, c) - truth.at(y, x, c), 2);
+        sum += double{right} * right;
+      }
+    }
+  }
+  EXPECT_LT(std::sqrt(off / sum), 0.005);
+  EXPECT_LT(std::sqrt(off_truth / sum), 0.03);
+}
+
+// What a real floor mirrors of a real wall is in the plate, also through a clear pane between.
+TEST(MirroredPlate, LeavesWhatRealThingsMirrorOfEachOtherAsItIs) {
+  render::SceneDescription scene = shot_scene(false);
+  render::StandInParameters shiny;
+  shiny.catches_shadow = shiny.catches_light = 0;
+  shiny.catches_reflection = 1;
+  shiny.reflectance = 1;
+  scene.materials[0] = make_stand_in_material("floor", shiny);
+  render::StandardParameters clear;
+  clear.transmission = 1;
+  clear.roughness = 0;
+  clear.specular = 0;
+  scene.materials[1] = render::make_standard_material("clear", clear);
+  const auto add_wall = [&](float y, float top, std::uint32_t material) {
+    auto wall = std::make_shared<render::Mesh>();
+    wall->positions = {{-4, y, 0}, {4, y, 0}, {4, y, top}, {-4, y, top}};
+    wall->triangles = {{0, 1, 2}, {0, 2, 3}};
+    wall->materials = {material};
+    scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size());
+    scene.meshes.push_back(wall);
+  };
+  scene.materials.push_back(make_stand_in_material("wall", {}));
+  add_wall(2, 3, 3);
+  scene.instances.back().kind = render::ObjectKind::stand_in;
+  scene.instances.back().blocks_light = false;
+  scene.instances.back().mirrored = true;
+  add_wall(1, 3, 1);  // the pane
+  MadeShot shot = made_shot(96, 72, scene);
+  shot.job.cam_from_set = calibrate::look_at({0, -2.5, 1.2}, {0, 0.5, 0}, 0);
+  const capture::Image picture = rendered(shot), plate = capture::to_float(shot.plate);
+  const calibrate::Lens lens = lens_of(shot);
+  render::FrameInputs inputs = shot.inputs();
+  inputs.lens = &lens;
+  const capture::Image truth = render_reference(inputs, shot.job, plate, {.samples = 4});
+  for (int y = 40; y < 72; ++y) {  // the floor before the pane
+    for (int x = 0; x < 96; ++x) {
+      ASSERT_NEAR(picture.at(y, x, 0), plate.at(y, x, 0), 0.002) << x << " " << y;
+      ASSERT_NEAR(truth.at(y, x, 0), plate.at(y, x, 0), 0.002) << x << " " << y;
+    }
+  }
 }
 
 // A wall that mirrors show hides in them what is behind it.

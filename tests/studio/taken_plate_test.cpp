@@ -2,12 +2,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "capture/camera.h"
 #include "studio/person_feed.h"
+#include "studio/plate_taking.h"
 #include "studio/set.h"
 #include "tests/made_files.h"
 #include "tests/studio/made_show.h"
@@ -124,12 +129,79 @@ TEST_F(TakenPlate, IsTakenAnewForAnotherNumberAndElseStays) {
   EXPECT_THAT(again.take_notes(), ElementsAre(HasSubstr("of the next 50"), "she has its plate"));
 }
 
+// What was taken counts, whether it is whole when the edit is read, when it comes, or later.
+TEST_F(TakenPlate, GoesOnWhileSetsAreEdited) {
+  for (const int edited : {20, 45}) {
+    const Set set = set_with(""), despilled = set_with("despill = 2\n");
+    PersonFeed feed(set, std::nullopt, false);
+    int at = 0;
+    show_until(feed, set, at, edited);
+    PersonFeed next(despilled, std::nullopt, false, &feed);  // read beside the show
+    show_until(feed, set, at, edited + 10);
+    next.take_over();
+    const PersonStatus status = show_until(next, despilled, at, 75);
+    EXPECT_EQ(status.key, "good") << edited;
+    std::vector<std::string> notes = feed.take_notes();
+    const std::vector<std::string> more = next.take_notes();
+    notes.insert(notes.end(), more.begin(), more.end());
+    EXPECT_THAT(notes, ElementsAre(HasSubstr("of the next 50"), "she has its plate")) << edited;
+  }
+}
+
 TEST_F(TakenPlate, TellsThatSomebodyMayHaveBeenInThePicture) {
-  const Set set = set_with("");
-  PersonFeed feed(set, capture::Time{0}, false);
-  int at = 170;
-  show_until(feed, set, at, 240);
-  EXPECT_THAT(feed.take_notes(), Contains(HasSubstr("she has its plate, but")));
+  for (const int from : {170, 45}) {  // all the time, and some of it
+    const Set set = set_with("");
+    PersonFeed feed(set, capture::Time{0}, false);
+    int at = from;
+    show_until(feed, set, at, from + 60);
+    EXPECT_THAT(feed.take_notes(), Contains(HasSubstr("she has its plate, but"))) << from;
+  }
+}
+
+TEST_F(TakenPlate, OfTooShortAVideoIsRefused) {
+  const Set set = made_set("grey:500,25,0",
+                           "[[billboard]]\nposition = [0, -1, 0]\nheight = 1.7\n"
+                           "source = \"grey:49,25,0\"\n[billboard.key]\nplate = \"take\"\n");
+  try {
+    PersonFeed feed(set, std::nullopt, false);
+    FAIL();
+  } catch (const SetError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("a plate is taken of 50 frames, but grey:49,25,0 has 49"));
+  }
+}
+
+// A lamp that flickers is nobody who moves, and what a garbage mask cuts away is no doubt.
+TEST(PlateTaking, DoubtsWhatMovesAndWhatIsNoScreen) {
+  const auto shot = [](float light, int thing_at) {
+    auto image = std::make_shared<capture::Image>(capture::make_image(96, 128));
+    for (int y = 0; y < 96; ++y) {
+      for (int x = 0; x < 128; ++x) {
+        const bool thing = thing_at >= 0 && std::abs(x - thing_at) < 12;
+        image->at(y, x, 0) = light * (thing ? 0.4F : 0.05F);
+        image->at(y, x, 1) = light * (thing ? 0.1F : 0.4F);
+        image->at(y, x, 2) = light * 0.08F;
+      }
+    }
+    return image;
+  };
+  const auto doubts = [&](std::vector<std::uint8_t> garbage, auto&& thing_at) {
+    PlateTaking taking(std::move(garbage), true, true);
+    for (int i = 0; i < static_cast<int>(shots_of_plate); ++i) {
+      EXPECT_EQ(taking.plate(), nullptr);
+      taking.add(shot(i % 2 == 0 ? 1.0F : 0.8F, thing_at(i)));
+    }
+    EXPECT_NE(taking.plate(), nullptr);
+    const auto told = taking.take_doubts();
+    EXPECT_EQ(taking.take_doubts(), std::nullopt);
+    return told.value_or("nothing told");
+  };
+  EXPECT_EQ(doubts({}, [](int) { return -1; }), "");
+  EXPECT_THAT(doubts({}, [](int i) { return 2 * i; }), HasSubstr("something moved in"));
+  EXPECT_THAT(doubts({}, [](int) { return 60; }), HasSubstr("% of the plate is not screen"));
+  std::vector<std::uint8_t> garbage(std::size_t{96} * 128, 0);
+  for (std::size_t i = 0; i < garbage.size(); ++i)
+    garbage[i] = i % 128 > 40 && i % 128 < 80 ? 255 : 0;
+  EXPECT_EQ(doubts(garbage, [](int) { return 60; }), "");
 }
 
 TEST_F(TakenPlate, IsReadFromTheSet) {
