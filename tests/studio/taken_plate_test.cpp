@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -218,6 +219,23 @@ TEST_F(TakenPlate, IsReadFromTheSet) {
   } catch (const SetError& error) {
     EXPECT_THAT(error.what(), HasSubstr("take"));
   }
+}
+
+// Pictures of a live camera that come while one is being added are not waited for.
+TEST(PlateTaking, TakesWhatItCanOfPicturesThatDoNotWait) {
+  const auto shot = std::make_shared<capture::Image>(capture::make_image(480, 640));
+  for (std::size_t i = 0; i < shot->pixels.size(); ++i) shot->pixels[i] = i % 3 == 1 ? 0.4F : 0.05F;
+  PlateTaking taking({}, true, false);
+  std::size_t given = 0;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (!taking.plate() && std::chrono::steady_clock::now() < end) {
+    taking.add(shot);
+    ++given;
+  }
+  ASSERT_NE(taking.plate(), nullptr);
+  EXPECT_GT(given, shots_of_plate);
+  EXPECT_NEAR(taking.plate()->light.at(240, 320, 1), 0.4F, 1e-4);
+  EXPECT_EQ(taking.take_doubts(), "");
 }
 
 }  // namespace
