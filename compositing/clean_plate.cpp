@@ -29,9 +29,7 @@ void blur_screen(Image& light) {
   pass(light.height, light.width, [&](int x, int y, int c) -> float& { return light.at(y, x, c); });
 }
 
-float screen_share(const Image& light,
-                   ScreenColour colour,
-                   std::span<const std::uint8_t> garbage) {
+float screen_share(const Image& light, ScreenColour colour, std::span<const std::uint8_t> garbage) {
   const ScreenLight key = find_key(spread_pixels(light), colour);
   if (key.excess <= 0) return 0;
   std::size_t pixels = 0, screen = 0;
