@@ -306,8 +306,7 @@ void add_levels(FrameContext& context) {
       inputs.kept ? inputs.kept->bordered_levels() : std::make_shared<BorderedLevels>();
   bordered->begin(context.levels);
   context.bordered = bordered;
-  const bool bends = (inputs.scene->has_glass() || inputs.scene->has_mirrored()) &&
-                     inputs.scene->description().background != "environment";
+  const bool bends = inputs.scene->has_glass() || inputs.scene->has_mirrored();
   if (bends && inputs.plate != nullptr && inputs.lens != nullptr) {
     const auto plate = inputs.kept ? inputs.kept->plate_levels() : std::make_shared<PlateLevels>();
     plate->fill(*inputs.plate, *inputs.directions);

@@ -184,7 +184,7 @@ class Composite {
   void sample_bent(
       Vec3f origin, const PathEnd& end, int mirrors, SampleSequence& numbers, Pixel& p) const {
     const auto seen =
-        environment_behind_
+        environment_behind_ && !end.stand_in
             ? std::nullopt
             : plate_.seen(end.stand_in ? end.stand_in->position - origin : end.incoming,
                           end.mirrored);
