@@ -78,6 +78,16 @@ capture::Image rendered(const MadeShot& shot, render::KeptTransport* kept = null
   return capture::to_float(result.rgba);
 }
 
+// An upright wall across the view, of so much height.
+void add_wall(render::SceneDescription& scene, float y, float top, std::uint32_t material) {
+  auto wall = std::make_shared<render::Mesh>();
+  wall->positions = {{-4, y, 0}, {4, y, 0}, {4, y, top}, {-4, y, top}};
+  wall->triangles = {{0, 1, 2}, {0, 2, 3}};
+  wall->materials = {material};
+  scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size());
+  scene.meshes.push_back(wall);
+}
+
 // A mirror as a wall: its picture of the floor is the plate where the mirrored ray falls, and of
 // what the camera does not see, the environment.
 TEST(MirroredPlate, IsWhatAFlatMirrorShowsOfTheFloor) {
@@ -89,12 +99,7 @@ TEST(MirroredPlate, IsWhatAFlatMirrorShowsOfTheFloor) {
   scene.materials[0] = make_stand_in_material("floor", real);
   scene.instances[0].mirrored = true;
   scene.materials[1] = render::make_standard_material("silver", metal(0));
-  auto wall = std::make_shared<render::Mesh>();
-  wall->positions = {{-3, back, 0}, {3, back, 0}, {3, back, 3}, {-3, back, 3}};
-  wall->triangles = {{0, 1, 2}, {0, 2, 3}};
-  wall->materials = {1};
-  scene.meshes.push_back(wall);
-  scene.instances.emplace_back().mesh = 1;
+  add_wall(scene, back, 3, 1);
   MadeShot shot = made_shot(width, height, scene);
   shot.environment = made_sky(32, 2, 3);
   const Vec3f eye{0, -2.5F, 1.2F};
@@ -323,20 +328,12 @@ TEST(MirroredPlate, LeavesWhatRealThingsMirrorOfEachOtherAsItIs) {
   clear.roughness = 0;
   clear.specular = 0;
   scene.materials[1] = render::make_standard_material("clear", clear);
-  const auto add_wall = [&](float y, float top, std::uint32_t material) {
-    auto wall = std::make_shared<render::Mesh>();
-    wall->positions = {{-4, y, 0}, {4, y, 0}, {4, y, top}, {-4, y, top}};
-    wall->triangles = {{0, 1, 2}, {0, 2, 3}};
-    wall->materials = {material};
-    scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size());
-    scene.meshes.push_back(wall);
-  };
   scene.materials.push_back(make_stand_in_material("wall", {}));
-  add_wall(2, 3, 3);
+  add_wall(scene, 2, 3, 3);
   scene.instances.back().kind = render::ObjectKind::stand_in;
   scene.instances.back().blocks_light = false;
   scene.instances.back().mirrored = true;
-  add_wall(1, 3, 1);  // the pane
+  add_wall(scene, 1, 3, 1);  // the pane
   MadeShot shot = made_shot(96, 72, scene);
   shot.job.cam_from_set = calibrate::look_at({0, -2.5, 1.2}, {0, 0.5, 0}, 0);
   const capture::Image picture = rendered(shot), plate = capture::to_float(shot.plate);
@@ -359,17 +356,9 @@ TEST(MirroredPlate, HidesWhatIsBehindRealThings) {
   render::StandardParameters glow;
   std::fill_n(glow.emission, 3, 5.0F);
   scene.materials.push_back(render::make_standard_material("lamp", glow));
-  const auto add_wall = [&](float y, float top, std::uint32_t material) {
-    auto wall = std::make_shared<render::Mesh>();
-    wall->positions = {{-4, y, 0}, {4, y, 0}, {4, y, top}, {-4, y, top}};
-    wall->triangles = {{0, 1, 2}, {0, 2, 3}};
-    wall->materials = {material};
-    scene.instances.emplace_back().mesh = static_cast<std::uint32_t>(scene.meshes.size());
-    scene.meshes.push_back(wall);
-  };
-  add_wall(1.5F, 3, 1);  // the mirror
-  add_wall(-6, 3, 3);    // what glows behind the camera
-  add_wall(-5, 3, 0);    // a real wall before that
+  add_wall(scene, 1.5F, 3, 1);  // the mirror
+  add_wall(scene, -6, 3, 3);    // what glows behind the camera
+  add_wall(scene, -5, 3, 0);    // a real wall before that
   render::Instance& real = scene.instances.back();
   real.kind = render::ObjectKind::stand_in;
   real.blocks_light = false;
