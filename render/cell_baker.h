@@ -17,6 +17,7 @@
 #include "render/met_centres.h"
 #include "render/open_lobes.h"
 #include "render/place_terms.h"
+#include "render/plate_view.h"
 #include "render/sample_sequence.h"
 #include "render/standard.h"
 #include "render/trace.h"
@@ -160,17 +161,6 @@ class CellBaker final : public RaySink {
     float weight;  // of its points together
   };
   using PaintedOfPixel = std::array<PaintedSlot, CellTransport::most_painted_of_pixel>;
-
-  // How a ray that is not straight on sees the plate, and what it sees where it does not.
-  struct PlateView {
-    Vec3f sees;  // the environment, there
-    float roughness = 0;
-    Spread spread;
-    bool one_of_many = false;
-    bool mirrored = false;  // else bent
-    float share = 0;        // of the plate
-    double x = 0, y = 0;    // in its pixels
-  };
 
   // Of points: the irradiance that is planned.
   struct Light {

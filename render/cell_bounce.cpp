@@ -9,6 +9,7 @@
 #include "render/trace.h"
 
 namespace render {
+
 // What a ray sees that surfaces send on. Of those from real surfaces, the plate shows already what
 // they mirror of each other.
 unsigned CellBaker::mask_of(const QueuedRay& ray) const {
@@ -63,17 +64,18 @@ void CellBaker::meet_plate(const QueuedRay& ray, std::size_t i) {
 bool CellBaker::is_behind_mirrored(const ShadePoint& p, Vec3f direction, float far_m) {
   const Scene& scene = *frame_->inputs.scene;
   if (!scene.has_mirrored()) return false;
+  const Vec3f origin = offset_origin(p.hit, direction);
   ++statistics_->shadow_rays;
-  return transmittance(scene, offset_origin(p.hit, direction), direction, 0, far_m, mask_mirrored,
-                       gather_.pictures) == Vec3f{};
+  if (counting_) ++counting_[p.pixel].shadow_rays;
+  if (grid_) grid_->mark_line(origin, direction, far_m, transport_->reach.passed);
+  return transmittance(scene, origin, direction, 0, far_m, mask_mirrored, gather_.pictures) ==
+         Vec3f{};
 }
 
 // Whether a mirrored ray meets a stand-in, and sees the plate there.
 bool CellBaker::meets_plate(const QueuedRay& ray, std::size_t i) const {
+  if (!ray.sees_mirrored || stream_.geom[i] == RTC_INVALID_GEOMETRY_ID) return false;
   const Scene& scene = *frame_->inputs.scene;
-  if (!ray.sees_mirrored || stream_.geom[i] == RTC_INVALID_GEOMETRY_ID) {
-    return false;
-  }
   const auto met = scene.surface_of(stream_.geom[i], stream_.prim[i], stream_.inst[i]);
   return scene.description().instances[met.instance].kind == ObjectKind::stand_in;
 }
@@ -156,8 +158,8 @@ void CellBaker::bounce() {
         const auto k = static_cast<std::size_t>(count - 1);
         sees_mirrored_[k] = q.sees_mirrored;
         plate_views_[k] = in_plate ? view_of(q) : PlateView{.sees = q.direction, .spread = {}};
-        lamps_apart_[static_cast<std::size_t>(count - 1)] = q.lamps_apart;
-        is_first_[static_cast<std::size_t>(count - 1)] = q.first;
+        lamps_apart_[k] = q.lamps_apart;
+        is_first_[k] = q.first;
       }
       p.media = q.media;
       // The plate shows as behind clear bodies.

@@ -503,6 +503,7 @@ void CellBaker::add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed) {
   const Vec3f planned = weight * frame_->planned_table->lamps[number].intensity;
   const float least = (1 - frame_->job->effort.accuracy) / (8 * static_cast<float>(lamps.size()));
   if (!(std::max(largest(planned), largest(-planned)) > least)) return;
+  if (!lobe.difference && is_behind_mirrored(p, direction, std::sqrt(squared))) return;
   add_lamp_past_pictures(p, target_of(p), number, weight);
   samples_[p.slot].added += planned;
 }

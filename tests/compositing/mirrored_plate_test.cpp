@@ -78,6 +78,18 @@ capture::Image rendered(const MadeShot& shot, render::KeptTransport* kept = null
   return capture::to_float(result.rgba);
 }
 
+capture::Image truth_of(const MadeShot& shot) {
+  const calibrate::Lens lens = lens_of(shot);
+  render::FrameInputs inputs = shot.inputs();
+  inputs.lens = &lens;
+  return render_reference(inputs, shot.job, capture::to_float(shot.plate), {.samples = 128});
+}
+
+double error_of(const capture::Image& picture, const capture::Image& truth, const MadeShot& shot) {
+  const capture::Image mask = render::affected_mask(truth, capture::to_float(shot.plate));
+  return render::picture_error(picture, truth, mask).relative_rms;
+}
+
 // An upright wall across the view, of so much height.
 void add_wall(render::SceneDescription& scene, float y, float top, std::uint32_t material) {
   auto wall = std::make_shared<render::Mesh>();
@@ -158,18 +170,10 @@ TEST(MirroredPlate, IsAsTheReferenceHasIt) {
        {std::tuple("mirror", metal(0), 0.03), std::tuple("rough metal", metal(0.3F), 0.04),
         std::tuple("paint", coated_paint(), 0.04)}) {
     const MadeShot shot = shot_of(ball, true);
-    const calibrate::Lens lens = lens_of(shot);
-    render::FrameInputs inputs = shot.inputs();
-    inputs.lens = &lens;
-    const capture::Image plate = capture::to_float(shot.plate);
-    const capture::Image truth = render_reference(inputs, shot.job, plate, {.samples = 128});
-    const capture::Image mask = render::affected_mask(truth, plate);
-    const auto off = [&](const capture::Image& picture) {
-      return render::picture_error(picture, truth, mask).relative_rms;
-    };
-    const double error = off(rendered(shot));
+    const capture::Image truth = truth_of(shot);
+    const double error = error_of(rendered(shot), truth, shot);
     EXPECT_LT(error, most) << what;
-    EXPECT_GT(off(rendered(shot_of(ball, false))), 1.1 * error) << what;
+    EXPECT_GT(error_of(rendered(shot_of(ball, false)), truth, shot), 1.1 * error) << what;
     ::testing::Test::RecordProperty(std::string("error_") + what, std::to_string(error));
   }
 }
@@ -180,13 +184,7 @@ TEST(MirroredPlate, IsAsTheReferenceHasItToAndFro) {
   real.catches_reflection = 1;
   real.reflectance = 0.5F;
   const MadeShot shot = shot_of(metal(0), true, real);
-  const calibrate::Lens lens = lens_of(shot);
-  render::FrameInputs inputs = shot.inputs();
-  inputs.lens = &lens;
-  const capture::Image plate = capture::to_float(shot.plate);
-  const capture::Image truth = render_reference(inputs, shot.job, plate, {.samples = 128});
-  const capture::Image mask = render::affected_mask(truth, plate);
-  const double error = render::picture_error(rendered(shot), truth, mask).relative_rms;
+  const double error = error_of(rendered(shot), truth_of(shot), shot);
   EXPECT_LT(error, 0.04);
   ::testing::Test::RecordProperty("error", std::to_string(error));
 }
