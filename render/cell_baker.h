@@ -316,7 +316,7 @@ class CellBaker final : public RaySink {
             .one_of_many = ray.one_of_many,
             .mirrored = true};
   }
-  bool is_behind_mirrored(const ShadePoint& p, Vec3f direction, float far_m);
+  float seen_past_plate(const ShadePoint& p, Vec3f direction, float far_m);
 
   // cell_cut_rays.cpp
   void note_cut_ray(const ShadePoint& from, Vec3f throughput, LookUp& sees, bool rough);

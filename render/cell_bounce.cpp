@@ -60,16 +60,23 @@ void CellBaker::meet_plate(const QueuedRay& ray, std::size_t i) {
   add_bent(p, ray.throughput, unshaded, view);
 }
 
-// A light, or lamp, that what lobes mirror of the plate hides: there the plate shows it, if at all.
-bool CellBaker::is_behind_mirrored(const ShadePoint& p, Vec3f direction, float far_m) {
+// How much of a light, or lamp, lobes see: not where the plate shows a real surface before it.
+float CellBaker::seen_past_plate(const ShadePoint& p, Vec3f direction, float far_m) {
   const Scene& scene = *frame_->inputs.scene;
-  if (!scene.has_mirrored()) return false;
+  if (!scene.has_mirrored() || !frame_->lens) return 1;
   const Vec3f origin = offset_origin(p.hit, direction);
   ++statistics_->shadow_rays;
   if (counting_) ++counting_[p.pixel].shadow_rays;
   if (grid_) grid_->mark_line(origin, direction, far_m, transport_->reach.passed);
-  return transmittance(scene, origin, direction, 0, far_m, mask_mirrored, gather_.pictures) ==
-         Vec3f{};
+  const auto met = closest_hit(scene, origin, direction, 0, mask_mirrored, RayKind::reflection,
+                               gather_.pictures);
+  if (!met || met->distance >= far_m) return 1;
+  const Vec3f from_camera = origin + direction * met->distance - frame_->camera;
+  PlateView view{.sees = direction, .spread = {}, .mirrored = true};
+  find_plate(
+      calibrate::project(*frame_->lens, calibrate::to_double(frame_->turn.to_camera(from_camera))),
+      view);
+  return 1 - view.share;
 }
 
 // Whether a mirrored ray meets a stand-in, and sees the plate there.

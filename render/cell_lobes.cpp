@@ -424,8 +424,9 @@ void CellBaker::mirror_compact(const Lobe& lobe, std::size_t light, Vec3f share)
   if (!(density > 0)) return;
   const ShadePoint& p = *lobe.point;
   const Vec3f direction = frame_->planned_table->lights[light].direction;
-  if (!lobe.difference && is_behind_mirrored(p, direction, ray_far)) return;
-  const Vec3f weight = lobe.throughput * share * density;
+  const float seen = lobe.difference ? 1 : seen_past_plate(p, direction, ray_far);
+  if (!(seen > 0)) return;
+  const Vec3f weight = lobe.throughput * share * (density * seen);
   if (past_pictures_) {
     add_light_past_pictures(p, target_of(p), direction, light, weight);
   } else {
@@ -500,11 +501,13 @@ void CellBaker::add_lamp(const Lobe& lobe, std::size_t number, Vec3f passed) {
   const float blur_rad = calibrate::hypotenuse(std::sqrt(disc / squared), lobe.cone_rad);
   const float density = lobe.seen.blurred(lobe.roughness, blur_rad, direction);
   const Vec3f weight = lobe.throughput * passed * (density * facing / (squared + disc));
-  const Vec3f planned = weight * frame_->planned_table->lamps[number].intensity;
+  Vec3f planned = weight * frame_->planned_table->lamps[number].intensity;
   const float least = (1 - frame_->job->effort.accuracy) / (8 * static_cast<float>(lamps.size()));
   if (!(std::max(largest(planned), largest(-planned)) > least)) return;
-  if (!lobe.difference && is_behind_mirrored(p, direction, std::sqrt(squared))) return;
-  add_lamp_past_pictures(p, target_of(p), number, weight);
+  const float seen = lobe.difference ? 1 : seen_past_plate(p, direction, std::sqrt(squared));
+  if (!(seen > 0)) return;
+  planned = planned * seen;
+  add_lamp_past_pictures(p, target_of(p), number, weight * seen);
   samples_[p.slot].added += planned;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <string>
 
@@ -11,8 +12,10 @@
 #include "calibrate/pose.h"
 #include "made_shot.h"
 #include "render/kept_transport.h"
+#include "render/light_follower.h"
 #include "render/reference.h"
 #include "render/renderer.h"
+#include "tests/render/sun_and_sky.h"
 
 namespace compositing::mirrored_plate_test {
 namespace {
@@ -275,6 +278,47 @@ TEST(MirroredPlate, IsTheEnvironmentWithoutALens) {
       sum += std::pow(pictures[1].pixels[i], 2);
     }
     EXPECT_LT(std::sqrt(off / sum), 0.01) << roughness;
+  }
+}
+
+// A sun that stands behind a real wall shows in metal where the plate shows nothing of that wall,
+// and not where it does.
+TEST(MirroredPlate, HidesTheSunWhereItShowsTheWallBeforeIt) {
+  for (const bool in_picture : {false, true}) {
+    render::SceneDescription scene = shot_scene();
+    scene.instances.pop_back();  // the glass ball
+    scene.materials[1] = render::make_standard_material("ball", metal(0.3F));
+    add_wall(scene, in_picture ? 4.0F : -8.0F, 8, 0);
+    scene.instances.back().kind = render::ObjectKind::stand_in;
+    scene.instances.back().blocks_light = false;
+    scene.instances.back().mirrored = true;
+    MadeShot shot = made_shot(96, 72, scene);
+    shot.job.cam_from_set = calibrate::look_at({0, -4, 1}, {0, 0, 0.7}, 0);
+    shot.environment = render::make_sun_and_sky(
+        {.sun_radius_rad = 0.01F,
+         .sun_azimuth_rad = (in_picture ? 0.5F : -0.5F) * std::numbers::pi_v<float>,
+         .sun_elevation_rad = 0.15F,
+         .clouds = 0},
+        256);
+    render::LightFollower follower;
+    shot.job.lights = follower.follow(shot.environment, {});
+    render::smooth_for_reflections(shot.environment, follower.compact_texels());
+    ASSERT_TRUE(shot.environment.compact_apart);
+    const capture::Image picture = rendered(shot), truth = truth_of(shot);
+    const auto brightest = [](const capture::Image& of) {
+      float most = 0;
+      for (std::size_t i = 0; i < of.pixels.size(); i += 4) most = std::max(most, of.pixels[i]);
+      return most;
+    };
+    ::testing::Test::RecordProperty(in_picture ? "wall" : "sun",
+                                    std::to_string(brightest(picture)));
+    if (in_picture) {
+      EXPECT_LT(brightest(picture), 3);
+      EXPECT_LT(brightest(truth), 3);
+    } else {
+      EXPECT_GT(brightest(picture), 5);
+      EXPECT_GT(brightest(truth), 5);
+    }
   }
 }
 
