@@ -297,7 +297,7 @@ TEST(MirroredPlate, HidesTheSunWhereItShowsTheWallBeforeIt) {
     shot.environment = render::make_sun_and_sky(
         {.sun_radius_rad = 0.01F,
          .sun_azimuth_rad = (in_picture ? 0.5F : -0.5F) * std::numbers::pi_v<float>,
-         .sun_elevation_rad = 0.15F,
+         .sun_elevation_rad = 0.4F,
          .clouds = 0},
         256);
     render::LightFollower follower;
