@@ -63,6 +63,7 @@ void CellBaker::bake(const FrameContext& frame,
     const CellReach reach = known ? *known : may_be_apart ? transport.reach : CellReach{};
     find(stage, false);
     transport.reach.add(reach);
+    if (may_be_apart) transport.shadow_answers.forget();  // for the first try's are not all here
   }
   transport.rays =
       statistics.primary_rays + statistics.shadow_rays + statistics.secondary_rays - rays_before;
@@ -75,6 +76,10 @@ bool CellBaker::find(int stage, bool past_pictures) {
   transport.clear();
   past_pictures_ = transport.past_pictures = past_pictures;
   gather_.pictures = past_pictures ? LivePictures::passed_apart : LivePictures::met;
+  // Rays that caustics let through differ from others in more than where they go.
+  transport.shadow_answers.begin(grid_ != nullptr && !frame.caustics);
+  gather_.notes.begin_cell(grid_ != nullptr ? &transport.shadow_answers : nullptr,
+                           frame.inputs.scene->places().bounds);
   needs_pictures_ = false;
   const auto& table = *frame.inputs.directions;
   transport.blocks = {block_, std::min(cell_size, table.width - x0_),

@@ -109,6 +109,7 @@ void CellBaker::settle_doubts(int count) {
   doubtful_.fill(nowhere);
   clear_receivers();
   Receivers& r = receivers_;
+  gather_.notes.begin(shadow_rays_, r, ShadowRays::anywhere);
   std::array<bool, stream_rays> has_lobe{};
   for (const Lobe& lobe : lobes_) has_lobe[index_of(*lobe.point)] = true;
   std::array<std::uint32_t, stream_rays + 1> first_of_point{};

@@ -108,6 +108,9 @@ class MovedThings {
   // Whether bounced rays may meet it; whether light may come otherwise to points.
   bool may_be_passed(const CellReach& reach) const;
   bool may_light(const CellReach::Receivers& receivers) const;
+  // Whether that is by what fills, or has left, these, and nothing else.
+  bool shade_alone() const { return relit_.empty(); }
+  std::span<const Scene::Bounds> where() const { return where_; }
 
  private:
   bool may_shade(const Scene::Bounds& receivers) const;

@@ -361,6 +361,7 @@ void CellTransport::clear() {
   picture_shadows.clear(), looks_apart = {}, nearest_m = farthest_m = 0;
   picture_lights.clear(), shadowed.clear(), mirrored_shadowed.clear();
   reach = {};
+  shadow_answers.forget();
   rays = 0;
   counts.clear();
 }
@@ -379,7 +380,8 @@ std::size_t CellTransport::bytes() const {
          of(environments_behind) +
          std::accumulate(environments_behind.begin(), environments_behind.end(), std::size_t{0},
                          [](std::size_t sum, const auto& e) { return sum + e.bytes(); }) +
-         of(picture_lights) + of(picture_shadows) + of(shadowed) + of(mirrored_shadowed);
+         of(picture_lights) + of(picture_shadows) + of(shadowed) + of(mirrored_shadowed) +
+         shadow_answers.bytes();
 }
 
 void relight(const CellTransport& cell,

@@ -233,7 +233,8 @@ struct CellTransport {
   float nearest_m = 0, farthest_m = 0;
   std::vector<Shadowed> shadowed, mirrored_shadowed;  // one each, or none
   CellReach reach;                                    // if anything moves
-  std::uint64_t rays = 0;                             // that it took
+  ShadowAnswers shadow_answers;
+  std::uint64_t rays = 0;  // that it took
   // By pixel, or empty if nobody has asked: a cell that is kept without them is found anew, once.
   std::vector<RayCount> counts;
 

@@ -1,13 +1,17 @@
 // Transport kept from frame to frame.
 #include "render/kept_transport.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <iterator>
 #include <utility>
 
+#include "capture/parallel_loop.h"
 #include "render/kernel.h"
+#include "render/light_gather.h"
+#include "render/trace.h"
 
 namespace render {
 namespace {
@@ -23,15 +27,63 @@ std::array<float, 2> distances_to(const Scene::Bounds& box, Vec3f from) {
   return {length(Vec3f{x[0], y[0], z[0]}), length(Vec3f{x[1], y[1], z[1]})};
 }
 
+// Whether cells' shadow rays come to something else where things moved.
+class ShadowTest {
+ public:
+  ShadowTest(const MovedThings& things, const LightTable& lights, const FrameContext& frame)
+      : things_(things),
+        lights_(lights),
+        frame_(frame),
+        moved_(things.where(), lights.lights.size(), frame.soft_lights) {}
+
+  // Yes where that is not known.
+  bool differs(const CellTransport& cell, int stage) const {
+    if (!cell.shadow_answers.known() || !things_.shade_alone()) return true;
+    prepare_thread();
+    const Effort& effort = frame_.efforts[static_cast<std::size_t>(stage)];
+    const LightContext context{.scene = frame_.inputs.scene,
+                               .table = &lights_,
+                               .effort = &effort,
+                               .parts = effort.soft_lights ? &frame_.soft_lights : nullptr};
+    std::unique_ptr<GatherWorkspace>& workspace = workspaces_.local();
+    if (!workspace) workspace = std::make_unique<GatherWorkspace>();
+    const LivePictures pictures =
+        cell.past_pictures ? LivePictures::passed_apart : LivePictures::met;
+    return cell.shadow_answers.differ(context, moved_, pictures, *workspace);
+  }
+
+ private:
+  const MovedThings& things_;
+  const LightTable& lights_;
+  const FrameContext& frame_;
+  MovedInLight moved_;
+  mutable tbb::enumerable_thread_specific<std::unique_ptr<GatherWorkspace>> workspaces_;
+};
+
 }  // namespace
 
 void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame) {
+  scarce_ = bytes_ > room() / 2;
+  follow(keys, frame);
+  if (!scarce_) return;
+  for (Cell& cell : cells_) {
+    if (cell.transport) drop_answers(cell);
+  }
+}
+
+// Pictures come before cells that stay where things move.
+void KeptTransport::drop_answers(Cell& cell) {
+  const std::size_t bytes = cell.transport->shadow_answers.bytes();
+  cell.transport->shadow_answers = {};
+  cell.bytes -= bytes, bytes_ -= bytes;
+}
+
+void KeptTransport::follow(const FrameKeys& keys, const FrameContext& frame) {
   const Scene& scene = *frame.inputs.scene;
   const bool same_size = frame.columns == columns_ && frame.rows == rows_;
   auto moved = Scene::moved(places_, scene.places());
   const bool same_transport = keys.transport == keys_.transport;
   light_stays_ = keys.light.all == keys_.light.all;
-  scarce_ = bytes_ > room() / 2;
   keys_ = keys;
   const auto caustics_before = std::exchange(shown_caustics_, frame.caustics);
   const bool same_way = stalls_.empty() == frame.stalls.empty();
@@ -99,30 +151,38 @@ void KeptTransport::forget(Changes changes, const FrameContext& frame) {
                        changes.relit);
   };
   // Cells that were found without pictures stay while these stay in their stalls.
-  const MovedThings but_apart = things(changes.but_apart), stalls = things(changes.stalls);
-  std::ranges::copy(changes.stalls, std::back_inserter(changes.moved));
-  const MovedThings moved = things(changes.moved);
-  const auto matters = [&](const MovedThings& things, std::size_t i, const CellTransport& cell) {
-    return things.may_be_seen(cones_[i], frame.camera) || things.may_change(cell.reach);
-  };
-  for (std::size_t i = 0; i < cells_.size(); ++i) {
+  const MovedThings but_apart = things(changes.but_apart), stalls = things(changes.stalls),
+                    moved = things(changes.moved);
+  const bool all_but_apart = changes.but_apart.size() == changes.moved.size();
+  const ShadowTest but_apart_test(but_apart, lights, frame), moved_test(moved, lights, frame);
+  capture::parallel_for(std::size_t{0}, cells_.size(), [&](std::size_t i) {
     Cell& cell = cells_[i];
     if (cell.stage == none) {
       cell.needs_pictures = none;
-      continue;
+      return;
     }
     const CellTransport& transport = *cell.transport;
+    const auto may_be_met = [&](const MovedThings& things) {
+      return things.may_be_seen(cones_[i], frame.camera) || things.may_be_passed(transport.reach);
+    };
+    const auto matters = [&](const MovedThings& things, const ShadowTest& test) {
+      return may_be_met(things) ||
+             (things.may_light(transport.reach.lit) && test.differs(transport, cell.stage));
+    };
     if (transport.past_pictures) {
-      const bool changed = any_past && (matters(but_apart, i, transport) ||
+      const bool changed = any_past && (matters(but_apart, but_apart_test) ||
                                         stalls_matter(changes.stalls, stalls, i, frame));
       if (changed) cell.stage = none;
-    } else if (matters(moved, i, transport)) {
-      const bool but_by_pictures =
-          any_past && (matters(but_apart, i, transport) || matters(stalls, i, transport));
-      cell.needs_pictures = but_by_pictures ? none : cell.stage;
-      cell.stage = none;
+      return;
     }
-  }
+    const bool by_stalls =
+        any_past && (may_be_met(stalls) || stalls.may_light(transport.reach.lit));
+    if (!by_stalls && !matters(moved, moved_test)) return;
+    const bool by_others =
+        any_past && (by_stalls || all_but_apart || matters(but_apart, but_apart_test));
+    cell.needs_pictures = by_others ? none : cell.stage;
+    cell.stage = none;
+  });
 }
 
 // Whether a cell that was found without pictures would be found otherwise with other stalls: where
@@ -212,11 +272,12 @@ void KeptTransport::keep(int column, int row, int stage) {
   const std::size_t bytes = cell.transport->bytes();
   const std::size_t others = bytes_.fetch_add(bytes - cell.bytes) - cell.bytes;
   cell.bytes = bytes;
+  if (others + bytes > room() / 2) drop_answers(cell);
   cell.stage = stage;
   cell.needs_pictures = none;
   if (cell.transport->bends_plate()) bends_plate_ = true;
-  const bool less = bytes <= std::exchange(cell.replaced, std::size_t{0});
-  if (others + bytes <= room() || less) return;
+  const bool less = cell.bytes <= std::exchange(cell.replaced, std::size_t{0});
+  if (others + cell.bytes <= room() || less) return;
   // Too much: this cell's is given back.
   full_ = true;
   bytes_ -= cell.bytes;

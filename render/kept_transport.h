@@ -131,6 +131,8 @@ class KeptTransport {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);
   }
+  void follow(const FrameKeys& keys, const FrameContext& frame);
+  void drop_answers(Cell& cell);
   void forget_all(const Scene& scene);
   // What moved, where light falls otherwise, and what of that shows no picture apart; where
   // pictures have other stalls.

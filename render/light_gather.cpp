@@ -84,17 +84,6 @@ Scene::Bounds box_of(const Receivers& r) {
   return {lower, upper};
 }
 
-bool can_be_blocked(const LightContext& context, const Scene::Bounds& box, std::size_t light) {
-  if (!context.effort->cull_lights) return true;
-  const Vec3f middle = context.table->lights[light].direction;
-  const DirectionRange to =
-      context.has_parts(light) ? context.parts->range(light) : DirectionRange{middle, middle};
-  const auto& boxes = context.scene->blocker_boxes();
-  return may_be_met(context.scene->blocker_bounds(), box, to) &&
-         std::any_of(boxes.begin(), boxes.end(),
-                     [&](const Scene::Bounds& b) { return may_be_met(b, box, to); });
-}
-
 // A point that counts little tests every second, fourth ... light only; compact ones are few and
 // strong, and are tested by all. 0 = none.
 std::uint32_t stride_of(const Effort& effort, float share) {
@@ -221,6 +210,14 @@ LightRows::LightRows(std::span<const DirectionalLight> lights) : number(order_by
   }
 }
 
+bool LightContext::can_be_blocked(const Scene::Bounds& from, std::size_t light) const {
+  if (!effort->cull_lights) return true;
+  const DirectionRange to = range(light);
+  return may_be_met(scene->blocker_bounds(), from, to) &&
+         std::ranges::any_of(scene->blocker_boxes(),
+                             [&](const Scene::Bounds& b) { return may_be_met(b, from, to); });
+}
+
 unsigned LightContext::mask_to(std::uint32_t light) const {
   return caustics != nullptr && caustics->photons().follows(light) ? ray_glass_blocks : 0U;
 }
@@ -240,6 +237,7 @@ void gather_cell(const LightContext& context,
   visibility.near.resize(lights.size());
   CellMask soft_shadow{};
   const Scene::Bounds box = box_of(r);
+  w.notes.begin(context, r, ShadowRays::to_lights);
   CellMask real_first{};
   if (context.scene->has_real_blockers()) {
     for (std::size_t k = 0; k < cell_pixels; ++k) {
@@ -263,7 +261,10 @@ void gather_cell(const LightContext& context,
       if (group[i].compact == 0) {
         for (std::size_t word = 0; word < 4; ++word) w.lit[i][word] &= answering[word];
       }
-      skip[i] = w.lit[i] == CellMask{} || !can_be_blocked(context, box, first + i);
+      skip[i] = true;
+      if (w.lit[i] == CellMask{}) continue;
+      skip[i] = !context.can_be_blocked(box, first + i);
+      if (skip[i]) w.notes.leave_out(first32 + static_cast<std::uint32_t>(i), box);
     }
     if (real_first != CellMask{}) {
       // Light that real things block is not there to be lost.
@@ -389,6 +390,7 @@ void gather_points(const LightContext& context,
   const auto& lights = context.table->lights;
   const bool real = context.scene->has_real_blockers();
   ask_lights(context, r, w);
+  w.notes.begin(context, r, ShadowRays::to_lights);
   std::size_t rays = 0;
   const auto visit = [&](std::uint32_t k, std::uint32_t i, bool blocked, Vec3f share) {
     const Vec3f passed = blocked ? Vec3f{} : share;
@@ -410,9 +412,10 @@ void gather_points(const LightContext& context,
       const Vec3f origin{r.px[k], r.py[k], r.pz[k]};
       ++statistics.shadow_rays;
       if (w.counts) ++w.counts[k];
-      if (transmittance(*context.scene, origin, to, 0, ray_far, mask_real_blocker) == Vec3f{}) {
-        continue;
-      }
+      const bool blocked =
+          transmittance(*context.scene, origin, to, 0, ray_far, mask_real_blocker) == Vec3f{};
+      w.notes.note(origin, mask_real_blocker, to, blocked);
+      if (blocked) continue;
     }
     w.ray_weight[static_cast<std::size_t>(w.rays)] = weight;
     add_ray(w, r, k, i, to, r.mask[k] | (in(r.by_caustics, k) ? context.mask_to(i) : 0U));
@@ -427,6 +430,7 @@ void gather_cell_lamps(const LightContext& context,
                        CellLamps& cell,
                        RenderStatistics& statistics) {
   const auto& lamps = context.table->lamps;
+  w.notes.begin(context, r, ShadowRays::to_lamps);
   for (std::size_t first = 0; first < lamps.size(); first += GatherWorkspace::group) {
     const std::size_t count = std::min<std::size_t>(GatherWorkspace::group, lamps.size() - first);
     std::array<std::uint16_t, GatherWorkspace::group> place{};
@@ -481,6 +485,7 @@ void gather_point_lamps(const LightContext& context,
     rays = 0;
     flush(*context.scene, w, statistics, visit);
   };
+  w.notes.begin(context, r, ShadowRays::to_lamps);
   w.ways.resize(lamps.size());
   const auto count = static_cast<std::size_t>(r.count);
   for (std::size_t first = 0; first < count; first += 8) {

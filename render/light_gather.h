@@ -11,6 +11,7 @@
 #include "render/lamp_way.h"
 #include "render/ray_log.h"
 #include "render/scene.h"
+#include "render/shadow_answers.h"
 #include "render/trace.h"
 
 namespace render {
@@ -74,12 +75,14 @@ struct GatherWorkspace {
   alignas(64) std::array<float, stream_rays> ox, oy, oz, dx, dy, dz, near_m, far_m, time;
   alignas(64) std::array<unsigned, stream_rays> mask, id, flags;
   alignas(64) std::array<float, stream_rays> tr, tg, tb;  // transmittance so far
+  std::array<float, stream_rays> reach_m;  // far_m before they were shot, if `notes` ask for it
   std::array<std::uint32_t, stream_rays> ray_light, ray_point;
   std::array<float, stream_rays> ray_weight;  // of callers who want one back
   int rays = 0;
   RayLog* log = nullptr;                      // keeps all rays, if set
   std::uint32_t* counts = nullptr;            // adds up shadow rays by receiver, if set
   LivePictures pictures = LivePictures::met;  // that block light
+  ShadowNotes notes;
 
   static constexpr int group = 64;  // lights at a time
   std::array<CellMask, group> lit, seen, tested, near;
@@ -100,7 +103,7 @@ struct GatherWorkspace {
   LightSums soft;
   // What is so near to a centre, times the radius of a light, casts penumbrae narrower than pixels
   // can share.
-  std::array<float, cell_pixels> sharp_m;
+  std::array<float, cell_pixels> sharp_m{};
   CellMask same2;  // pixels whose 2x2 block is one smooth surface
   // A smooth surface, or what of it lies in a 4x4 block.
   struct Region {
@@ -147,6 +150,13 @@ struct LightContext {
   // What shadow rays to a light of the table carry in their mask beside what blocks them.
   unsigned mask_to(std::uint32_t light) const;
   bool has_parts(std::size_t light) const { return parts != nullptr && parts->has(light); }
+  // Within which all directions lie in which a light is looked for.
+  DirectionRange range(std::size_t light) const {
+    const Vec3f middle = table->lights[light].direction;
+    return has_parts(light) ? parts->range(light) : DirectionRange{middle, middle};
+  }
+  // Whether anything may be in a light's way from that box.
+  bool can_be_blocked(const Scene::Bounds& from, std::size_t light) const;
   // Towards a light from a receiver: to the part that it looks for, or to the middle, if that part
   // has set there.
   Vec3f direction(const Receivers& r, std::size_t point, std::uint32_t light) const {

@@ -1,6 +1,8 @@
 // Shadow rays to Embree.
 #include "render/shadow_stream.h"
 
+#include <algorithm>
+
 #include "render/embree_context.h"
 
 namespace render {
@@ -27,7 +29,9 @@ void shoot(const Scene& scene, GatherWorkspace& w, RenderStatistics& statistics)
   RTCRayNp rays{w.ox.data(),    w.oy.data(),   w.oz.data(), w.near_m.data(),
                 w.dx.data(),    w.dy.data(),   w.dz.data(), w.time.data(),
                 w.far_m.data(), w.mask.data(), w.id.data(), w.flags.data()};
+  if (w.notes.ask_for_reach()) std::copy_n(w.far_m.begin(), n, w.reach_m.begin());
   rtcOccludedNp(scene.embree(), &context.context, &rays, n);
+  w.notes.note(w);
   statistics.shadow_rays += n;
   if (w.counts) {
     for (unsigned i = 0; i < n; ++i) ++w.counts[w.ray_point[i]];

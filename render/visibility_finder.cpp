@@ -94,11 +94,13 @@ void VisibilityFinder::find(std::uint32_t first, std::span<const bool> skip) {
     if (!skip[i]) refine_quads(first, i);
   }
   shoot_rest(first);
+  w_.notes.go_on(ShadowRays::near_to_lights);
   for (std::size_t i = 0; i < count; ++i) {
     w_.near[i] = {};
     if (!skip[i] && ray_mask_ == 0 && has_parts(first, i)) test_near(first, i);
   }
   shoot_near(first);
+  w_.notes.go_on(lamps_ ? ShadowRays::to_lamps : ShadowRays::to_lights);
   for (std::size_t i = 0; i < count; ++i) {
     if (!skip[i]) spread(i);
   }

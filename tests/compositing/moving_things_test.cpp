@@ -160,6 +160,78 @@ TEST(MovingThings, ShowAtOnceInEveryCellThatSeesThem) {
   }
 }
 
+// A room in whose light things take small steps, each of which changes a few shadows: only where a
+// shadow ray comes to something else, or rays may see them, is anything found anew.
+struct SmallSteps {
+  MadeRoom room{160, 128};
+  render::SceneDescription scene = MadeRoom::describe();
+  render::KeptTransport kept;
+  double lost = 0;  // share of the cells, mean of the frames
+
+  explicit SmallSteps(std::vector<std::size_t> moving) {
+    for (const std::size_t i : moving) scene.instances[i].moves = true;
+  }
+  // Moves a thing along, in so many frames, each of which is to have the bits of a cold one.
+  void take(std::size_t thing, Vec3f step, int frames) {
+    room.scene = std::make_unique<render::Scene>(scene);
+    render_room(room, &kept);
+    lost = 0;
+    for (int frame = 0; frame < frames; ++frame) {
+      auto& place = scene.instances[thing].set_from_object;
+      place[3] += step.x, place[7] += step.y, place[11] += step.z;
+      room.scene = std::make_unique<render::Scene>(scene, *room.scene);
+      render::FrameInputs inputs = room.inputs();
+      inputs.kept = &kept;
+      render::prepare_frame(inputs, room.job, room.plate);
+      const std::vector<int> stages = kept.stages();
+      lost += static_cast<double>(std::ranges::count(stages, render::KeptTransport::none)) /
+              static_cast<double>(stages.size() * static_cast<std::size_t>(frames));
+      const render::FrameResult warm = render_room(room, &kept);
+      const render::Scene built(scene);
+      inputs = room.inputs();
+      inputs.scene = &built;
+      render::FrameResult cold;
+      render_frame(inputs, room.job, room.plate, cold);
+      EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << thing << " " << frame;
+      EXPECT_EQ(warm.matte.pixels, cold.matte.pixels) << thing << " " << frame;
+    }
+  }
+};
+
+TEST(MovingThings, LeaveCellsWhoseShadowRaysComeToTheSame) {
+  SmallSteps dull({4, 5, 6});
+  dull.scene.instances[0].mesh = 1;  // no floor that mirrors
+  dull.take(4, {0.004F, 0.003F, 0}, 6);
+  EXPECT_GT(dull.lost, 0.05);
+  EXPECT_LT(dull.lost, 0.45);
+  SmallSteps glass({6});
+  glass.take(6, {0.002F, -0.004F, 0.002F}, 4);
+  EXPECT_LT(glass.lost, 0.6);
+  SmallSteps lamps({4});
+  const auto screen = render::sample_area_light(lamps.scene, MadeRoom::screen_instance, 3, {2, 2});
+  lamps.room.job.lights.lamps = lamps_of(screen, lamps.room.video, {{4, 4, 4}, 0.02F});
+  lamps.take(4, {0.003F, 0, 0.002F}, 4);
+  EXPECT_LT(lamps.lost, 0.55);
+}
+
+// Something comes into the way of lights that nothing could block before, and leaves it again.
+TEST(MovingThings, ComeBetweenLightsThatNothingBlockedAndCells) {
+  SmallSteps far({4});
+  far.scene.instances[4].set_from_object[11] = 20;
+  far.scene.instances.erase(far.scene.instances.begin() + 5, far.scene.instances.end());
+  far.take(4, {0.2F, -0.3F, -4}, 6);
+  far.take(4, {0, 0, 9}, 3);
+}
+
+// More shadow rays than are kept of any cell.
+TEST(MovingThings, ShowWhereCellsHaveTooManyShadowRaysToKeep) {
+  SmallSteps many({4});
+  many.room.job.lights.lights = even_lights(900).lights;
+  many.room.job.effort.adaptive_visibility = false;
+  many.take(4, {0.004F, 0.003F, 0}, 2);
+  EXPECT_GT(many.lost, 0.5);
+}
+
 // A small thing in a corner leaves most of a wide picture as it is.
 TEST(MovingThings, LeaveCellsFarAwayAsTheyAre) {
   render::SceneDescription scene = shot_scene(false);
