@@ -43,6 +43,8 @@ constexpr double small_part = 0.0625, seconds_to_go_straight = 1.5;
 // A cell may hold a live frame up for so many frames. Those that took such a part, or more, of what
 // one took before that was given up then, wait: in each frame for what is more by so much.
 constexpr double most_frames_of_cell = 3, part_that_waits = 0.9, forgotten_in_frame = 1.01;
+// While something moves, for so many: others wait until it stands.
+constexpr double most_frames_in_motion = 0.25;
 
 // The step through all cells in which they take their turns, spread over the picture: by the golden
 // section (Knuth, "The Art of Computer Programming" 3, 6.4).
@@ -69,12 +71,14 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
 }
 
 double Sharpening::most_of_cell_ms() const {
-  return live_ ? most_frames_of_cell * frame_ms_ : HUGE_VAL;
+  if (!live_) return HUGE_VAL;
+  return (moves_ ? most_frames_in_motion : most_frames_of_cell) * frame_ms_;
 }
 
 bool Sharpening::takes_too_long(std::size_t cell, std::size_t to) const {
   const CellTime& time = cell_times_[cell];
   if (time.too_fine != 0 && to >= time.too_fine) return true;
+  if (moves_ && time.too_fine_in_motion != 0 && to >= time.too_fine_in_motion) return true;
   return time.stage != 0 && double{time.ms} * cost_[to] / cost_[time.stage] > most_of_cell_ms();
 }
 bool Sharpening::may_take_too_long(std::size_t cell, std::size_t to) const {
@@ -92,7 +96,8 @@ void Sharpening::follow_cells() {
       time.stage = one.stage, time.ms = one.took_ms;
       continue;
     }
-    time.too_fine = one.stage;
+    (moves_ ? time.too_fine_in_motion : time.too_fine) = one.stage;
+    if (moves_) continue;
     if (time.stage == 0) continue;
     double& least_ms = least_of_slow_ms_[one.stage];
     least_ms = std::min(least_ms, part_that_waits * double{time.ms});
@@ -100,7 +105,7 @@ void Sharpening::follow_cells() {
 }
 
 std::string Sharpening::why_coarse() const {
-  if (share() >= 1) return "";
+  if (share() >= 1 || moves_) return "";
   if (stopped_) {
     return fmt::format(
         "the memory for what is kept is used up: the picture gets no sharper while nothing moves, "
@@ -234,6 +239,7 @@ SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const floa
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
   const auto lost = static_cast<std::size_t>(std::ranges::count(kept, none));
+  moves_ = live_ && lost > 0;
   const std::size_t first = stage_of_lost(lost);
   lost_.fill(0);
   lost_[first] = lost;

@@ -91,10 +91,11 @@ class Sharpening {
   };
   Shed shed_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
+  bool moves_ = false;                   // in the last plan, live cells were lost
   // Of a cell that is kept: the last stage that was found ahead and what that took, and the stage
   // that took too long.
   struct CellTime {
-    std::uint8_t stage = 0, too_fine = 0;  // 0 = none
+    std::uint8_t stage = 0, too_fine = 0, too_fine_in_motion = 0;  // 0 = none
     float ms = 0;
   };
   std::vector<CellTime> cell_times_;

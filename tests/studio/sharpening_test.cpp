@@ -330,6 +330,27 @@ TEST(Sharpening, HasEdgesWithinASecondWhereItCan) {
   }
 }
 
+// While things move, what they leave as it is goes on, but no cell that takes longer than frames
+// have; that is found once they stand.
+TEST(Sharpening, LeavesSlowCellsUntilNothingMoves) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine{0.1};
+  machine.late_of(12, sharpening);
+  machine.slow_every = 20, machine.slow = 30;  // 48 ms
+  machine.moving = 40;
+  const int late = machine.late_of(400, sharpening);
+  EXPECT_LT(late, 10);
+  const auto finished = [&] {
+    return std::ranges::count(machine.kept, int{render::finished_stage});
+  };
+  EXPECT_GT(finished(), static_cast<std::ptrdiff_t>(cells - 200));
+  EXPECT_LT(finished(), static_cast<std::ptrdiff_t>(cells - 50));
+  EXPECT_EQ(sharpening.why_coarse(), "");
+  machine.moving = 0;
+  machine.late_of(200, sharpening);
+  EXPECT_EQ(machine.kept, std::vector<int>(cells, render::finished_stage));
+}
+
 // One cell in twenty would take seconds: none is waited for longer than three frames, hardly any
 // twice, all others are finished, and what stays is told.
 TEST(Sharpening, WaitsForNoCellThatWouldHoldFramesUp) {
