@@ -81,6 +81,7 @@ bool CellBaker::find(int stage, bool past_pictures) {
   gather_.notes.begin_cell(grid_ != nullptr ? &transport.shadow_answers : nullptr,
                            frame.inputs.scene->places().bounds);
   needs_pictures_ = false;
+  shades_ring_ = false;  // the cell before may have been given up there
   const auto& table = *frame.inputs.directions;
   transport.blocks = {block_, std::min(cell_size, table.width - x0_),
                       std::min(cell_size, table.height - y0_)};

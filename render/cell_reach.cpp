@@ -74,6 +74,7 @@ bool SpaceGrid::holds(const Scene::Bounds& bounds) const {
 }
 
 int SpaceGrid::box_at(Vec3f p) const {
+  if (!(per_size_.x > 0)) return -1;  // it is laid over nothing
   const Vec3f at{(p.x - lower_.x) * per_size_.x, (p.y - lower_.y) * per_size_.y,
                  (p.z - lower_.z) * per_size_.z};
   constexpr auto end = static_cast<float>(side);

@@ -26,6 +26,7 @@ EnvironmentPlaces::EnvironmentPlaces() {
 
 void EnvironmentPlaces::clear(const Environment& planned,
                               std::span<const capture::Image* const> levels) {
+  aside_ = false;  // a cell may have been given up meanwhile
   planned_ = &planned;
   levels_ = levels;
   places_.clear();

@@ -129,7 +129,8 @@ DataKey plate_levels_key(const FrameContext& context, const DataKey& before) {
   const std::vector<capture::Image>& levels = context.plate_levels->all();
   key.mix(levels[std::min<std::size_t>(glanced, levels.size() - 1)].pixels);
   const std::uint64_t glance = key.value();
-  if (glance != before.glance) return {glance, glance};
+  if (glance != before.glance)
+    return {glance, 0};  // not known: levels that are alike at a glance may differ
   key.mix(levels.front().pixels);
   return {glance, key.value()};
 }

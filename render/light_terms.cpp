@@ -6,6 +6,7 @@
 namespace render {
 
 void LightTerms::clear() {
+  aside_ = false;  // a cell may have been given up meanwhile
   terms_.clear();
   most_ = enough_terms;
 }

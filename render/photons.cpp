@@ -33,7 +33,8 @@ struct Grid {
   Vec3f corner;          // of the grid, in front of the box
   float step_m = 0;
   int columns = 0, rows = 0;
-  float rim_rad = 0;  // of the light
+  float wide_m = 0, high_m = 0;  // of what it is over
+  float rim_rad = 0;             // of the light
 };
 
 // A photon on its way.
@@ -81,6 +82,7 @@ Grid grid_over(const Scene::Bounds& box, Vec3f to_light) {
   const float rounding = std::max({std::abs(far.x), std::abs(far.y), std::abs(far.z)}) * 1e-5F;
   const float before = reach(to_light) * 1.01F + (wide + high) * 1e-3F + rounding;
   grid.corner = middle + to_light * before - grid.a * wide - grid.b * high;
+  grid.wide_m = 2 * wide, grid.high_m = 2 * high;
   return grid;
 }
 
@@ -131,11 +133,20 @@ class PhotonTracer {
     }
   }
 
+  // A real surface that hides nothing is met only if nothing virtual is behind it.
+  bool looks_on(const Photon& photon, const TracedHit& met) const {
+    if (!photon.bent || !scene_.has_standing_back()) return false;
+    const std::uint32_t instance =
+        scene_.surface_of(met.geom_id, met.prim_id, met.inst_id).instance;
+    const Instance& real = scene_.description().instances[instance];
+    return real.kind == ObjectKind::stand_in && !real.occludes;
+  }
+
   void follow(Photon photon) {
     const auto met =
         closest_hit(scene_, photon.origin, photon.direction, 0,
                     photon.bent ? blockers | mask_stand_in : blockers, RayKind::reflection);
-    note(photon.origin, photon.direction, met ? met->distance : ray_far);
+    note(photon.origin, photon.direction, met && !looks_on(photon, *met) ? met->distance : ray_far);
     if (!met) return;
     photon.share = photon.share * passed_through(scene_, photon.media, met->distance);
     if (!(largest(photon.share) > least_)) return;
@@ -293,7 +304,6 @@ std::vector<Grid> find_grids(const Scene& scene,
                              bool& whole) {
   const SceneDescription& description = scene.description();
   std::vector<Grid> grids;
-  std::vector<std::array<float, 2>> sizes;
   float total = 0;  // light on all boxes
   const auto light_of = [&](const Grid& grid) {
     return sum(table.lights[lights[grid.number]].irradiance);
@@ -314,17 +324,14 @@ std::vector<Grid> find_grids(const Scene& scene,
       grid.number = n;
       grid.instance = i;
       grid.rim_rad = light.spread;
-      const Vec3f diagonal = ((box.lower + box.upper) * 0.5F - grid.corner) * 2.0F;
-      const float wide = dot(diagonal, grid.a), high = dot(diagonal, grid.b);
-      if (!(std::max(wide, high) > 0) || !std::isfinite(wide * high)) continue;
-      sizes.push_back({wide, high});
+      const float area_m2 = grid.wide_m * grid.high_m;
+      if (!(std::max(grid.wide_m, grid.high_m) > 0) || !std::isfinite(area_m2)) continue;
       grids.push_back(grid);
-      total += light_of(grid) * wide * high;
+      total += light_of(grid) * area_m2;
     }
   }
-  for (std::size_t i = 0; i < grids.size(); ++i) {
-    Grid& grid = grids[i];
-    const auto [wide, high] = sizes[i];
+  for (Grid& grid : grids) {
+    const float wide = grid.wide_m, high = grid.high_m;
     // Each body has one at least of each light, or would be opaque to it.
     const float share = light_of(grid) * wide * high / total;
     const float all = static_cast<float>(photons);

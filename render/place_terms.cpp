@@ -42,6 +42,7 @@ void join_places(std::vector<KeyedPlace>& of_slot) {
 }
 
 void PlaceTerms::clear() {
+  aside_ = false;  // a cell may have been given up meanwhile
   terms_.clear();
   most_ = enough_terms;
 }

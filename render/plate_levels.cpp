@@ -2,6 +2,7 @@
 #include "render/plate_levels.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <span>
 #include <stdexcept>
@@ -52,6 +53,10 @@ void PlateLevels::fill(const capture::HalfImage& plate, const calibrate::Directi
     const std::size_t first = whole.index(y, 0);
     capture::floats_from_halves(std::span(plate.pixels).subspan(first, values),
                                 &whole.pixels[first]);
+    // What is no number, or endless, is its own pixel's alone.
+    for (float& value : std::span(whole.pixels).subspan(first, values)) {
+      if (!std::isfinite(value)) value = 0;
+    }
     for (int x = 0; !lens.sensitivity.empty() && x < plate.width; ++x) {
       const float by = 1 / sensitivity_of_plate(lens.sensitivity[lens.index(y, x)]);
       for (int c = 0; c < 3; ++c) whole.at(y, x, c) *= by;

@@ -17,6 +17,39 @@ unsigned mask_of(const Instance& instance) {
          (instance.occludes ? mask_occluder : 0U) | (instance.mirrored ? mask_mirrored : 0U);
 }
 
+// Where an instance's tree stands, for Embree, which asks for a way back: what is flat is made a
+// hundred thousandth as thick as it is large. Hits are read by the matrix itself. False if it is
+// less than flat, so that nobody can see it.
+bool stand_tree(const std::array<float, 12>& set_from_object, std::array<float, 12>& placed) {
+  placed = set_from_object;
+  const auto column = [&](std::size_t i) {
+    return Vec3f{set_from_object[i], set_from_object[4 + i], set_from_object[8 + i]};
+  };
+  const auto row = [&](std::size_t i) {
+    return Vec3f{set_from_object[4 * i], set_from_object[4 * i + 1], set_from_object[4 * i + 2]};
+  };
+  // The largest of three directions across two of them each: across all, if they are flat.
+  const auto across = [](const auto& of) {
+    Vec3f most{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Vec3f v = cross(of(i), of((i + 1) % 3));
+      if (length(v) > length(most)) most = v;
+    }
+    return most;
+  };
+  const float size = std::max({length(column(0)), length(column(1)), length(column(2))});
+  const Vec3f out = across(column), in = across(row);
+  constexpr float least = 1e-30F, thin = 1e-5F;
+  if (!(length(out) > least) || !(length(out) > 1e-7F * size * size)) return false;
+  if (std::abs(determinant(set_from_object)) > 0.1F * thin * size * length(out)) return true;
+  const Vec3f to = normalize(out) * (thin * size), from = normalize(in);
+  const std::array<float, 3> t{to.x, to.y, to.z}, f{from.x, from.y, from.z};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) placed[4 * i + k] += t[i] * f[k];
+  }
+  return true;
+}
+
 // A box around a box that is moved.
 Scene::Bounds placed_bounds(const Scene::Bounds& box, const std::array<float, 12>& m) {
   if (!(box.lower.x <= box.upper.x)) return no_bounds;
@@ -149,9 +182,14 @@ void Scene::Impl::add_instance(std::uint32_t instance, RTCScene inner) {
   const bool all_placed = instance == Part::none;
   const Instance still;
   const Instance& placing = all_placed ? still : description.instances[instance];
-  rtcSetGeometryMask(geometry, all_placed ? ~0U : mask_of(placing));
-  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR,
-                          placing.set_from_object.data());
+  std::array<float, 12> place;
+  const bool is_there = stand_tree(placing.set_from_object, place);
+  if (!is_there) {
+    const Instance nowhere;
+    std::copy_n(nowhere.set_from_object.begin(), place.size(), place.begin());
+  }
+  rtcSetGeometryMask(geometry, all_placed ? ~0U : is_there ? mask_of(placing) : 0U);
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, place.data());
   rtcCommitGeometry(geometry);
   rtcAttachGeometryByID(scene, geometry, static_cast<unsigned>(instance_of_geometry.size()));
   rtcReleaseGeometry(geometry);

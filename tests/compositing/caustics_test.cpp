@@ -131,6 +131,47 @@ TEST(Caustics, AreInTheVeryFrameInWhichAnythingMoves) {
   }
 }
 
+// A real floor that hides nothing shows what is below it: what moves there comes into the way of
+// light that glass has bent.
+TEST(Caustics, AreInTheVeryFrameInWhichSomethingMovesBehindWhatHidesNothing) {
+  BallShot ball(64);
+  ball.shot.job.effort.caustic_photons = 3000;
+  render::SceneDescription scene = ball.shot.scene->description();
+  scene.instances[0].occludes = false;
+  ball.shot.scene = std::make_unique<render::Scene>(std::move(scene));
+  const std::size_t box = ball.shot.scene->description().instances.size() - 1;
+  ball.move(box, 2, -2);  // below the floor
+  ball.move(box, 0, -0.9F);
+  render::KeptTransport kept;
+  for (int frame = 0; frame < 8; ++frame) {
+    ball.move(box, frame % 2, frame % 3 == 0 ? 0.25F : -0.12F);
+    const render::FrameResult warm = ball.show(&kept), cold = ball.show();
+    EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
+  }
+}
+
+// Hidden by the least scale that there is, far from where the set begins.
+TEST(Caustics, OfWhatIsTinyAndFarAwayAreNone) {
+  BallShot ball(32);
+  ball.shot.job.effort.caustic_photons = 500;
+  for (const float far_m : {3.0F, 30.0F, 300.0F}) {
+    for (int turn = 0; turn < 6; ++turn) {
+      render::SceneDescription scene = ball.shot.scene->description();
+      const float angle = static_cast<float>(turn);
+      for (std::size_t i = 1; i < scene.instances.size(); ++i) {
+        auto& place = scene.instances[i].set_from_object;
+        place = {1e-6F, 0,   0, far_m * std::cos(angle), 0, 1e-6F, 0, far_m * std::sin(angle), 0, 0,
+                 1e-6F, 0.5F};
+      }
+      BallShot tiny(32);
+      tiny.shot.job.effort.caustic_photons = 500;
+      tiny.shot.scene = std::make_unique<render::Scene>(std::move(scene));
+      for (const capture::Half value : tiny.show().rgba.pixels)
+        ASSERT_TRUE(std::isfinite(capture::float_from_half(value))) << far_m << " " << turn;
+    }
+  }
+}
+
 TEST(Caustics, AreTheSameWhateverTheTiles) {
   BallShot ball(80);
   ball.shot.job.effort.caustic_photons = 3000;
