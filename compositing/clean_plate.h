@@ -116,6 +116,8 @@ class PlateLight {
   // Of colour, against the primary; of the gain within a cell: what noise may make of them.
   float tolerance() const { return tolerance_; }
   float spread() const { return spread_; }
+  // LitPlate::sigma under a mean gain: noise of dim light is the larger part of the share.
+  float sigma_under(float gain) const;
   const LitPlate& lit() const { return *lit_; }
   // The same, not touched by later updates while it is held.
   std::shared_ptr<const LitPlate> shared_lit() const { return lit_; }
@@ -136,6 +138,7 @@ class PlateLight {
   PlateSight measure(const Rows& rows);
   template <class Rows>
   CellSums look_at(const Rows& rows, int row, int column) const;
+  float know_background_alone();
   std::array<F8, 3> ratios_at(int y, int x) const;
   void prepare();
   void light_up();
@@ -164,6 +167,10 @@ class PlateLight {
   std::vector<float> shown_;  // of the gain's cells: 1 = shows the screen
   float tolerance_ = 0;       // of colour, against the primary
   float spread_ = 0;          // of the gain within a cell
+  // Means over the screen: of light as noise weighs it, and of excess.
+  float noisy_light_ = 0, excess_ = 0;
+  float usual_gain_ = 1;  // of PlateUse::difference, in the frame before
+  std::vector<float> known_gains_;
 };
 
 }  // namespace compositing

@@ -134,6 +134,9 @@ struct LightPolynomial {
 
 LightPolynomial light_polynomial(capture::Transfer transfer);
 
+// What has so much of the least excess of bare screen, or less, may have none of its colour.
+inline constexpr float hardly_of_excess = 0.25F;
+
 // Light between which a block of pixels is screen at a glance, in the keyer's order.
 struct LightBounds {
   std::array<float, 3> most{};  // 0 lets nothing through
@@ -197,9 +200,10 @@ class LightRows {
   }
 
   // Whether eight pixels of `rows` rows from (y, x) on have all no more of the first channel than
-  // of the mean of the others, or hardly.
-  bool lacks_first(int y, int x, int rows) const {
-    constexpr float hardly = 0.03F;
+  // of the mean of the others, or hardly: much less than what is within the bounds has.
+  bool lacks_first(int y, int x, int rows, const LightBounds& bounds) const {
+    const float excess = bounds.least - 0.5F * (bounds.most[1] + bounds.most[2]);
+    const float hardly = std::clamp(hardly_of_excess * excess, 0.0F, 0.03F);
     for (int row = 0; row < rows; ++row) {
       std::array<F8, 3> c;
       load_raw(at(y + row, x), c);
@@ -366,8 +370,14 @@ class CodeRows {
     return within & ((1U << rows) - 1);
   }
 
-  bool lacks_first(int y, int x, int rows) const {
-    constexpr int hardly = 10;
+  bool lacks_first(int y, int x, int rows, const CodeBounds& bounds) const {
+    const auto bound = [&](std::uint32_t of, std::size_t c) {
+      return static_cast<int>(of >> shifts_[c] & 255);
+    };
+    const int excess =
+        bound(bounds.least, 0) - (bound(bounds.most, 1) + bound(bounds.most, 2) + 1) / 2;
+    const int hardly =
+        std::clamp(static_cast<int>(hardly_of_excess * static_cast<float>(excess)), 0, 10);
     const std::uint8_t* from = at(y, x);
     const std::size_t down = 4 * static_cast<std::size_t>(width_);
 #if defined(__AVX2__)

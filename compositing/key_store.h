@@ -23,6 +23,8 @@ namespace compositing {
 inline constexpr float calm = 1.0F, moving = 2.0F, least_gain_of_change = 0.2F;
 // Alpha below this share of the noise is none; from twice of it on it is as it was.
 inline constexpr float haze_of_noise = 0.6F;
+// More would take from alpha of 1, too.
+inline constexpr float most_haze = 0.5F;
 // One pixel alone of eight in a row is a speck of noise up to so many times of that: what is bare
 // then stays bare over wide stretches, which rays pass at once.
 inline constexpr float speck_of_haze = 3, most_of_speck = 0.25F;
@@ -41,7 +43,7 @@ class KeyStore {
         out_(out),
         width_(static_cast<std::size_t>(plate.width)),
         across_((width_ + key_lanes - 1) / key_lanes),
-        haze_(noise * haze_of_noise) {
+        haze_(std::min(noise * haze_of_noise, most_haze)) {
     const std::size_t rows = 8 * static_cast<std::size_t>((plate.height + 7) / 8);
     if (scratch.past.size() != across_ * rows || !scratch.has_previous) {
       scratch.previous.assign(across_ * rows * key_lanes, 0);
@@ -137,7 +139,10 @@ class KeyStore {
     written = 0;
   }
   void mark_written(int y, int x) { out_.written[block_at(y, x)] = 1; }
-  void mark_written(std::size_t block) { std::memset(out_.written + 8 * block, 1, 8); }
+  // The first rows of a block, which at the lower edge has no more.
+  void mark_written(std::size_t block, int rows) {
+    std::memset(out_.written + 8 * block, 1, static_cast<std::size_t>(rows));
+  }
   void mark_written(std::size_t block, std::size_t row, bool written) {
     out_.written[8 * block + row] = written ? 1 : 0;
   }

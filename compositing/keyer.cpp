@@ -203,7 +203,8 @@ KeyReport Keyer::key_light(const capture::Image& frame, const Target& target) {
   if (quick_) {
     const PlateSight sight = quick_->update(rows, settings_.follows_light);
     watch(rows);
-    return report(sight, key_quickly(rows, std::span(quick_->light_bounds()), target));
+    return report(sight,
+                  key_quickly(rows, std::span(quick_->light_bounds()), sigma(sight), target));
   }
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   watch(rows);
@@ -220,7 +221,7 @@ KeyReport Keyer::key_codes(const CodedFrame& frame, const Target& target) {
     const PlateSight sight = quick_->update(rows, settings_.follows_light);
     watch(rows);
     const std::span bare(quick_->code_bounds(frame.transfer));
-    return report(sight, key_quickly(rows, bare, target));
+    return report(sight, key_quickly(rows, bare, sigma(sight), target));
   }
   const PlateSight sight = light_.update(frame, settings_.follows_light);
   watch(rows);
@@ -283,9 +284,10 @@ float Keyer::key_rows(const Source& source,
 template <class Source>
 float Keyer::key_quickly(const Source& source,
                          std::span<const typename Source::Bounds> bare,
+                         float sigma,
                          const Target& target) {
   const LitPlate& plate = light_.bare();
-  const float noise = settings_.smoothing * plate.sigma;
+  const float noise = settings_.smoothing * sigma;
   QuickPass<Source> pass(
       source, {plate, *quick_, dials_, masks_.garbage, masks_.core, masked_, noise, bare}, scratch_,
       {target.pixels, target.written});
@@ -313,7 +315,7 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
     lower(least_if_clipped + (1 - least_if_clipped) * screen_clipped.of(sight.clipped),
           KeyStatus::clipped);
     lower(screen_shadowed.of(sight.shadowed), KeyStatus::shadowed);
-    lower(noise_of_share.of(light_.lit().sigma), KeyStatus::noisy);
+    lower(noise_of_share.of(sigma(sight)), KeyStatus::noisy);
   }
   lower(screen_unlike_plate.of(sight.mismatch), KeyStatus::misfit);
   lower(neither_share.of(soft), KeyStatus::misfit);

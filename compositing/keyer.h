@@ -128,7 +128,12 @@ class Keyer {
   template <class Source>
   float key_quickly(const Source& source,
                     std::span<const typename Source::Bounds> bare,
+                    float sigma,
                     const Target& target);
+  // Noise of the screen's share in a frame's light.
+  float sigma(const PlateSight& sight) const {
+    return light_.sigma_under(settings_.follows_light ? sight.gain : 1);
+  }
   bool glances() const;
   template <class Rows>
   void watch(const Rows& rows);

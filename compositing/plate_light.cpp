@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "compositing/background_subtraction.h"
 #include "compositing/clean_plate.h"
 #include "compositing/key_lanes.h"
 #include "compositing/plate_cells.h"
@@ -119,7 +120,7 @@ PlateLight::PlateLight(CleanPlate plate, PlateUse use)
   bare_.columns = cells_along(bare_.width, bare_.step);
   bare_.colour = plate_.colour;
   bare_.cells = means_over(plate_, bare_.step);
-  double variance = 0, excess = 0, light = 0, count = 0;
+  double variance = 0, noisy_light = 0, excess = 0, light = 0, count = 0;
   for (std::size_t i = 0; i < bare_.cells.size(); i += 4) {
     float* c = &bare_.cells[i];
     const auto noise = [&](float x) { return plate_.noise_gain * x + plate_.noise_floor; };
@@ -133,11 +134,14 @@ PlateLight::PlateLight(CleanPlate plate, PlateUse use)
     }
     if (c[3] <= 0) continue;
     variance += noise(c[0]) + 0.25F * (noise(c[1]) + noise(c[2]));
+    noisy_light += c[0] + 0.25F * (c[1] + c[2]);
     excess += own, light += c[0], count += 1;
   }
   const double deviation = std::sqrt(variance / std::max(count, 1.0));
   bare_.sigma =
       use == PlateUse::screen && count > 0 ? static_cast<float>(deviation * count / excess) : 0.05F;
+  noisy_light_ = static_cast<float>(noisy_light / std::max(count, 1.0));
+  excess_ = static_cast<float>(excess / std::max(count, 1.0));
   const float share = static_cast<float>(deviation * std::max(count, 1.0) / std::max(light, 1e-3));
   tolerance_ = 0.035F + 3 * share;
   spread_ = 0.025F + 1.3F * share;
@@ -280,9 +284,52 @@ PlateSight PlateLight::update(const CodedFrame& frame, bool follow) {
                      follow);
 }
 
+float PlateLight::sigma_under(float gain) const {
+  const float lit = gain * excess_;
+  if (bare_.use != PlateUse::screen || !(lit > 0)) return bare_.sigma;
+  constexpr float floors = 1.5F;  // of the three channels together
+  return std::sqrt(plate_.noise_gain * gain * noisy_light_ + floors * plate_.noise_floor) / lit;
+}
+
+// A grey suit before a grey wall has the wall's colour in another light. A background's own light
+// changes from frame to frame, or all at once: cells that differ from it by more than shadows and
+// gleams do are not taken for it. Returns the share of cells that stay.
+float PlateLight::know_background_alone() {
+  constexpr float most_gleam = 1.5F, least_kept = 0.4F;
+  const auto cells = shown_.size();
+  float* const gains = filler_.value(0, 0);
+  float* const known = &filler_.weight(0, 0);
+  known_gains_.clear();
+  for (std::size_t i = 0; i < cells; ++i) {
+    if (known[i] > 0) known_gains_.push_back(gains[i]);
+  }
+  if (known_gains_.empty()) return 1;
+  const auto middle = [&](auto end) {
+    const auto at = known_gains_.begin() + (end - known_gains_.begin()) / 2;
+    std::nth_element(known_gains_.begin(), at, end);
+    return *at;
+  };
+  const auto is_near = [&](float gain) {
+    return gain >= darkest_shadow * usual_gain_ && gain <= most_gleam * usual_gain_;
+  };
+  const auto all = static_cast<float>(known_gains_.size());
+  auto end = std::partition(known_gains_.begin(), known_gains_.end(), is_near);
+  if (static_cast<float>(end - known_gains_.begin()) < least_kept * all) {
+    usual_gain_ = middle(known_gains_.end());
+    end = std::partition(known_gains_.begin(), known_gains_.end(), is_near);
+  }
+  const float kept = static_cast<float>(end - known_gains_.begin()) / all;
+  for (std::size_t i = 0; i < cells; ++i) {
+    if (known[i] > 0 && !is_near(gains[i])) gains[i] = known[i] = shown_[i] = 0;
+  }
+  if (kept > 0) usual_gain_ = middle(end);
+  return kept;
+}
+
 template <class Rows>
 PlateSight PlateLight::update_from(const Rows& rows, bool follow) {
   PlateSight sight = measure(rows);
+  if (bare_.use == PlateUse::difference) sight.screen *= know_background_alone();
   const std::shared_ptr<LitPlate> before = renew();
   if (bare_.use == PlateUse::screen) {
     const float scale = std::max(static_cast<float>(bare_.height) / learned_height, 1.0F);
@@ -297,8 +344,10 @@ PlateSight PlateLight::update_from(const Rows& rows, bool follow) {
     }
     sight.gain = sum / static_cast<float>(gains_.size());
     if (follow) light_up();
+    lit_->sigma = sigma_under(follow ? sight.gain : 1);
   } else if (before) {
     lit_->cells = before->cells;
+    lit_->sigma = before->sigma;
   }
   if (!follow && (gained_ || before)) {
     std::copy(bare_.cells.begin(), bare_.cells.end(), lit_->cells.begin());

@@ -30,7 +30,9 @@ constexpr float most_of_seen = 0.6F;                 // share that must
 PlateWatch::PlateWatch(const CleanPlate& plate)
     : height_(plate.light.height),
       width_(plate.light.width),
-      pixels_(std::max(2, static_cast<int>(std::lround(plate.light.width / 480.0)))),
+      pixels_(std::max(
+          2,
+          static_cast<int>(std::lround(std::max(plate.light.width, plate.light.height) / 480.0)))),
       noise_gain_(plate.noise_gain),
       noise_floor_(plate.noise_floor) {
   if (plate.light.empty() || plate.light.channels != 3) {

@@ -89,7 +89,7 @@ class QuickPass {
       look[i].bare =
           static_cast<std::uint8_t>(source_.pairs_within(top, 8 * i, rows, in_.bare[block]));
       look[i].open = look[i].bare != 0;
-      if (!look[i].open) look[i].plain = source_.lacks_first(top, 8 * i, rows);
+      if (!look[i].open) look[i].plain = source_.lacks_first(top, 8 * i, rows, in_.bare[block]);
       if (look[i].bare != (1U << rows) - 1) {
         in_.light.prefetch(block);
         store_.prefetch(top, 8 * i, rows);
@@ -128,7 +128,7 @@ class QuickPass {
   }
 
   void put_whole(int top, int x, int rows, std::size_t block) {
-    store_.mark_written(block);
+    store_.mark_written(block, rows);
     // Without smoothing nothing is kept, and so nothing would take it back.
     if (in_.noise > 0) store_.keep_whole(block);
     switch (primary_) {

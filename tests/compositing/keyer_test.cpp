@@ -365,6 +365,83 @@ TEST(Keyer, FollowsTheWallsAndNoPosterByDifference) {
 }
 
 // The screen is a third of what its plate shows.
+// A wall of one colour, and before it what has its colour in another light.
+TEST(Keyer, TakesClothesOfTheWallsColourFromItByDifference) {
+  constexpr int height = 96, width = 160;
+  const auto picture = [&](float light, float clothes, std::uint64_t seed) {
+    Image image = capture::make_image(height, width);
+    constexpr std::array wall{0.5F, 0.42F, 0.3F};
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      const std::size_t x = i / 3 % width, y = i / 3 / width;
+      const bool stands = clothes != 1 && x >= 48 && x < 112 && y >= 16;
+      image.pixels[i] =
+          light * (stands ? clothes : 1) * wall[i % 3] +
+          0.003F * static_cast<float>(capture::normal_deviate(capture::mixed_bits(seed, i)));
+    }
+    return image;
+  };
+  const std::vector<Image> shots{picture(1, 1, 1), picture(1, 1, 2), picture(1, 1, 3)};
+  KeySettings settings;
+  settings.method = KeyMethod::difference;
+  for (const float clothes : {0.25F, 0.4F, 1.9F}) {
+    Keyer keyer(average_plate(shots), settings);
+    const auto share_above = [&](float light, float worn, std::uint64_t seed) {
+      const Image keyed = keyed_picture(keyer, picture(light, worn, seed));
+      float inside = 0, outside = 0;
+      for (int y = 24; y < height; ++y) {
+        for (int x = 56; x < 104; ++x) inside += keyed.at(y, x, 3) / (48 * (height - 24));
+      }
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < 32; ++x) outside += keyed.at(y, x, 3) / (32 * height);
+      }
+      return std::array{inside, outside};
+    };
+    for (const float light : {1.0F, 1.1F, 0.95F, 0.5F, 0.5F}) {  // lamps that go half out at once
+      const auto [inside, outside] = share_above(light, clothes, 7);
+      // Of dim light, noise is the larger part, and the ramp of alpha is in its units.
+      EXPECT_GT(inside, light > 0.9F ? 0.95F : 0.3F) << clothes << " " << light;
+      EXPECT_LT(outside, 0.02F) << clothes << " " << light;
+    }
+    const auto [nobody, bare] = share_above(0.5F, 1, 9);
+    EXPECT_LT(nobody, 0.02F);
+    EXPECT_LT(bare, 0.02F);
+  }
+}
+
+// Of dim light the noise is a larger part: what is bare stays so, as with a plate that was taken in
+// that light.
+TEST(Keyer, KnowsThatNoiseIsMoreOfDimmerLight) {
+  constexpr int height = 135, width = 240;
+  const auto picture = [&](float light, std::uint64_t seed) {
+    Image image = capture::make_image(height, width);
+    constexpr std::array screen{0.03F, 0.3F, 0.05F};
+    for (std::size_t i = 0; i < image.pixels.size(); ++i) {
+      const float mean = light * screen[i % 3], sigma = std::sqrt(2e-5F + 1e-4F * mean);
+      const auto noise = static_cast<float>(capture::normal_deviate(capture::mixed_bits(seed, i)));
+      image.pixels[i] = std::max(mean + sigma * noise, 0.0F);
+    }
+    return image;
+  };
+  const auto plate_at = [&](float light) {
+    std::vector<Image> shots;
+    for (std::uint64_t i = 1; i <= 8; ++i) shots.push_back(picture(light, i));
+    return average_plate(shots);
+  };
+  for (const KeyEffort effort : {KeyEffort::full, KeyEffort::quick}) {
+    KeySettings settings;
+    settings.effort = effort;
+    const auto haze = [&](float plate_light) {
+      Keyer keyer(plate_at(plate_light), settings);
+      Image keyed;
+      for (std::uint64_t i = 20; i < 23; ++i) keyed = keyed_picture(keyer, picture(0.5F, i));
+      float above = 0;
+      for (std::size_t i = 3; i < keyed.pixels.size(); i += 4) above += keyed.pixels[i] > 0;
+      return above / (height * width);
+    };
+    EXPECT_LT(haze(1), 2 * haze(0.5F) + 0.01F);
+  }
+}
+
 TEST(Keyer, KeysBeforeAScreenThatIsTheLesserPartOfThePicture) {
   Image room = even_picture(64, 192, {0.5F, 0.4F, 0.3F});
   const auto fill = [](Image& image, int left, int right, std::array<float, 3> light) {

@@ -1,10 +1,12 @@
 // Quick keys against full ones, and what holds of both.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <random>
 #include <stdexcept>
 #include <string_view>
 #include <vector>
@@ -217,6 +219,87 @@ TEST(QuickKey, RefusesWhatTheFullOneRefuses) {
   const std::vector<std::uint8_t> few(8);
   EXPECT_THROW(keyer.key(CodedFrame{16, 24, few, capture::Transfer::srgb}, keyed),
                std::invalid_argument);
+}
+
+// A screen that hardly has any light of its colour, with a camera's noise: bare, it is clear.
+TEST(QuickKey, LeavesADimScreenClear) {
+  constexpr int height = 96, width = 160;
+  for (const std::array<int, 3> colour :
+       {std::array{0x1E, 0x3B, 0x21}, std::array{0x1A, 0x36, 0x1C}}) {
+    std::mt19937 random(7);
+    std::normal_distribution<double> noise(0, 2);
+    const auto shot = [&](std::vector<std::uint8_t>& codes) {
+      codes.resize(4 * height * width);
+      Image light = capture::make_image(height, width);
+      for (std::size_t i = 0; i < codes.size(); ++i) {
+        const std::size_t c = i % 4;
+        const double code = c < 3 ? colour[c] + noise(random) : 255;
+        codes[i] = static_cast<std::uint8_t>(std::clamp(std::lround(code), 0L, 255L));
+        if (c == 3) continue;
+        light.pixels[i / 4 * 3 + c] =
+            static_cast<float>(capture::decode(capture::Transfer::srgb, codes[i] / 255.0));
+      }
+      return light;
+    };
+    std::vector<std::uint8_t> codes;
+    std::vector<Image> shots;
+    for (int i = 0; i < 8; ++i) shots.push_back(shot(codes));
+    Keyer by_codes(average_plate(shots), quick_settings()),
+        by_light(average_plate(shots), quick_settings());
+    HalfImage a, b;
+    for (int i = 0; i < 3; ++i) {
+      const Image light = shot(codes);
+      by_codes.key({height, width, codes, capture::Transfer::srgb}, a);
+      by_light.key(light, b);
+    }
+    for (const HalfImage* keyed : {&a, &b}) {
+      const Image rgba = to_float(*keyed);
+      int opaque = 0;
+      for (std::size_t i = 3; i < rgba.pixels.size(); i += 4) opaque += rgba.pixels[i] > 0.5F;
+      EXPECT_LT(opaque, height * width / 500) << colour[0] << " " << (keyed == &a);
+    }
+  }
+}
+
+// A picture whose last rows are no whole block: once nobody is there, nothing is marked.
+TEST(QuickKey, ForgetsRowsAtTheLowerEdge) {
+  constexpr int height = 94, width = 160;
+  const Image screen = even_picture(height, width, {0.05F, 0.4F, 0.08F});
+  Image stands = screen;
+  for (int y = 40; y < height; ++y) {
+    for (int x = 40; x < 120; ++x)
+      stands.at(y, x, 0) = stands.at(y, x, 1) = stands.at(y, x, 2) = 0.3F;
+  }
+  const std::vector<Image> shots{screen, screen};
+  Keyer keyer(average_plate(shots), quick_settings());
+  KeyedFrame keyed;
+  for (int i = 0; i < 4; ++i) keyer.key(stands, keyed);
+  EXPECT_TRUE(keyed.has_any_in_block(11, 10));
+  for (int i = 0; i < 12; ++i) keyer.key(screen, keyed);
+  for (int row = 0; row < 12; ++row) {
+    for (int column = 0; column < 20; ++column)
+      EXPECT_FALSE(keyed.has_any_in_block(row, column)) << row << " " << column;
+  }
+}
+
+// However much is smoothed, and however noisy it is, what a mask holds is whole.
+TEST(QuickKey, KeepsWhatAMaskHoldsAlsoUnderNoise) {
+  constexpr int height = 64, width = 64;
+  const Image screen = even_picture(height, width, {0.02F, 0.06F, 0.02F});
+  CleanPlate plate = average_plate(std::vector<Image>{screen, screen});
+  plate.noise_gain = 0.01F, plate.noise_floor = 1e-4F;
+  KeyMasks masks;
+  masks.core.assign(height * width, 255);
+  for (const KeyEffort effort : {KeyEffort::quick, KeyEffort::full}) {
+    KeySettings settings;
+    settings.effort = effort;
+    settings.smoothing = 4;
+    Keyer keyer(plate, settings, masks);
+    HalfImage keyed;
+    for (int i = 0; i < 4; ++i) keyer.key(even_picture(height, width, {0.3F, 0.3F, 0.3F}), keyed);
+    const Image rgba = to_float(keyed);
+    for (std::size_t i = 3; i < rgba.pixels.size(); i += 4) ASSERT_EQ(rgba.pixels[i], 1) << i;
+  }
 }
 
 }  // namespace
