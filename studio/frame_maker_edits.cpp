@@ -147,13 +147,22 @@ void FrameMaker::apply(const Move& move) {
   const auto& [name, pose] = move;
   const std::optional<NamedParts> named = parts_named(set_, name);
   if (!named) throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
-  if (named->part) {
-    move_parts(set_, named->object, *named->part, pose, set_scene_);
-  } else {
-    set_.objects[named->object].pose = pose;
-    place_object(set_, named->object, set_scene_);
+  ObjectSettings& object = set_.objects[named->object];
+  const ObjectSettings object_before = object;
+  const std::vector<render::Instance> instances_before = set_scene_.description.instances;
+  try {
+    if (named->part) {
+      move_parts(set_, named->object, *named->part, pose, set_scene_);
+    } else {
+      object.pose = pose;
+      place_object(set_, named->object, set_scene_);
+    }
+    videos_->place(set_, set_scene_);
+  } catch (...) {  // what is refused changes nothing
+    object = object_before;
+    set_scene_.description.instances = instances_before;
+    throw;
   }
-  videos_->place(set_, set_scene_);
   renew_scene(scene_->pictures());
 }
 

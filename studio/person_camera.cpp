@@ -203,6 +203,7 @@ void PersonCameraFeed::begin_key(const VideoSource& source, const PersonCameraFe
     }
   } else {
     check_length();
+    if (was && was->takes_plate && before->keyer_) plate_before_ = before->taking_->plate();
     const bool by_screen = key.settings.method == compositing::KeyMethod::screen;
     taking_ = std::make_shared<PlateTaking>(masks_.garbage, by_screen, !info.live);
     notes_.push_back(fmt::format(
@@ -218,9 +219,18 @@ void PersonCameraFeed::go_on_with_plate(bool good) {
   try {
     take_plate(good);
   } catch (const std::exception& error) {
-    plate_failed_ = true;
-    notes_.push_back(fmt::format("has no plate: {}", error.what()));
+    give_up_plate(error.what());
   }
+}
+
+void PersonCameraFeed::give_up_plate(const std::string& why) {
+  plate_failed_ = true;
+  if (!plate_before_) {
+    notes_.push_back(fmt::format("has no plate: {}", why));
+    return;
+  }
+  notes_.push_back(fmt::format("has no new plate: {}; it is keyed by the one before", why));
+  make_keyer(*plate_before_, std::move(masks_));
 }
 
 // One more frame of the empty screen; after the last one the key begins, which takes a moment.
@@ -276,6 +286,15 @@ void PersonCameraFeed::advance(capture::Time time) {
       std::chrono::duration_cast<capture::Time>(std::chrono::duration<double>(settings_.offset_s));
   const std::optional<capture::Frame> frame = source_->at(time, offset);
   const capture::Frame& newest = frame && frame->image ? *frame : source_->newest();
+  if (takes_plate() && !plate_failed_ && !source_->info().live) {
+    same_picture_for_ = frame && newest.image == image_ ? same_picture_for_ + 1 : 0;
+    const bool stands = same_picture_for_ > shots_of_plate;
+    if (!frame || stands) {
+      give_up_plate(fmt::format("its video {} after {} of {} pictures",
+                                stands ? "stands still" : "has ended", taking_->given(),
+                                shots_of_plate));
+    }
+  }
   if (newest.image == image_ || !newest.image) return;
   skipped_ = image_ != shown_ || newest.pass_first != pass_;
   pass_ = newest.pass_first;

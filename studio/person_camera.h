@@ -100,6 +100,7 @@ class PersonCameraFeed {
   void make_keyer(const compositing::CleanPlate& plate, compositing::KeyMasks masks);
   void go_on_with_plate(bool good);
   void take_plate(bool good);
+  void give_up_plate(const std::string& why);
   void key_frame();
   void show_keyed(std::shared_ptr<const compositing::KeyedTexture> texture);
   void look_for_person(const compositing::KeyedFrame& keyed);
@@ -114,6 +115,8 @@ class PersonCameraFeed {
   std::unique_ptr<compositing::Keyer> keyer_;
   std::shared_ptr<PlateTaking> taking_;  // of plates that are taken
   bool plate_failed_ = false;
+  std::size_t same_picture_for_ = 0;  // frames of the show, while a file's plate is taken
+  std::shared_ptr<const compositing::CleanPlate> plate_before_;  // if one is taken anew
   compositing::KeyMasks masks_;  // for the key, once the plate is there
   std::future<std::unique_ptr<compositing::Keyer>> coming_keyer_;
   std::vector<std::string> notes_;

@@ -72,6 +72,11 @@ std::shared_ptr<const compositing::CleanPlate> PlateTaking::plate() {
   return plate_;
 }
 
+std::size_t PlateTaking::given() {
+  const std::lock_guard lock(mutex_);
+  return given_;
+}
+
 std::optional<std::string> PlateTaking::take_doubts() {
   if (!plate()) return std::nullopt;
   const std::lock_guard lock(mutex_);

@@ -32,6 +32,8 @@ class PlateTaking {
 
   // One more picture, (height, width, 3), of the size of those before, if the plate is not there.
   void add(std::shared_ptr<const capture::Image> shot);
+  // Pictures that it has.
+  std::size_t given();
   // Null until it is there. Throws what went wrong while it was made.
   std::shared_ptr<const compositing::CleanPlate> plate();
   // Once it is there: what speaks against it, in words, or "". Nothing from the second call on.

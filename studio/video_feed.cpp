@@ -100,13 +100,13 @@ std::shared_ptr<VideoFeed::Player> VideoFeed::open(const VideoSettings& settings
 void VideoFeed::place(const Set& set, const SetScene& scene) {
   Faults faults(set.path);
   std::size_t lamps = set.lamps.size();
+  std::vector<std::vector<render::AreaLight>> lights(channels_.size());
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     const VideoSettings& video = channels_[i].settings;
-    channels_[i].lights.clear();
     if (!video.lights) continue;
     try {
-      channels_[i].lights = area_lights_of(scene, i, video.samples);
-      for (const render::AreaLight& light : channels_[i].lights) lamps += light.samples.size() + 1;
+      lights[i] = area_lights_of(scene, i, video.samples);
+      for (const render::AreaLight& light : lights[i]) lamps += light.samples.size() + 1;
       if (lamps > static_cast<std::size_t>(render::most_lights)) {
         faults.add(video.object_place,
                    fmt::format("{} lamps so far, but a set holds at most {}: fewer samples", lamps,
@@ -118,6 +118,7 @@ void VideoFeed::place(const Set& set, const SetScene& scene) {
     }
   }
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+  for (std::size_t i = 0; i < channels_.size(); ++i) channels_[i].lights = std::move(lights[i]);
 }
 
 void VideoFeed::update(Player& player, capture::Time time, const capture::Frame& plate) {

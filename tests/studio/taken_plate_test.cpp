@@ -171,6 +171,61 @@ TEST_F(TakenPlate, OfTooShortAVideoIsRefused) {
   }
 }
 
+// As Stage, but it ends, or is one picture again and again; nothing tells before.
+class ShortStage final : public capture::Camera {
+ public:
+  ShortStage(int frames, bool stands) : left_(frames), stands_(stands) {}
+  const capture::CameraInfo& info() const override { return stage_.info(); }
+  capture::CameraStatistics statistics() const override { return {}; }
+  std::optional<capture::Frame> next() override {
+    if (left_-- == 0) return std::nullopt;
+    auto frame = stage_.next();
+    if (stands_ && picture_) frame->image = picture_;
+    picture_ = frame->image;
+    return frame;
+  }
+
+ private:
+  Stage stage_;
+  int left_;
+  bool stands_;
+  std::shared_ptr<const capture::Image> picture_;
+};
+
+TEST_F(TakenPlate, TellsThatTooFewPicturesCame) {
+  capture::register_camera("brief", [](std::string_view rest, const capture::CameraOptions&) {
+    return std::make_unique<ShortStage>(std::stoi(std::string(rest)), false);
+  });
+  capture::register_camera("stands", [](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<ShortStage>(500, true);
+  });
+  const auto set_of = [&](const std::string& source, const std::string& key) {
+    return made_set("grey:500,25,0",
+                    "[[billboard]]\nname = \"she\"\nposition = [0, -1, 0]\nheight = 1.7\nsource = "
+                    "\"" +
+                        source + "\"\n[billboard.key]\nplate = \"take\"\n" + key);
+  };
+  for (const auto& [source, note] :
+       {std::pair("brief:30", "has no plate: its video has ended after 30 of 50 pictures"),
+        std::pair("stands:", "has no plate: its video stands still after 1 of 50 pictures")}) {
+    const Set set = set_of(source, "");
+    PersonFeed feed(set, std::nullopt, false);
+    int at = 0;
+    show_until(feed, set, at, 80);
+    EXPECT_THAT(feed.take_notes(), Contains(HasSubstr(note))) << source;
+  }
+  // Taken anew when the video is nearly over: the plate before goes on.
+  const Set set = set_of("brief:90", ""), anew = set_of("brief:90", "take = 1\n");
+  PersonFeed feed(set, std::nullopt, false);
+  int at = 0;
+  EXPECT_EQ(show_until(feed, set, at, 75).key, "good");
+  PersonFeed again(anew, std::nullopt, false, &feed);
+  again.take_over();
+  EXPECT_EQ(show_until(again, anew, at, 110).key, "good");
+  EXPECT_THAT(again.take_notes(),
+              Contains(HasSubstr("has no new plate: its video has ended after")));
+}
+
 // A lamp that flickers is nobody who moves, and what a garbage mask cuts away is no doubt.
 TEST(PlateTaking, DoubtsWhatMovesAndWhatIsNoScreen) {
   const auto shot = [](float light, int thing_at) {

@@ -106,6 +106,24 @@ TEST_F(VideoSetTest, TakesRaysForTheFirstFrameOnly) {
   EXPECT_EQ(rays[1] + rays[2], 0U);
 }
 
+// A move that is refused changes nothing, and the next one is done.
+TEST_F(VideoSetTest, RefusesAMoveThatLeavesNoScreenAndGoesOn) {
+  FrameMaker maker(made_set(light));
+  const PreparedFrame before = maker.make(0).value();
+  const auto places = [](const PreparedFrame& frame) {
+    std::vector<std::array<float, 12>> all;
+    for (const render::Instance& i : frame.scene->description().instances)
+      all.push_back(i.set_from_object);
+    return all;
+  };
+  EXPECT_THROW(maker.move_object("tv", {{200, 300, 0}, 0, 0, 1e-6}), std::exception);
+  const PreparedFrame same = maker.make(0).value();
+  EXPECT_EQ(places(same), places(before));
+  EXPECT_EQ(same.job.lights.lamps.size(), before.job.lights.lamps.size());
+  maker.move_object("cube", {{1.5, 0, 0}, 0, 0, 1});
+  EXPECT_NE(places(maker.make(0).value()), places(before));
+}
+
 TEST_F(VideoSetTest, HoldsTheLastPictureOfAVideoThatEndsAndSaysSo) {
   Show show(made_set("[[video]]\nsource = \"grey:2,25,0\"\nmaterial = \"screen\"\n"));
   const std::vector<float> screens = screens_of(show);
