@@ -77,7 +77,9 @@ bool CellBaker::find(int stage, bool past_pictures) {
   past_pictures_ = transport.past_pictures = past_pictures;
   gather_.pictures = past_pictures ? LivePictures::passed_apart : LivePictures::met;
   // Rays that caustics let through differ from others in more than where they go.
-  transport.shadow_answers.begin(grid_ != nullptr && !frame.caustics);
+  // Cells that are about to go on are not worth the time.
+  const bool stays = stage <= one_ray_stage || stage == finished_stage;
+  transport.shadow_answers.begin(grid_ != nullptr && !frame.caustics && stays);
   gather_.notes.begin_cell(grid_ != nullptr ? &transport.shadow_answers : nullptr,
                            frame.inputs.scene->places().bounds);
   needs_pictures_ = false;

@@ -297,6 +297,7 @@ void Sharpening::found_ahead(std::span<const std::uint8_t> stages, double ms) {
     reached_ += one.stage - std::size_t{plan_.stages[one.cell]};
   }
   went_on_ = !plan_.ahead.empty();
+  if (moves_ && in_vain_ms > 0) return;  // the others are the quick ones
   learn(found, all_ms > 0 ? ms * (1 - in_vain_ms / all_ms) : ms);
 }
 
