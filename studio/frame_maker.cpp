@@ -264,14 +264,23 @@ std::vector<std::string> FrameMaker::take_notes() {
   return notes;
 }
 
-// Tells of the first of frames that are lost in a row.
+// Tells of the first of frames that are lost in a row, of rows that are long, and of their ends.
 void FrameMaker::note_plate(const capture::Frame& frame) {
+  constexpr double long_s = 1;
   const bool lost = frame.status == capture::FrameStatus::lost;
-  if (lost && !plate_is_lost_) {
-    notes_.push_back(fmt::format("the plate's frame {} is lost{}{}", frame.number,
-                                 frame.note.empty() ? "" : ": ", frame.note));
+  const auto why = [&] { return frame.note.empty() ? "" : ": " + frame.note; };
+  const double lost_s = rate_.num > 0 ? static_cast<double>(plate_frames_lost_) / rate_.value() : 0;
+  if (lost && plate_frames_lost_ == 0) {
+    notes_.push_back(fmt::format("the plate's frame {} is lost{}", frame.number, why()));
+    plate_is_told_gone_ = false;
+  } else if (lost && lost_s >= long_s && !plate_is_told_gone_) {
+    notes_.push_back(fmt::format("the plate is gone, and its last picture stays{}", why()));
+    plate_is_told_gone_ = true;
+  } else if (!lost && plate_is_told_gone_) {
+    notes_.push_back(fmt::format("the plate is back after {:.1f} s", lost_s));
+    plate_is_told_gone_ = false;
   }
-  plate_is_lost_ = lost;
+  plate_frames_lost_ = lost ? plate_frames_lost_ + 1 : 0;
   if (plate_->is_live() || plate_is_cut_short_) return;
   const std::string how = plate_->statistics().cut_short;
   plate_is_cut_short_ = !how.empty();
@@ -280,7 +289,9 @@ void FrameMaker::note_plate(const capture::Frame& frame) {
 
 calibrate::Pose FrameMaker::pose_at(capture::Time time) {
   if (!track_) return set_.camera.pose.cam_from_set;
-  const double time_s = seconds(time);
+  // A track begins with a live plate, as with a file.
+  if (plate_->is_live() && !live_track_begins_) live_track_begins_ = time;
+  const double time_s = seconds(time - live_track_begins_.value_or(capture::Time{}));
   const calibrate::TrackedPose at = calibrate::pose_at(*track_, time_s);
   if (!at.inside && !is_off_track_) {
     notes_.push_back(

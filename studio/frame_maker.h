@@ -242,8 +242,10 @@ class FrameMaker {
   std::deque<VideoChange> openings_;  // of one video none twice but the first, which is on its way
   std::future<std::shared_ptr<VideoFeed::Player>> opening_;  // of the first
   std::vector<std::string> notes_;                           // for the next frame
-  bool plate_is_lost_ = false, plate_is_cut_short_ = false, is_off_track_ = false;
-  std::optional<capture::Frame> first_due_;  // of a live plate
+  std::int64_t plate_frames_lost_ = 0;                       // in a row
+  bool plate_is_told_gone_ = false, plate_is_cut_short_ = false, is_off_track_ = false;
+  std::optional<capture::Time> live_track_begins_;  // beside a live plate
+  std::optional<capture::Frame> first_due_;         // of a live plate
   Due last_due_;
   capture::Time last_picture_{};  // stamp of its newest one that was due
   capture::Time plate_delay_{};   // from the stamp of its last picture to its arrival

@@ -225,11 +225,10 @@ FrameMaker::Change FrameMaker::prepare(Set set,
   }
   // Last, since the frames of a recording go on.
   if (!light_->serves(set)) {
-    const std::optional<Moment> now = moment();
-    open_once_left([&] {
-      change.light = std::make_unique<LightFeed>(set, light_.get(),
-                                                 now ? std::optional(now->time) : std::nullopt);
-    });
+    // Beside a live plate a recording begins when it goes on air.
+    std::optional<capture::Time> from;
+    if (const std::optional<Moment> now = moment(); now && !plate_->is_live()) from = now->time;
+    open_once_left([&] { change.light = std::make_unique<LightFeed>(set, light_.get(), from); });
   }
   change.set = std::move(set);
   return change;

@@ -425,14 +425,17 @@ void ProbeSource::show(const Taken& taken) {
 ProbeSource::Radiance ProbeSource::at(capture::Time time, bool on_clock) {
   if (camera_) {
     const bool by_itself = camera_->is_live() && !on_clock;
+    // A recording begins with a show on the monotonic clock.
+    if (on_clock && !camera_->is_live() && !begun_) begun_ = time - camera_->first().time;
+    const capture::Time begun = begun_.value_or(capture::Time{});
     const capture::Time on_its_clock =
-        by_itself ? capture::monotonic_now() : time + offset_ - passed_;
+        by_itself ? capture::monotonic_now() : time - begun + offset_ - passed_;
     take_until(on_its_clock);
     if (ahead_.empty() && camera_->has_ended(on_its_clock))
       status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;
   }
-  return {newest_.image, newest_.time + passed_};
+  return {newest_.image, newest_.time + passed_ + begun_.value_or(capture::Time{})};
 }
 
 }  // namespace studio

@@ -65,7 +65,8 @@ class ProbeSource {
   // stamped by then. The same pointer as before if there is
   // nothing newer; when the camera has ended, its last. Where the newest shots tell nothing, since
   // all is saturated or all is black, the last good one stays. Where the show's time is not the
-  // monotonic clock, for its plate is a file, a live camera gives its newest.
+  // monotonic clock (`on_clock`), for its plate is a file, a live camera gives its newest; where it
+  // is, for its plate is live, a recording begins when it is first asked.
   Radiance at(capture::Time time, bool on_clock = true);
   const ProbeStatus& status() const { return status_; }
 
@@ -96,9 +97,10 @@ class ProbeSource {
   FileTimes times_;  // of the response, when it was read
   int height_ = 0, width_ = 0;
   std::vector<double> exposures_s_;
-  capture::Time offset_{};         // its clock less the show's
-  capture::Time passed_{};         // of a recording that loops: by passes before it was opened
-  std::vector<std::size_t> seen_;  // some of the pixels that the lens sees, evenly spread
+  capture::Time offset_{};              // its clock less the show's
+  std::optional<capture::Time> begun_;  // of a recording in a show on the monotonic clock, then
+  capture::Time passed_{};              // of a recording that loops: by passes before it was opened
+  std::vector<std::size_t> seen_;       // some of the pixels that the lens sees, evenly spread
   capture::WindowMergeSettings merging_;     // with the camera's noise, if calibration has told it
   std::unique_ptr<Source> camera_;           // null = the radiance stays
   std::unique_ptr<RollingBracket> bracket_;  // null while no two exposures are known

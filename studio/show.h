@@ -81,6 +81,7 @@ struct ShowStatus {
   std::int64_t dropped = 0;                   // left out because the show was late
   std::int64_t frame = -1;                    // number of the last one
   double fps = 0;                             // since the first frame was shown
+  double fps_now = 0, delay_now_frames = 0;   // of the last two seconds; the delay's median
   double frame_ms_p50 = 0, frame_ms_p99 = 0;  // from one shown frame to the next
   double first_frame_ms = 0;                  // from the show's making to its first picture
   std::array<double, stages> stage_ms{};      // mean of each stage

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <chrono>
+#include <deque>
+#include <utility>
 
 #include "studio/quantiles.h"
 #include "studio/show.h"
@@ -32,6 +34,7 @@ class Tally {
   Clock::time_point last_shown_;
   Quantiles interval_ms_;
   Quantiles delay_ms_;
+  std::deque<std::pair<Clock::time_point, double>> recent_;  // when frames were shown, their delay
   Quantiles light_age_ms_;
   std::array<double, stages> stage_sum_ms_{};
   ShowStatus status_;

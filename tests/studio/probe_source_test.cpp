@@ -110,7 +110,7 @@ class ProbeSourceTest : public testing::Test {
     std::vector<double> light;
     statuses_.clear();
     for (std::int64_t n = 3; n < frames; ++n) {  // it has read a bracket ahead
-      light.push_back(source.at(capture::time_of_frame(n, rate)).image->at(1, 3, 0));
+      light.push_back(source.at(capture::time_of_frame(n, rate), false).image->at(1, 3, 0));
       statuses_.push_back(source.status());
     }
     return light;
@@ -138,7 +138,7 @@ TEST(ProbeSource, ShowsWhatWasTakenByThenWhateverItsClock) {
         std::chrono::duration_cast<capture::Time>(std::chrono::duration<double>(offset_s));
     for (std::int64_t n = 0; n < 60; ++n) {  // of the probe, on the plate's clock
       const capture::Time time = capture::time_of_frame(n, rate) - offset + 1us;
-      const double light = source.at(time).image->pixels.front();
+      const double light = source.at(time, false).image->pixels.front();
       if (n < change) {
         EXPECT_NEAR(light, 100, 1) << offset_s << ", " << n;
       } else if (n >= change + 3) {
@@ -219,9 +219,9 @@ TEST_F(ProbeSourceTest, SaysThatItsCameraHasEnded) {
   set.probe->kind = ProbeSettings::Kind::camera;
   set.probe->source = "scripted:";
   ProbeSource source(set);
-  source.at(capture::time_of_frame(11, rate));
+  source.at(capture::time_of_frame(11, rate), false);
   EXPECT_EQ(source.status().kept_because, "");
-  source.at(capture::time_of_frame(13, rate));
+  source.at(capture::time_of_frame(13, rate), false);
   EXPECT_EQ(source.status().kept_because, "the probe has ended");
 }
 
@@ -302,8 +302,43 @@ TEST(ProbeSource, TakesGivenExposuresByPlacesInARecordingThatLoops) {
   set.probe->exposures_s.assign(exposures_s.begin(), exposures_s.end());
   ProbeSource source(set);
   for (std::int64_t n = 0; n < 25; ++n) {
-    const auto light = source.at(capture::time_of_frame(n, rate));
+    const auto light = source.at(capture::time_of_frame(n, rate), false);
     EXPECT_NEAR(light.image->pixels.front(), 100, 1) << n;
+  }
+}
+
+// Beside a live plate, whose times are the monotonic clock's, a recording begins with the show.
+TEST(ProbeSource, BeginsARecordingWithAShowOnTheMonotonicClock) {
+  const std::filesystem::path directory = made::make_temporary_directory();
+  for (int n = 0; n < 24; ++n) {
+    capture::Image shot = capture::make_image(4, 8);
+    const double light = n < 12 ? 50 : 100,
+                 exposure_s = exposures_s.at(static_cast<std::size_t>(n % 3));
+    for (float& value : shot.pixels) value = static_cast<float>(std::min(light * exposure_s, 1.0));
+    capture::write_exr((directory / ("p" + std::to_string(n) + ".exr")).string(), shot);
+  }
+  for (const bool loops : {false, true}) {
+    Set set;
+    set.camera.loop = loops;
+    set.show.fps = rate;
+    set.probe.emplace();
+    set.probe->kind = ProbeSettings::Kind::camera;
+    set.probe->source = "file:" + (directory / "p%d.exr").string();
+    set.probe->exposures_s.assign(exposures_s.begin(), exposures_s.end());
+    ProbeSource source(set);
+    const capture::Time begun = std::chrono::hours(7);
+    for (std::int64_t n = 0; n < 23; ++n) {
+      const auto light = source.at(begun + capture::time_of_frame(n, rate));
+      EXPECT_EQ(source.status().kept_because, "") << loops << " " << n;
+      if (n < 12) {
+        EXPECT_NEAR(light.image->pixels.front(), 50, 1) << n;
+      }
+      if (n > 14) {
+        EXPECT_NEAR(light.image->pixels.front(), 100, 1) << n;
+      }
+      EXPECT_LT(source.status().age, std::chrono::seconds(1));
+      EXPECT_GT(light.time, begun - std::chrono::seconds(1));
+    }
   }
 }
 

@@ -80,6 +80,34 @@ TEST_F(ShowNotes, NotesLostFramesOfThePlateOnceInARow) {
             2);
 }
 
+// Frames 5 to 44 of 60 are lost.
+class GapCamera final : public GreyCamera {
+ public:
+  GapCamera() : GreyCamera(60, {25, 1}, 0) {}
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (frame && frame->number >= 5 && frame->number < 45) {
+      frame->status = capture::FrameStatus::lost;
+      frame->note = "no picture came";
+    }
+    return frame;
+  }
+};
+
+TEST_F(ShowNotes, NotesThatThePlateIsGoneAndThatItIsBack) {
+  capture::register_camera("gap", [](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<GapCamera>();
+  });
+  Show show(made_set("gap:"));
+  show.run();
+  const auto& notes = show.status()->notes;
+  EXPECT_THAT(notes, Contains(HasSubstr("frame 5 is lost: no picture came")));
+  EXPECT_THAT(notes,
+              Contains(HasSubstr("the plate is gone, and its last picture stays: no picture")));
+  EXPECT_THAT(notes, Contains(HasSubstr("the plate is back after 1.6 s")));
+  EXPECT_GT(show.status()->fps_now, 0);
+}
+
 TEST_F(ShowNotes, NotesThatTheCamerasTrackHasEnded) {
   std::ofstream(dir_ / "track.csv") << "time_s,px,py,pz,qw,qx,qy,qz\n"
                                        "0,0,-8,4,0.7,-0.7,0,0\n0.1,0,-8,4,0.7,-0.7,0,0\n";
