@@ -97,6 +97,16 @@ std::vector<ReadFile> read_by(const Set& set) {
   return files;
 }
 
+// A set's file, by its name and tables.
+bool is_set(const std::string& path) {
+  if (std::filesystem::path(path).extension() != ".toml") return false;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with("[show]") || line.starts_with("[camera]")) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::vector<ReadFile> files_of(std::string_view uri, const std::string& what) {
@@ -115,6 +125,9 @@ std::vector<ReadFile> files_of(std::string_view uri, const std::string& what) {
 }
 
 void spare_files(std::span<const ReadFile> files, const std::string& written) {
+  if (is_set(written)) {
+    throw std::runtime_error(written + ": is a set, and would be lost: write to another file");
+  }
   if (written.empty()) return;
   for (const ReadFile& file : files) {
     if (!compositing::is_one_file(file.path, written) && !is_of_sequence(file.path, written)) {

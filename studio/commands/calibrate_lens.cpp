@@ -54,13 +54,15 @@ struct Picture {
 // A video gives every so many frames, a picture itself.
 std::vector<Picture> read_pictures(const LensOptions& options, Console& console) {
   constexpr std::size_t most_pictures = 500;
-  const std::int64_t every = options.every.value_or(25);
+  constexpr std::int64_t few = 50;  // a folder of single pictures, rather than a video
   std::vector<Picture> pictures;
   for (std::size_t i = 0; i < options.images.size(); ++i) {
     const std::string& source = options.images[i];
     console.progress(static_cast<double>(i) / static_cast<double>(options.images.size()),
                      "reading");
     const auto camera = open_recorded(source);
+    const std::int64_t frames = camera->info().frames;
+    const std::int64_t every = options.every.value_or(frames > 0 && frames <= few ? 1 : 25);
     std::int64_t frame_number = 0;
     while (const auto frame = camera->next()) {
       if (frame->image != nullptr && frame_number % every == 0) {

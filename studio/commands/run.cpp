@@ -9,7 +9,9 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -97,8 +99,9 @@ void report_progress(const ShowStatus& status,
       planned ? static_cast<double>(status.frames) / static_cast<double>(*planned) : 0;
   std::string text = fmt::format("frame {}", status.frames);
   if (planned) text += fmt::format(" of {}", *planned);
-  text += fmt::format("  {:.1f} fps  delay {:.1f}", status.fps, status.delay_frames);
+  text += fmt::format("  {:.1f} fps  delay {:.1f}", status.fps_now, status.delay_now_frames);
   if (status.dropped > 0) text += fmt::format("  dropped {}", status.dropped);
+  if (status.lost_plate_frames > 0) text += fmt::format("  lost {}", status.lost_plate_frames);
   console.progress(share, text);
 }
 
@@ -336,13 +339,20 @@ void run(const RunOptions& options, Console& console) {
   bool was_interrupted = false;
   try {
     const Interruptible ctrl_c;
+    // Also while the show is paused and shows nothing.
+    const std::jthread stopping([&](const std::stop_token& done) {
+      while (!done.stop_requested() && !ctrl_c.is_interrupted()) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      }
+      if (ctrl_c.is_interrupted()) show.post(Quit{});
+    });
     show.run([&](const ShownFrame& shown) {
       const auto status = show.status();
       report_progress(*status, planned, console);
       warnings.tell(shown, *status);
       // A show that is not live is there for its recording.
       const bool in_vain = !status->recorder.error.empty() && !show.is_live();
-      if (ctrl_c.is_interrupted() || in_vain) show.post(Quit{});
+      if (in_vain) show.post(Quit{});
       if (picture) picture->show(shown.view_rgb8 ? shown.view_rgb8 : shown.rgb8);
       last = shown;
     });
