@@ -157,7 +157,8 @@ class Recorder::Take {
   void write_sounds(const std::vector<capture::Sound>& sounds, capture::Time latest);
   void write_sound(std::int64_t first, std::span<const float> samples);
   void finish_videos() noexcept;
-  void stop(const std::string& error);
+  void stop(const std::string& what);
+  std::string with_all_that_ends(std::string error) const;
 
   const RecorderSettings settings_;
 
@@ -386,7 +387,20 @@ void Recorder::Take::finish_videos() noexcept {
   }
 }
 
-void Recorder::Take::stop(const std::string& error) {
+// What else ends where one output of a take fails.
+std::string Recorder::Take::with_all_that_ends(std::string error) const {
+  std::string others;
+  for (const std::string* file :
+       {&settings_.file, &settings_.fill_file, &settings_.key_file, &settings_.exr_dir}) {
+    if (file->empty() || error.find(*file) != std::string::npos) continue;
+    others += (others.empty() ? "" : ", ") + *file;
+  }
+  if (others.empty()) return error;
+  return error + "; with it the whole take ends: " + others + " too";
+}
+
+void Recorder::Take::stop(const std::string& what) {
+  const std::string error = with_all_that_ends(what);
   finish_videos();
   {
     const std::lock_guard lock(mutex_);

@@ -161,6 +161,8 @@ TEST_F(RecorderFaultsTest, ClosesTheVideoWholeWhenItIsTheExrFramesThatFail) {
   recorder.close();
   const RecorderStatus status = recorder.status();
   EXPECT_NE(status.error.find("frame.000005.exr"), std::string::npos) << status.error;
+  EXPECT_NE(status.error.find("the whole take ends: " + settings.file), std::string::npos)
+      << status.error;
   EXPECT_EQ(status.written, 5);
   EXPECT_EQ(status.dropped, 1);
   EXPECT_EQ(picture_times_s(settings.file).size(), 6U);
