@@ -252,7 +252,11 @@ TEST_F(CalibrateCommands, WhatWasReadIsNotWrittenOver) {
     EXPECT_THAT(outcome.err, HasSubstr("would be lost")) << words;
   }
   EXPECT_EQ(content_of(path("cam.rsp")), "1 1 0\n1 1 0\n1 1 0\n");
+  const std::string set = "[show]\nwidth = 64\n";
+  write("set.toml", set);
   for (const std::string& words : {"calibrate pose" + of_both + path("lens.toml"),
+                                   "calibrate pose" + of_both + path("set.toml"),
+                                   "calibrate probe" + of_both + path("set.toml"),
                                    "calibrate probe" + of_both + path("lens.toml"),
                                    "calibrate probe" + of_both + path("markers.toml"),
                                    "calibrate rig" + lenses + path("lens.toml"),
@@ -265,6 +269,7 @@ TEST_F(CalibrateCommands, WhatWasReadIsNotWrittenOver) {
     EXPECT_THAT(outcome.err, HasSubstr("would be lost")) << words;
     EXPECT_EQ(content_of(path("lens.toml")), lens) << words;
     EXPECT_EQ(content_of(path("markers.toml")), markers) << words;
+    EXPECT_EQ(content_of(path("set.toml")), set) << words;
   }
 }
 

@@ -284,23 +284,28 @@ TEST_F(ProbeSourceTest, ShowsWhatHasNoExposuresFrameByFrame) {
   EXPECT_EQ(statuses_.back().frames, 20);
 }
 
-// Ten pictures of three exposures: the eleventh frame has the first one's again.
-TEST(ProbeSource, TakesGivenExposuresByPlacesInARecordingThatLoops) {
+// A set whose probe is so many pictures of three exposures, of that radiance each.
+Set set_of_pictures(int count, bool loops, const std::function<double(int)>& radiance) {
   const std::filesystem::path directory = made::make_temporary_directory();
-  for (int n = 0; n < 10; ++n) {
+  for (int n = 0; n < count; ++n) {
     capture::Image shot = capture::make_image(4, 8);
-    const double exposure_s = exposures_s.at(static_cast<std::size_t>(n % 3));
-    for (float& value : shot.pixels) value = static_cast<float>(std::min(100 * exposure_s, 1.0));
+    const double light = radiance(n) * exposures_s.at(static_cast<std::size_t>(n % 3));
+    for (float& value : shot.pixels) value = static_cast<float>(std::min(light, 1.0));
     capture::write_exr((directory / ("p" + std::to_string(n) + ".exr")).string(), shot);
   }
   Set set;
-  set.camera.loop = true;
+  set.camera.loop = loops;
   set.show.fps = rate;
   set.probe.emplace();
   set.probe->kind = ProbeSettings::Kind::camera;
   set.probe->source = "file:" + (directory / "p%d.exr").string();
   set.probe->exposures_s.assign(exposures_s.begin(), exposures_s.end());
-  ProbeSource source(set);
+  return set;
+}
+
+// Of ten pictures the eleventh frame has the first one's exposure again.
+TEST(ProbeSource, TakesGivenExposuresByPlacesInARecordingThatLoops) {
+  ProbeSource source(set_of_pictures(10, true, [](int) { return 100; }));
   for (std::int64_t n = 0; n < 25; ++n) {
     const auto light = source.at(capture::time_of_frame(n, rate), false);
     EXPECT_NEAR(light.image->pixels.front(), 100, 1) << n;
@@ -309,23 +314,8 @@ TEST(ProbeSource, TakesGivenExposuresByPlacesInARecordingThatLoops) {
 
 // Beside a live plate, whose times are the monotonic clock's, a recording begins with the show.
 TEST(ProbeSource, BeginsARecordingWithAShowOnTheMonotonicClock) {
-  const std::filesystem::path directory = made::make_temporary_directory();
-  for (int n = 0; n < 24; ++n) {
-    capture::Image shot = capture::make_image(4, 8);
-    const double light = n < 12 ? 50 : 100,
-                 exposure_s = exposures_s.at(static_cast<std::size_t>(n % 3));
-    for (float& value : shot.pixels) value = static_cast<float>(std::min(light * exposure_s, 1.0));
-    capture::write_exr((directory / ("p" + std::to_string(n) + ".exr")).string(), shot);
-  }
   for (const bool loops : {false, true}) {
-    Set set;
-    set.camera.loop = loops;
-    set.show.fps = rate;
-    set.probe.emplace();
-    set.probe->kind = ProbeSettings::Kind::camera;
-    set.probe->source = "file:" + (directory / "p%d.exr").string();
-    set.probe->exposures_s.assign(exposures_s.begin(), exposures_s.end());
-    ProbeSource source(set);
+    ProbeSource source(set_of_pictures(24, loops, [](int n) { return n < 12 ? 50 : 100; }));
     const capture::Time begun = std::chrono::hours(7);
     for (std::int64_t n = 0; n < 23; ++n) {
       const auto light = source.at(begun + capture::time_of_frame(n, rate));
