@@ -65,7 +65,7 @@ class ShadowTest {
 void KeptTransport::begin_frame(const FrameKeys& keys, const FrameContext& frame) {
   scarce_ = bytes_ > room() / 2;
   follow(keys, frame);
-  if (!scarce_) return;
+  if (bytes_ <= room() / 8 * 7) return;
   for (Cell& cell : cells_) {
     if (cell.transport) drop_answers(cell);
   }
@@ -272,7 +272,7 @@ void KeptTransport::keep(int column, int row, int stage) {
   const std::size_t bytes = cell.transport->bytes();
   const std::size_t others = bytes_.fetch_add(bytes - cell.bytes) - cell.bytes;
   cell.bytes = bytes;
-  if (others + bytes > room() / 2) drop_answers(cell);
+  if (others + bytes > room() / 4 * 3) drop_answers(cell);
   cell.stage = stage;
   cell.needs_pictures = none;
   if (cell.transport->bends_plate()) bends_plate_ = true;
