@@ -5,12 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "render/box_meets.h"
+
 namespace render {
 namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
-
-float part(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
 bool is_empty(const Scene::Bounds& b) { return !(b.lower.x <= b.upper.x); }
 
@@ -18,36 +18,6 @@ Vec3f middle(const Scene::Bounds& b) { return (b.lower + b.upper) * 0.5F; }
 Vec3f half_size(const Scene::Bounds& b) { return (b.upper - b.lower) * 0.5F; }
 
 Scene::Bounds grown(const Scene::Bounds& b, Vec3f by) { return {b.lower - by, b.upper + by}; }
-
-// The stretch of from + t * direction, 0 <= t <= far, inside of a box; first > last: none.
-struct Stretch {
-  float first, last;
-};
-Stretch inside(const Scene::Bounds& box, Vec3f from, Vec3f direction, float far) {
-  Stretch s{0, far};
-  for (int axis = 0; axis < 3; ++axis) {
-    const float o = part(from, axis), d = part(direction, axis);
-    const float low = part(box.lower, axis), high = part(box.upper, axis);
-    if (d == 0) {
-      if (o < low || o > high) return {1, 0};
-      continue;
-    }
-    const float a = (low - o) / d, b = (high - o) / d;
-    s.first = std::max(s.first, std::min(a, b));
-    s.last = std::min(s.last, std::max(a, b));
-  }
-  return s;
-}
-
-bool meets(const Scene::Bounds& box, Vec3f from, Vec3f direction, float far) {
-  const auto [first, last] = inside(box, from, direction, far);
-  return first <= last;
-}
-
-bool overlap(const Scene::Bounds& a, const Scene::Bounds& b) {
-  return a.lower.x <= b.upper.x && a.upper.x >= b.lower.x && a.lower.y <= b.upper.y &&
-         a.upper.y >= b.lower.y && a.lower.z <= b.upper.z && a.upper.z >= b.lower.z;
-}
 
 bool have_common(const SpaceGrid::Mask& a, const SpaceGrid::Mask& b) {
   for (std::size_t i = 0; i < a.size(); ++i) {

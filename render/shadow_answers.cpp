@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "render/blocker_boxes.h"
+#include "render/box_meets.h"
 #include "render/lamp_way.h"
 #include "render/light_gather.h"
 #include "render/shadow_stream.h"
@@ -30,25 +31,7 @@ Scene::Bounds grown_for(const Scene::Bounds& b, const Scene::Bounds& from) {
   return {b.lower - by, b.upper + by};
 }
 
-bool overlap(const Scene::Bounds& a, const Scene::Bounds& b) {
-  return a.lower.x <= b.upper.x && a.upper.x >= b.lower.x && a.lower.y <= b.upper.y &&
-         a.upper.y >= b.lower.y && a.lower.z <= b.upper.z && a.upper.z >= b.lower.z;
-}
-
 std::array<float, 3> parts(Vec3f v) { return {v.x, v.y, v.z}; }
-
-// Whether a ray comes into a box.
-bool may_meet(const Scene::Bounds& b, Vec3f from, Vec3f direction, float far_m) {
-  const auto o = parts(from), d = parts(direction), lower = parts(b.lower), upper = parts(b.upper);
-  float near_m = 0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const float per_metre = 1 / (d[axis] == 0 ? hardly : d[axis]);
-    const float a = (lower[axis] - o[axis]) * per_metre, c = (upper[axis] - o[axis]) * per_metre;
-    near_m = std::max(near_m, std::min(a, c));
-    far_m = std::min(far_m, std::max(a, c));
-  }
-  return !(near_m > far_m);
-}
 
 // As may_be_met(), of eight ranges of directions at once.
 unsigned may_be_met(const Scene::Bounds& things,
@@ -202,7 +185,7 @@ bool ShadowAnswers::differ(const LightContext& context,
       const Receiver& from = receivers_[ray.receiver];
       const auto [direction, far_m] = way(context, run, i);
       const auto meets = [&](const Scene::Bounds& b) {
-        return may_meet(b, from.origin, direction, far_m);
+        return render::meets(b, from.origin, direction, far_m);
       };
       if (std::ranges::none_of(things, meets)) continue;
       if (ray.answer == Answer::dimmed) return true;

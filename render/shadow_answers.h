@@ -112,7 +112,7 @@ class ShadowNotes {
  public:
   // Of a cell, where things that may move fill these; null = nobody wants them.
   void begin_cell(ShadowAnswers* to, std::span<const Scene::Bounds> moving = {});
-  // Rays that follow begin at these receivers, in that box.
+  // Rays that follow begin at these receivers.
   void begin(const LightContext& context, const Receivers& receivers, ShadowRays to);
   void go_on(ShadowRays to) { rays_to_ = to; }
   bool ask_for_reach() const { return wants() && rays_to_ == ShadowRays::anywhere; }
@@ -130,7 +130,6 @@ class ShadowNotes {
   unsigned meet_moving(const GatherWorkspace& w, std::size_t first) const;
   std::uint16_t receiver(Vec3f origin, std::uint32_t mask, float sharp_m);
   void begin_run(std::uint32_t number, ShadowRays to);
-  void add(std::uint16_t receiver, std::uint8_t part, ShadowAnswers::Answer answer);
 
   ShadowAnswers* to_ = nullptr;
   const LightContext* context_ = nullptr;

@@ -148,8 +148,11 @@ void FrameMaker::apply(const Move& move) {
   const std::optional<NamedParts> named = parts_named(set_, name);
   if (!named) throw std::invalid_argument(fmt::format("the set has no object named \"{}\"", name));
   ObjectSettings& object = set_.objects[named->object];
-  const ObjectSettings object_before = object;
-  const std::vector<render::Instance> instances_before = set_scene_.description.instances;
+  const auto pose_before = object.pose;
+  std::vector<decltype(ObjectPart::moved)> moved_before;
+  for (const ObjectPart& part : set_scene_.parts) {
+    if (part.object == named->object) moved_before.push_back(part.moved);
+  }
   try {
     if (named->part) {
       move_parts(set_, named->object, *named->part, pose, set_scene_);
@@ -159,8 +162,12 @@ void FrameMaker::apply(const Move& move) {
     }
     videos_->place(set_, set_scene_);
   } catch (...) {  // what is refused changes nothing
-    object = object_before;
-    set_scene_.description.instances = instances_before;
+    object.pose = pose_before;
+    auto moved = moved_before.begin();
+    for (ObjectPart& part : set_scene_.parts) {
+      if (part.object == named->object) part.moved = *moved++;
+    }
+    place_object(set_, named->object, set_scene_);
     throw;
   }
   renew_scene(scene_->pictures());

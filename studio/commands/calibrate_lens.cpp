@@ -365,7 +365,8 @@ Command calibrate_lens_command() {
             arguments.option("--report", o->report, "HTML file; else beside the lens");
             arguments.option("--model", o->model,
                              "auto, perspective, fisheye, or one of mrcal's LENSMODEL_...");
-            arguments.option("--every", o->every, 1, 100000, "frames of a video; one in 25");
+            arguments.option("--every", o->every, 1, 100000,
+                             "frames of a video; one in 25, or each of up to 50");
             arguments.option("--limit", o->limit_s, 0.1, 600, "seconds to look at each picture; 5");
             return [o](Console& console) { calibrate_lens(*o, console); };
           }};

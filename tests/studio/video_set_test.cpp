@@ -120,6 +120,16 @@ TEST_F(VideoSetTest, RefusesAMoveThatLeavesNoScreenAndGoesOn) {
   const PreparedFrame same = maker.make(0).value();
   EXPECT_EQ(places(same), places(before));
   EXPECT_EQ(same.job.lights.lamps.size(), before.job.lights.lamps.size());
+  // Nor of a part, as is seen when its object moves.
+  int refused = 0;
+  for (const render::Instance& i : before.scene->description().instances) {
+    if (!i.name.starts_with("tv/")) continue;
+    EXPECT_THROW(maker.move_object(i.name, {{200, 300, 0}, 0, 0, 1e-6}), std::exception);
+    ++refused;
+  }
+  EXPECT_GT(refused, 0);
+  maker.move_object("tv", maker.set().objects.back().pose);
+  EXPECT_EQ(places(maker.make(0).value()), places(before));
   maker.move_object("cube", {{1.5, 0, 0}, 0, 0, 1});
   EXPECT_NE(places(maker.make(0).value()), places(before));
 }
