@@ -149,6 +149,28 @@ bool is_device(std::string_view uri) {
   return uri.starts_with("v4l2:") || uri.starts_with("aravis:");
 }
 
+std::string missing_pictures(std::string_view uri, const CameraOptions& options) {
+  constexpr std::size_t most_gaps = 8;
+  std::string missing;
+  try {
+    const auto [scheme, rest] = parts_of_uri(uri, options);
+    const std::string path = absolute(rest, options);
+    if ((scheme != "" && scheme != "file") || !is_sequence(path)) return "";
+    const auto gaps = missing_numbers(numbered_files(path));
+    for (std::size_t i = 0; i < gaps.size() && i < most_gaps; ++i) {
+      const auto [first, last] = gaps[i];
+      missing += (i > 0 ? ", " : "") + std::to_string(first);
+      if (last > first) missing += " to " + std::to_string(last);
+    }
+    if (gaps.size() > most_gaps) {
+      missing += " and " + std::to_string(gaps.size() - most_gaps) + " more gaps";
+    }
+  } catch (const std::runtime_error&) {
+    return "";
+  }
+  return missing;
+}
+
 bool has_scheme(std::string_view uri) {
   const std::size_t colon = uri.find(':');
   return colon != uri.npos && openers().contains(uri.substr(0, colon));

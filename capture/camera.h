@@ -114,6 +114,10 @@ bool is_device(std::string_view uri);
 // have a colon in it.
 bool has_scheme(std::string_view uri);
 
+// Of numbered picture files: which numbers between the first and the last are missing, as "7, 12
+// to 15"; those frames are lost. "" of all else, and of what cannot be opened.
+std::string missing_pictures(std::string_view uri, const CameraOptions& options = {});
+
 // What can be told from a URI alone, without opening anything: throws std::runtime_error, without
 // the URI, with the reason and what to write, if its scheme is none that there is, or if it names a
 // device with settings that none could have (see parse_v4l2 and parse_aravis) or with a pixel

@@ -102,6 +102,17 @@ std::map<std::int64_t, std::string> numbered_files(const std::string& path) {
   return files;
 }
 
+std::vector<std::pair<std::int64_t, std::int64_t>> missing_numbers(
+    const std::map<std::int64_t, std::string>& files) {
+  std::vector<std::pair<std::int64_t, std::int64_t>> gaps;
+  std::int64_t expected = files.empty() ? 0 : files.begin()->first;
+  for (const auto& [number, file] : files) {
+    if (number > expected) gaps.emplace_back(expected, number - 1);
+    expected = number + 1;
+  }
+  return gaps;
+}
+
 std::string numbered_file(const std::string& path, std::int64_t number) {
   const Pattern pattern = pattern_of(path);
   std::string digits = std::to_string(number);

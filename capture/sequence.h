@@ -5,6 +5,8 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "capture/camera.h"
 #include "capture/linearise.h"
@@ -21,6 +23,10 @@ std::map<std::int64_t, std::string> numbered_files(const std::string& path);
 
 // The pattern's file of that number, whether it is there or not.
 std::string numbered_file(const std::string& path, std::int64_t number);
+
+// Numbers between the first and the last that no file has: of each gap the first and the last.
+std::vector<std::pair<std::int64_t, std::int64_t>> missing_numbers(
+    const std::map<std::int64_t, std::string>& files);
 
 // Opens all files in the folder that match the pattern, in the order of their numbers, from the
 // lowest; frames count from 0 there, at options.picture_rate. Missing numbers between are lost

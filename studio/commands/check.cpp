@@ -1,6 +1,8 @@
 // platelight check: names every fault of a set file.
+#include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -63,16 +65,34 @@ void say(const ModelReport& model, Console& console) {
   for (const std::string& note : r.notes) console.say("  note: " + note);
 }
 
-// Cameras that a set wants, which need not be there while it is written.
-std::vector<std::string> devices_of(const Set& set) {
+std::vector<std::string> sources_of(const Set& set) {
   std::vector<std::string> sources{set.camera.source};
   if (set.probe) sources.push_back(set.probe->source);
   for (const VideoSettings& video : set.videos) sources.push_back(video.source);
   for (const PersonSettings& person : set.persons) {
     for (const PersonCamera& camera : person.cameras) sources.push_back(camera.source);
   }
+  return sources;
+}
+
+// Cameras that a set wants, which need not be there while it is written.
+std::vector<std::string> devices_of(const Set& set) {
+  std::vector<std::string> sources = sources_of(set);
   std::erase_if(sources, [](const std::string& uri) { return !capture::is_device(uri); });
   return sources;
+}
+
+// What of its sources is no fault, but will be missed on air.
+std::vector<std::string> notes_of_sources(const Set& set) {
+  std::vector<std::string> notes;
+  for (const std::string& source : sources_of(set)) {
+    const std::string missing = capture::missing_pictures(source);
+    if (missing.empty()) continue;
+    std::string note = fmt::format(
+        "{}: there is no file with the numbers {}: those frames are lost", source, missing);
+    if (std::ranges::find(notes, note) == notes.end()) notes.push_back(std::move(note));
+  }
+  return notes;
 }
 
 void check(const std::string& path, Console& console) {
@@ -83,11 +103,13 @@ void check(const std::string& path, Console& console) {
     const std::vector<ModelReport> models = check_models(set);
     const std::vector<std::string> devices = devices_of(set);
     if (devices.empty()) check_show(set);
-    console.figures(json_text(nlohmann::ordered_json{{"diagnostics", nlohmann::json::array()},
-                                                     {"models", to_json(models)}}));
+    const std::vector<std::string> notes = notes_of_sources(set);
+    console.figures(json_text(nlohmann::ordered_json{
+        {"diagnostics", nlohmann::json::array()}, {"models", to_json(models)}, {"notes", notes}}));
     for (const ModelReport& model : models) say(model, console);
     console.say(fmt::format("{}: good ({} objects, {} stand-ins)", path, set.objects.size(),
                             set.stand_ins.size()));
+    for (const std::string& note : notes) console.say("  note: " + note);
     for (const std::string& device : devices) {
       console.say(
           fmt::format("  {} was not opened, and so no other source, nor the recording", device));

@@ -45,6 +45,29 @@ TEST(NumberedFiles, AreThoseThatPrintfWouldName) {
   EXPECT_THROW(numbered_files((directory / "none_%03d.obj").string()), std::runtime_error);
 }
 
+TEST(NumberedFiles, TellWhatIsMissingBetweenThem) {
+  const std::filesystem::path directory = made::make_temporary_directory();
+  const auto missing = [&] {
+    return missing_pictures("file:" + (directory / "shot_%d.png").string());
+  };
+  EXPECT_EQ(missing(), "") << "there are none at all";
+  for (const int number : {3, 4, 6, 7, 11})
+    write_grey(directory / ("shot_" + std::to_string(number) + ".png"), number);
+  EXPECT_EQ(missing(), "5, 8 to 10");
+  CameraOptions options;
+  options.base_dir = directory.string();
+  EXPECT_EQ(missing_pictures("shot_%d.png", options), "5, 8 to 10");
+  EXPECT_EQ(missing_pictures((directory / "shot_3.png").string()), "");
+  EXPECT_EQ(missing_pictures("v4l2:/dev/video%d"), "");
+  EXPECT_EQ(missing_pictures("none:%d"), "");
+  for (const int number : {5, 8, 9, 10})
+    write_grey(directory / ("shot_" + std::to_string(number) + ".png"), number);
+  EXPECT_EQ(missing(), "");
+  for (int number = 13; number < 40; number += 2)
+    write_grey(directory / ("shot_" + std::to_string(number) + ".png"), 1);
+  EXPECT_EQ(missing(), "12, 14, 16, 18, 20, 22, 24, 26 and 6 more gaps");
+}
+
 TEST(Sequence, IsInTheOrderOfNumbersWithGapsLost) {
   const std::filesystem::path directory = made::make_temporary_directory();
   for (const int number : {9, 10, 12}) {

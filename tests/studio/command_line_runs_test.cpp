@@ -36,6 +36,7 @@ namespace studio::command_line_runs_test {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 // Runs of real files: a sequence of stills, an object, a sky.
 class Runs : public CommandLine {
@@ -381,6 +382,19 @@ TEST_F(Runs, AreCheckedUpToTheirDisplayAndTake) {
   EXPECT_THAT(faults_of("", "file:large.png"), HasSubstr("66x48"));
   EXPECT_THAT(faults_of("[[video]]\nsource = \"file:large.png\"\nobject = \"kube\"\n"),
               HasSubstr("is shown nowhere"));
+}
+
+TEST_F(Runs, AreToldOfPicturesThatAreMissing) {
+  const std::string set = write_set();
+  EXPECT_THAT(run("check " + set).out, Not(HasSubstr("note:")));
+  fs::copy(dir_ / "plate_0.png", dir_ / "plate_15.png");
+  const std::string json = (dir_ / "check.json").string();
+  const Outcome outcome = run("check " + set + " --json " + json);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(
+      outcome.out,
+      HasSubstr("plate_%d.png: there is no file with the numbers 3 to 14: those frames are lost"));
+  EXPECT_EQ(nlohmann::json::parse(content_of(json))["notes"].size(), 1U);
 }
 
 TEST_F(Runs, AreCheckedForTheFaultsOfAllSources) {
