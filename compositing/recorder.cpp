@@ -5,7 +5,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <deque>
-#include <filesystem>
 #include <mutex>
 #include <span>
 #include <stdexcept>
@@ -13,12 +12,9 @@
 #include <thread>
 #include <utility>
 
-#include "compositing/exr_sequence.h"
-#include "compositing/fill_and_key.h"
-#include "compositing/locked_videos.h"
 #include "compositing/output_file.h"
+#include "compositing/recorder_outputs.h"
 #include "compositing/sound_track.h"
-#include "compositing/video_writer.h"
 
 namespace compositing {
 namespace {
@@ -28,52 +24,11 @@ constexpr std::size_t most_waiting_sounds = 1024;
 // Sound may lie this far ahead of its picture; what lies further has a damaged time.
 constexpr capture::Time most_sound_ahead = std::chrono::seconds(10);
 
-// The first frame's label, if there is timecode at this rate.
-std::optional<Timecode> first_label(const RecorderSettings& settings) {
-  if (settings.start || !allows_timecode(settings.rate)) return settings.start;
-  return Timecode{};
-}
-
-VideoSettings video_settings(const RecorderSettings& settings) {
-  const std::optional<Timecode> first = first_label(settings);
-  return {.file = settings.file,
-          .rate = settings.rate,
-          .width = settings.width,
-          .height = settings.height,
-          .pixel_aspect = settings.pixel_aspect,
-          .codec = settings.codec,
-          .crf = settings.crf,
-          .transfer = settings.transfer,
-          .timecode = first ? to_string(*first) : std::string(),
-          .comment = {},
-          .sound_channels = settings.sound_channels,
-          .sound_rate = settings.sound_rate};
-}
-
-bool has_pair(const RecorderSettings& settings) { return !settings.fill_file.empty(); }
-
-VideoSettings fill_settings(const RecorderSettings& settings) {
-  VideoSettings fill = video_settings(settings);
-  fill.file = settings.fill_file;
-  fill.comment =
-      "fill of " + std::filesystem::path(settings.key_file).filename().string() +
-      ": programme = fill + (1 - key) * plate, in display codes; shaped: do not multiply by key";
-  return fill;
-}
-
-VideoSettings key_settings(const RecorderSettings& settings) {
-  VideoSettings key = video_settings(settings);
-  key.file = settings.key_file;
-  key.channels = 1;
-  key.sound_channels = 0;
-  key.comment = "key of " + std::filesystem::path(settings.fill_file).filename().string() +
-                ": share of the plate's display codes that is hidden, linear, 0 to 255";
-  return key;
-}
-
 void require(bool holds, const std::string& reason) {
   if (!holds) throw std::invalid_argument(reason);
 }
+
+bool has_pair(const RecorderSettings& settings) { return !settings.fill_file.empty(); }
 
 void validate_pair(const RecorderSettings& settings) {
   require(settings.fill_file.empty() == settings.key_file.empty(),
@@ -128,6 +83,17 @@ void check(const RecorderSettings& settings) {
   if (!settings.exr_dir.empty()) require_writable_folder(settings.exr_dir);
 }
 
+std::vector<std::string> errors_of(const RecorderStatus& status) {
+  std::vector<std::string> errors;
+  for (const RecordedOutput& output : status.outputs) {
+    if (!output.error.empty()) errors.push_back(output.error);
+  }
+  if (!status.error.empty() && std::ranges::find(errors, status.error) == errors.end()) {
+    errors.push_back(status.error);
+  }
+  return errors;
+}
+
 class Recorder::Take {
  public:
   explicit Take(const RecorderSettings& settings);
@@ -152,28 +118,24 @@ class Recorder::Take {
   void run();
   bool write_next();
   void write(const Item& item);
-  void write_pair(std::int64_t index, const RecordedFrame& frame);
   std::vector<capture::Sound> take_waiting_sounds();
   void write_sounds(const std::vector<capture::Sound>& sounds, capture::Time latest);
   void write_sound(std::int64_t first, std::span<const float> samples);
-  void finish_videos() noexcept;
-  void stop(const std::string& what);
-  std::string with_all_that_ends(std::string error) const;
+  void close_outputs();
+  template <class Act>
+  void for_each_output(const Act& act);
+  void give_up(std::size_t output, std::string error);
+  void stop(const std::string& error);
 
   const RecorderSettings settings_;
 
   // The recording thread's own.
-  std::optional<ExrSequence> exr_;
-  std::optional<VideoWriter> video_;
-  std::optional<LockedVideos> pair_;
-  std::optional<FillAndKey> fill_and_key_;
-  std::vector<std::uint8_t> fill_, key_;  // of the frame that is written
-  std::int64_t raised_pixels_ = 0;
+  std::vector<NamedOutput> outputs_;  // one that failed is nothing any more
   std::optional<SoundTrack> sound_;
   std::optional<std::int64_t> first_number_;
   capture::Time start_{};
   capture::Time latest_sound_{};
-  std::int64_t taken_ = 0;  // frames from the queue, whatever became of them
+  std::int64_t taken_ = 0;  // frames from the queue: written, or not told as dropped yet
 
   mutable std::mutex mutex_;  // guards what follows
   std::condition_variable work_;
@@ -189,19 +151,10 @@ class Recorder::Take {
 
 Recorder::Take::Take(const RecorderSettings& settings) : settings_(settings) {
   check(settings);  // so that no take is lost to the start of one that cannot be
-  if (!settings.exr_dir.empty()) {
-    exr_.emplace(ExrSequenceSettings{settings.exr_dir, settings.rate, settings.exr_compression,
-                                     settings.pixel_aspect});
-  }
-  if (!settings.file.empty()) video_.emplace(video_settings(settings));
-  if (has_pair(settings)) {
-    pair_.emplace(fill_settings(settings), key_settings(settings));
-    fill_and_key_.emplace(settings.display);
-    key_.resize(static_cast<std::size_t>(settings.width) *
-                static_cast<std::size_t>(settings.height));
-    fill_.resize(key_.size() * 3);
-  }
-  if ((video_ || pair_) && settings.sound_channels > 0) {
+  outputs_ = open_outputs(settings);
+  for (const NamedOutput& output : outputs_) status_.outputs.push_back({output.name, 0, ""});
+  const bool has_video = !settings.file.empty() || has_pair(settings);
+  if (has_video && settings.sound_channels > 0) {
     sound_.emplace(settings.sound_channels, settings.sound_rate);
   }
   thread_ = std::thread([this] { run(); });
@@ -277,15 +230,11 @@ void Recorder::Take::run() {
   try {
     while (write_next()) continue;
     write_sounds(take_waiting_sounds(), latest_sound_);
-    if (video_) video_->close();
-    if (pair_) pair_->close();
   } catch (const std::exception& error) {
     stop(error.what());
   }
-  // Others may write there from now on.
-  video_.reset();
-  pair_.reset();
-  exr_.reset();
+  close_outputs();
+  outputs_.clear();  // others may write there from now on
   const std::lock_guard lock(mutex_);
   status_.finished = true;
 }
@@ -312,14 +261,9 @@ bool Recorder::Take::write_next() {
   write(item);
   const double taken_s = std::chrono::duration<double>(Clock::now() - begin).count();
   const std::lock_guard lock(mutex_);
-  ++status_.written;
-  if (!key_.empty()) {
-    status_.raised_share =
-        static_cast<double>(raised_pixels_) / static_cast<double>(status_.written * key_.size());
-  }
   status_.write_s += taken_s;
   status_.worst_write_s = std::max(status_.worst_write_s, taken_s);
-  return true;
+  return status_.error.empty();
 }
 
 void Recorder::Take::write(const Item& item) {
@@ -330,25 +274,18 @@ void Recorder::Take::write(const Item& item) {
   }
   const std::int64_t index = frame.number - *first_number_;
   latest_sound_ = start_ + capture::time_of_frame(index, settings_.rate) + most_sound_ahead;
-  if (video_) video_->write_picture(index, *frame.display_rgb8);
-  if (pair_) write_pair(index, frame);
+  for_each_output([&](TakeOutput& output, RecordedOutput& told) {
+    output.write(index, frame);
+    const std::lock_guard lock(mutex_);
+    ++told.written;
+    status_.written = std::max(status_.written, told.written);
+    if (const auto share = output.raised_share()) status_.raised_share = *share;
+  });
   write_sounds(item.sounds, latest_sound_);
-  if (exr_) {
-    const std::optional<Timecode> first = first_label(settings_);
-    exr_->write(frame.number, *frame.rgba, *frame.matte,
-                first ? std::optional(advance(*first, index, settings_.rate)) : std::nullopt);
-  }
-}
-
-void Recorder::Take::write_pair(std::int64_t index, const RecordedFrame& frame) {
-  raised_pixels_ += fill_and_key_->split(*frame.display_rgb8, *frame.rgba, *frame.plate,
-                                         *frame.matte, frame.tone, fill_, key_);
-  pair_->write_pictures(index, fill_, key_);
 }
 
 void Recorder::Take::write_sound(std::int64_t first, std::span<const float> samples) {
-  if (video_) video_->write_sound(first, samples);
-  if (pair_) pair_->write_sound(first, samples);
+  for_each_output([&](TakeOutput& output, RecordedOutput&) { output.write_sound(first, samples); });
 }
 
 void Recorder::Take::write_sounds(const std::vector<capture::Sound>& sounds, capture::Time latest) {
@@ -376,39 +313,52 @@ void Recorder::Take::write_sounds(const std::vector<capture::Sound>& sounds, cap
   }
 }
 
-// After a failure, which may be another file's: the first error is the one to tell.
-void Recorder::Take::finish_videos() noexcept {
-  if (pair_) pair_->salvage();
-  if (!video_) return;
-  try {
-    video_->close();
-  } catch (const std::exception&) {
-    video_->salvage();
+void Recorder::Take::close_outputs() {
+  for_each_output([](TakeOutput& output, RecordedOutput&) { output.close(); });
+}
+
+// Of those that have not failed. One that does is given up, and the others go on.
+template <class Act>
+void Recorder::Take::for_each_output(const Act& act) {
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    if (!outputs_[i].output) continue;
+    try {
+      act(*outputs_[i].output, status_.outputs[i]);
+    } catch (const std::exception& error) {
+      give_up(i, error.what());
+    }
   }
 }
 
-// What else ends where one output of a take fails.
-std::string Recorder::Take::with_all_that_ends(std::string error) const {
+void Recorder::Take::give_up(std::size_t output, std::string error) {
+  const std::unique_ptr<TakeOutput> failed = std::move(outputs_[output].output);
+  failed->give_up();
   std::string others;
-  for (const std::string* file :
-       {&settings_.file, &settings_.fill_file, &settings_.key_file, &settings_.exr_dir}) {
-    if (file->empty() || error.find(*file) != std::string::npos) continue;
-    others += (others.empty() ? "" : ", ") + *file;
+  for (const NamedOutput& other : outputs_) {
+    if (other.output) others += (others.empty() ? "" : ", ") + other.name;
   }
-  if (others.empty()) return error;
-  return error + "; with it the whole take ends: " + others + " too";
+  if (!others.empty()) error += "; the take goes on in " + others;
+  {
+    const std::lock_guard lock(mutex_);
+    RecordedOutput& told = status_.outputs[output];
+    told.written = std::min(told.written, failed->pictures());
+    told.error = error;
+  }
+  if (others.empty()) stop(error);
 }
 
-void Recorder::Take::stop(const std::string& what) {
-  const std::string error = with_all_that_ends(what);
-  finish_videos();
+// The take as a whole.
+void Recorder::Take::stop(const std::string& error) {
   {
     const std::lock_guard lock(mutex_);
     status_.error = error;
-    if (video_) status_.written = std::min(status_.written, video_->pictures());
-    if (pair_) status_.written = std::min(status_.written, pair_->pictures());
+    status_.written = 0;
+    for (const RecordedOutput& output : status_.outputs) {
+      status_.written = std::max(status_.written, output.written);
+    }
     // The frame that failed, if it was one, and those behind it.
     status_.dropped += taken_ - status_.written + static_cast<std::int64_t>(queue_.size());
+    taken_ = status_.written;
     queue_.clear();
   }
   room_.notify_all();

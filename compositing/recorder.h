@@ -52,23 +52,35 @@ struct RecordedFrame {
   std::optional<capture::Sound> sound;              // that came with the frame, if any
 };
 
+// What became of one output of a take.
+struct RecordedOutput {
+  std::string name;          // the file; "FILL and KEY"; the folder of EXR frames
+  std::int64_t written = 0;  // frames that it has, once it is closed
+  std::string error;         // why it ended before the take, and what goes on; "" = it has not
+};
+
 struct RecorderStatus {
-  std::int64_t written = 0;  // that all of its files have, once they are closed
-  std::int64_t dropped = 0;  // came while the queue was full, or after an error
+  std::int64_t written = 0;  // frames that any output has, once it is closed
+  std::int64_t dropped = 0;  // that none has: came while the queue was full, or after an error
+  std::vector<RecordedOutput> outputs;
   // Chunks of another form, with a time far after their frame, or of too many dropped frames.
   std::int64_t sounds_left_out = 0;
   double raised_share = 0;   // of pixels whose key is above the matte, see fill_and_key.h
   double worst_write_s = 0;  // longest time that one frame took to write
   double write_s = 0;        // time spent writing, in all
-  std::string error;         // why recording stopped; "" = it has not
+  std::string error;         // why recording stopped: the last output's; "" = it has not
   bool finished = false;     // the files are closed
 };
+
+// Why outputs failed, and recording stopped, each said once.
+std::vector<std::string> errors_of(const RecorderStatus& status);
 
 // Throws as Recorder's constructor, for all that can be told before anything is written.
 void check(const RecorderSettings& settings);
 
 // Never blocks or throws into the show once it runs: what goes wrong then stands in the status, and
-// what was recorded until then is kept. One thread pushes; any thread may ask for the status.
+// what was recorded until then is kept. An output that fails ends alone: the others go on. One
+// thread pushes; any thread may ask for the status.
 //
 // Sound is laid from the first frame's time on without gaps: what is missing becomes silence, what
 // comes twice is left out. The sound of a frame that is dropped is kept.

@@ -30,7 +30,7 @@ constexpr float far_view = 1e-3F;       // weight of cameras that look the other
 constexpr float small_share = 0.01F;    // of the colour, that is not looked for
 
 // The parameter block begins with this. Then come the cameras' places.
-HullBlock block_of(const Material& material) {
+HullBlock hull_block_of(const Material& material) {
   HullBlock block;
   std::memcpy(&block, material.parameters.data(), sizeof block);
   return block;
@@ -173,7 +173,7 @@ class HullShader final : public render::Shader {
   void check(const render::SceneDescription&, const Material& material) const override {
     const std::string& name = material.name;
     if (material.parameters.size() < sizeof(HullBlock)) refuse(name, "wrong parameter block");
-    const HullBlock b = block_of(material);
+    const HullBlock b = hull_block_of(material);
     if (const char* fault = fault_of(b)) refuse(name, fault);
     std::size_t bytes = 0;
     for (const MarchView& view : std::span(b.view).first(b.views)) {
@@ -214,7 +214,7 @@ class HullShader final : public render::Shader {
   bool lets_light_through(const Material&) const override { return true; }
 
   std::vector<std::size_t> pictures_of(const Material& material) const override {
-    const HullBlock block = block_of(material);
+    const HullBlock block = hull_block_of(material);
     std::vector<std::size_t> pictures;
     for (const MarchView& view : std::span(block.view).first(block.views)) {
       pictures.push_back(view.picture);
@@ -227,7 +227,7 @@ class HullShader final : public render::Shader {
       const render::Mesh&,
       const std::array<float, 12>& set_from_object,
       std::span<const std::shared_ptr<const render::LivePicture>> pictures) const override {
-    return std::make_shared<HullCells>(block_of(material),
+    return std::make_shared<HullCells>(hull_block_of(material),
                                        std::span(material.parameters).subspan(sizeof(HullBlock)),
                                        set_from_object, pictures);
   }

@@ -89,6 +89,11 @@ Json record_json(const Set& set, const compositing::RecorderStatus& recorder) {
             {"write_ms", recorder.write_s * 1000}};
   if (!set.record.key.empty()) json["key_raised"] = recorder.raised_share;
   if (!recorder.error.empty()) json["error"] = recorder.error;
+  for (const compositing::RecordedOutput& output : recorder.outputs) {
+    Json row{{"name", output.name}, {"written", output.written}};
+    if (!output.error.empty()) row["error"] = output.error;
+    json["outputs"].push_back(std::move(row));
+  }
   return json;
 }
 

@@ -2,6 +2,7 @@
 #include "studio/recording.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "compositing/output_file.h"
@@ -63,7 +64,7 @@ void Recording::start(const RecordSettings& settings) {
   compositing::check(recorder);  // else the take that runs goes on
   stop();
   while (ended_.size() > most_ended) finish_oldest();
-  note_last_error();
+  note_last_errors();
   take_ = {settings, std::make_unique<compositing::Recorder>(recorder)};
 }
 
@@ -83,12 +84,12 @@ void Recording::finish_oldest() {
   ended_.pop_front();
   take.recorder->close();
   last_status_ = take.recorder->status();
-  told_ = last_status_.error.empty();
-  if (take_ || !ended_.empty()) note_last_error();
+  told_ = compositing::errors_of(last_status_).empty();
+  if (take_ || !ended_.empty()) note_last_errors();
 }
 
-void Recording::note_last_error() {
-  if (!told_) notes_.push_back(last_status_.error);
+void Recording::note_last_errors() {
+  if (!told_) std::ranges::move(compositing::errors_of(last_status_), std::back_inserter(notes_));
   told_ = true;
 }
 

@@ -60,7 +60,7 @@ class Recording {
 
   compositing::RecorderSettings settings_of(const RecordSettings& settings) const;
   void forget_finished();
-  void note_last_error();
+  void note_last_errors();
   void finish_oldest();
   void finish_those_in_the_way(const RecordSettings& settings);
 

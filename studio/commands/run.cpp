@@ -114,14 +114,14 @@ class Warnings {
 
   void tell(const ShownFrame& shown, const ShowStatus& status) {
     const std::lock_guard lock(mutex_);
-    if (!status.recorder.error.empty()) tell(status.recorder.error);
+    for (const std::string& what : compositing::errors_of(status.recorder)) tell(what);
     for (const std::string& what : shown.notes) tell(what);
     seen_ += static_cast<std::int64_t>(shown.notes.size());
   }
   // What came after the last frame, and how many were not told.
   void tell_rest(const ShowStatus& status) {
     const std::lock_guard lock(mutex_);
-    if (!status.recorder.error.empty()) tell(status.recorder.error);
+    for (const std::string& what : compositing::errors_of(status.recorder)) tell(what);
     tell_last(status);
     for (const auto& [kind, count] : kinds_) {
       if (count > most_of_kind) {
@@ -177,17 +177,7 @@ std::vector<const char*> changed_at_start(const Set& on_air, const Set& changed)
   return sections;
 }
 
-// What the show recorded to last.
-const RecordSettings& last_record(const Set& set, const Script& script, const ShowStatus& status) {
-  const RecordSettings* last = &set.record;
-  for (const ScriptedCommand& command : script.commands) {
-    const auto* start = std::get_if<StartRecording>(&command.what);
-    if (start != nullptr && command.frame <= status.frame) last = &start->record;
-  }
-  return *last;
-}
-
-void report_end(const ShowStatus& status, const RecordSettings& record, Console& console) {
+void report_end(const ShowStatus& status, Console& console) {
   console.say(
       fmt::format("{} frames at {:.2f} fps, {} dropped, {} lost in the plate; frame time "
                   "{:.1f} ms (p99 {:.1f}), delay {:.1f} frames",
@@ -210,15 +200,8 @@ void report_end(const ShowStatus& status, const RecordSettings& record, Console&
         status.probe.frames, status.probe.lost, status.probe.rejected, status.kept_light_frames));
   }
   if (!status.match.note.empty()) console.say(status.match.note);
-  if (!record.file.empty()) {
-    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, record.file));
-  }
-  if (!record.exr.empty()) {
-    console.say(fmt::format("recorded {} frames to {}", status.recorder.written, record.exr));
-  }
-  if (!record.fill.empty()) {
-    console.say(fmt::format("recorded {} frames of fill to {} and of key to {}",
-                            status.recorder.written, record.fill, record.key));
+  for (const compositing::RecordedOutput& output : status.recorder.outputs) {
+    console.say(fmt::format("recorded {} frames to {}", output.written, output.name));
   }
   if (status.recorder.dropped > 0) {
     console.warn(fmt::format("{} frames are not in the recording", status.recorder.dropped));
@@ -367,7 +350,7 @@ void run(const RunOptions& options, Console& console) {
   const ShowStatus status = *show.status();
   warnings.tell_rest(status);
   warn_of_rest(script, status, console);
-  report_end(status, last_record(set, script, status), console);
+  report_end(status, console);
   if (status.changing) {
     console.say("the last edit was not on air yet, and is given up");
   }
@@ -384,7 +367,11 @@ void run(const RunOptions& options, Console& console) {
   if (status.frames == 0 && !was_interrupted && options.script.empty())
     throw std::runtime_error(set.path + ": the show ended before its first picture");
   if (picture) picture->finish();
-  if (!status.recorder.error.empty()) throw std::runtime_error(status.recorder.error);
+  std::string errors;
+  for (const std::string& error : compositing::errors_of(status.recorder)) {
+    errors += (errors.empty() ? "" : "; ") + error;
+  }
+  if (!errors.empty()) throw std::runtime_error(errors);
 }
 
 }  // namespace

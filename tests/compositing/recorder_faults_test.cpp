@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "compositing/exr_sequence.h"
 #include "compositing/recorder.h"
 #include "take.h"
 
@@ -147,26 +148,87 @@ TEST_F(RecorderFaultsTest, KeepsOthersFromAFolderOfFrames) {
   EXPECT_EQ(refusal(), "");
 }
 
-TEST_F(RecorderFaultsTest, ClosesTheVideoWholeWhenItIsTheExrFramesThatFail) {
+// A frame for every kind of output, 64x48.
+RecordedFrame complete_frame(std::int64_t number) {
+  RecordedFrame frame = half_picture(number, 64, 48);
+  frame.display_rgb8 = textured(64, 48, number);
+  frame.plate = std::make_shared<capture::HalfImage>(
+      capture::HalfImage{48, 64, std::vector<capture::Half>(48 * 64 * 3), 3});
+  return frame;
+}
+
+TEST_F(RecorderFaultsTest, GoesOnInItsVideosWhenItIsTheExrFramesThatFail) {
   RecorderSettings settings = small_take(path("take.mkv"));
   settings.exr_dir = path("take");
+  settings.display = std::make_shared<const Display>(DisplaySettings{});
+  settings.fill_file = path("fill.mkv");
+  settings.key_file = path("key.mkv");
   Recorder recorder(settings);
-  RecordedFrame frame = half_picture(0, 64, 48);
-  frame.display_rgb8 = flat(64, 48, 100);
-  for (; frame.number < 5; ++frame.number) EXPECT_TRUE(recorder.push(frame));
+  int n = 0;
+  for (; n < 5; ++n) EXPECT_TRUE(recorder.push(complete_frame(n)));
   while (recorder.status().written < 5) std::this_thread::yield();
   fs::remove_all(settings.exr_dir);
-  EXPECT_TRUE(recorder.push(frame));
-  recorder.wait_for_room();
+  for (; n < 20; ++n) EXPECT_TRUE(recorder.push(complete_frame(n)));
   recorder.close();
   const RecorderStatus status = recorder.status();
-  EXPECT_NE(status.error.find("frame.000005.exr"), std::string::npos) << status.error;
-  EXPECT_NE(status.error.find("the whole take ends: " + settings.file), std::string::npos)
-      << status.error;
-  EXPECT_EQ(status.written, 5);
-  EXPECT_EQ(status.dropped, 1);
-  EXPECT_EQ(picture_times_s(settings.file).size(), 6U);
-  EXPECT_NEAR(std::stod(probe(settings.file, "format=duration", "")), 0.24, 0.001);
+  EXPECT_EQ(status.error, "");
+  EXPECT_EQ(status.written, 20);
+  EXPECT_EQ(status.dropped, 0);
+  ASSERT_EQ(status.outputs.size(), 3U);
+  const std::string pair = settings.fill_file + " and " + settings.key_file;
+  for (const std::size_t whole : {0, 1}) {
+    EXPECT_EQ(status.outputs[whole].name, whole == 0 ? settings.file : pair);
+    EXPECT_EQ(status.outputs[whole].written, 20);
+    EXPECT_EQ(status.outputs[whole].error, "");
+  }
+  const RecordedOutput& failed = status.outputs[2];
+  EXPECT_EQ(failed.name, settings.exr_dir);
+  EXPECT_EQ(failed.written, 5);
+  EXPECT_NE(failed.error.find("frame.000005.exr"), std::string::npos) << failed.error;
+  EXPECT_NE(failed.error.find("; the take goes on in " + settings.file + ", " + pair),
+            std::string::npos)
+      << failed.error;
+  EXPECT_EQ(errors_of(status), std::vector{failed.error});
+  for (const std::string& file : {settings.file, settings.fill_file, settings.key_file}) {
+    EXPECT_EQ(picture_times_s(file).size(), 20U) << file;
+  }
+}
+
+TEST_F(RecorderFaultsTest, GoesOnInFillKeyAndExrFramesWhenItIsTheProgrammeThatFails) {
+  RecorderSettings settings = small_take(path("take.mkv"));
+  settings.codec = "lossless";
+  settings.exr_dir = path("take");
+  settings.display = std::make_shared<const Display>(DisplaySettings{});
+  settings.fill_file = path("fill.mkv");
+  settings.key_file = path("key.mkv");
+  RecorderStatus status;
+  {
+    const FileSizeLimit limit(200'000);  // of each: the pair is of flat pictures, and small
+    Recorder recorder(settings);
+    for (int n = 0; n < 100; ++n) {
+      recorder.wait_for_room();
+      EXPECT_TRUE(recorder.push(complete_frame(n)));
+    }
+    recorder.close();
+    status = recorder.status();
+  }
+  EXPECT_EQ(status.error, "");
+  EXPECT_EQ(status.written, 100);
+  ASSERT_EQ(status.outputs.size(), 3U);
+  EXPECT_EQ(status.outputs[1].written, 100);
+  EXPECT_EQ(status.outputs[2].written, 100);
+  EXPECT_EQ(picture_times_s(settings.fill_file).size(), 100U);
+  EXPECT_EQ(picture_times_s(settings.key_file).size(), 100U);
+  EXPECT_EQ(ExrSequence::frames_in(settings.exr_dir), 100);
+  const RecordedOutput& failed = status.outputs[0];
+  EXPECT_EQ(errors_of(status), std::vector{failed.error});
+  EXPECT_NE(failed.error.find("File too large"), std::string::npos) << failed.error;
+  const auto pictures = static_cast<std::int64_t>(picture_times_s(settings.file).size());
+  EXPECT_GE(pictures, 5);
+  EXPECT_LT(pictures, 90);
+  EXPECT_GE(pictures, failed.written);
+  EXPECT_LE(pictures, failed.written + 1);
+  output_of("ffmpeg -v error -xerror -i " + settings.file + " -f null -");
 }
 
 TEST_F(RecorderFaultsTest, TellsThatItsFileWasRemovedOrMovedMeanwhile) {
@@ -268,11 +330,7 @@ TEST_F(RecorderFaultsTest, KeepsATakeThatIsThereUntilTheFirstPicture) {
   EXPECT_EQ(record(settings, {}).error, "");
   for (const std::string& file : there) EXPECT_EQ(content(file), "a take of before") << file;
   EXPECT_FALSE(fs::exists(settings.key_file)) << "nothing was begun";
-  RecordedFrame frame = half_picture(0, 64, 48);
-  frame.display_rgb8 = flat(64, 48, 100);
-  frame.plate = std::make_shared<capture::HalfImage>(
-      capture::HalfImage{48, 64, std::vector<capture::Half>(48 * 64 * 3), 3});
-  EXPECT_EQ(record(settings, {frame}).error, "");
+  EXPECT_EQ(record(settings, {complete_frame(0)}).error, "");
   for (const std::string& file : {settings.file, settings.fill_file, settings.key_file}) {
     EXPECT_EQ(picture_times_s(file).size(), 1U) << file;
   }

@@ -307,8 +307,8 @@ TEST_F(Runs, RecordFillAndKeyForAnExternalKeyer) {
   const Outcome outcome = run("run " + write_set() + " --fill " + path("fill.mkv") + " --key " +
                               path("key.mkv") + " --json " + path("run.json"));
   ASSERT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("3 frames of fill to " + path("fill.mkv") + " and of key to " +
-                                     path("key.mkv")));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("recorded 3 frames to " + path("fill.mkv") + " and " + path("key.mkv")));
   EXPECT_GT(fs::file_size(path("fill.mkv")), 500U);
   EXPECT_GT(fs::file_size(path("key.mkv")), 500U);
   const auto json = nlohmann::json::parse(content_of(path("run.json")));
