@@ -75,16 +75,32 @@ std::uint32_t little_endian(const std::byte* bytes) {
   return value;
 }
 
+// The parser's own way to tell its depth takes time with the square of an array's length.
+bool is_too_deep(std::string_view text) {
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quoted && c == '\\') {
+      ++i;  // whatever follows does not end it
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (!quoted && (c == '{' || c == '[')) {
+      if (++depth > max_json_depth) return true;
+    } else if (!quoted && (c == '}' || c == ']')) {
+      --depth;
+    }
+  }
+  return false;
+}
+
 class Checker {
  public:
   explicit Checker(std::span<const std::byte> bytes) {
     const std::string_view text = json_text(bytes);
-    const auto limit_depth = [](int depth, json::parse_event_t, json&) {
-      if (depth > max_json_depth) refuse("its JSON is nested too deeply");
-      return true;
-    };
+    if (is_too_deep(text)) refuse("its JSON is nested too deeply");
     try {
-      document_ = json::parse(text, limit_depth);
+      document_ = json::parse(text);
     } catch (const json::exception& error) {
       // Without the library's name for the error, in brackets.
       const std::string_view what = error.what();
@@ -95,6 +111,7 @@ class Checker {
 
   GltfFacts check() {
     try {
+      check_version();
       check_extensions();
       check_buffers();
       check_accessors();
@@ -152,6 +169,13 @@ class Checker {
              std::to_string(array(of).size()) + " " + of);
   }
 
+  void check_version() const {
+    static const json::json_pointer place("/asset/version");
+    const auto version = document_.value(place, std::string("2.0"));
+    if (!version.starts_with("2."))
+      refuse("it is glTF " + version + ", of which only version 2 is read; export it anew");
+  }
+
   void check_extensions() {
     for (const json& name : array("extensionsRequired")) {
       const auto text = name.get<std::string>();
@@ -168,9 +192,10 @@ class Checker {
 
   // The index of refraction and dispersion are only known to solid glass.
   void note_refraction(const json& material) {
+    static const json::json_pointer thickness("/KHR_materials_volume/thicknessFactor");
     const json extensions = material.value("extensions", json::object());
-    const bool solid = extensions.contains("KHR_materials_volume") &&
-                       extensions.contains("KHR_materials_transmission");
+    const bool solid =
+        extensions.value(thickness, 0.0) > 0 && extensions.contains("KHR_materials_transmission");
     if (solid) return;
     const auto leave_out = [&](const std::string& name, const char* value, double plain) {
       if (!extensions.contains(name) || extensions[name].value(value, plain) == plain) return;

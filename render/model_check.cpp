@@ -21,6 +21,10 @@ constexpr std::string_view blanks = " \t\r\n\v\f";
 
 [[noreturn]] void refuse(const std::string& why) { throw std::runtime_error(why); }
 
+std::string_view text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 // Takes a word off the front of `text`; empty at its end.
 std::string_view take_word(std::string_view& text) {
   const std::size_t begin = text.find_first_not_of(blanks);
@@ -171,6 +175,11 @@ bool skip_words(const Element& element, std::string_view& body) {
 
 std::vector<std::string> notes_of(const PlyHead& head) {
   std::vector<std::string> notes;
+  if (!head.elements.empty() && head.elements[0].name != "vertex" &&
+      std::ranges::find(head.elements, "vertex", &Element::name) != head.elements.end()) {
+    refuse("its element '" + head.elements[0].name +
+           "' stands before its vertices, which is not read; export it with the vertices first");
+  }
   for (const Element& element : head.elements) {
     if (element.rows == 0) continue;
     if (element.name == "tristrips") {
@@ -192,6 +201,29 @@ std::vector<std::string> notes_of(const PlyHead& head) {
     }
   }
   return notes;
+}
+
+constexpr std::size_t stl_header = 80, stl_triangle = 50;  // bytes
+
+char small_letter(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+// What an ascii STL file says, without what some programs put before it.
+std::string_view words_of_stl(std::string_view text) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
+  text.remove_prefix(std::min(text.find_first_not_of(blanks), text.size()));
+  return text;
+}
+bool begins_as_words(std::string_view text) {
+  constexpr std::string_view first = "solid";
+  return text.size() >= first.size() &&
+         std::ranges::equal(text.substr(0, first.size()), first, {}, small_letter);
+}
+// Whether its length is what its count of triangles says, whatever its header begins with.
+bool is_binary_stl(std::string_view text) {
+  return text.size() >= stl_header + 4 &&
+         text.size() - stl_header - 4 ==
+             list_count(text.substr(stl_header, 4), false) * stl_triangle;
 }
 
 // What follows a name in a binary FBX record, up to its first number; nothing if there is none.
@@ -231,7 +263,7 @@ std::optional<double> number_that_ends(std::string_view line) {
 // Whether an FBX file, binary or ascii, has a property of that name whose number is as asked.
 template <class Is>
 bool any_fbx_property(std::span<const std::byte> file_bytes, std::string_view name, const Is& is) {
-  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
+  const std::string_view text = text_of(file_bytes);
   const bool binary = text.starts_with("Kaydara FBX Binary");
   const std::string word =
       binary ? std::string{'S', static_cast<char>(name.size()), 0, 0, 0} + std::string(name)
@@ -248,8 +280,29 @@ bool any_fbx_property(std::span<const std::byte> file_bytes, std::string_view na
 
 }  // namespace
 
+bool ply_has_paint(std::span<const std::byte> file_bytes) {
+  const std::string_view text = text_of(file_bytes);
+  const PlyHead head = parse_head(text);
+  const std::string_view header = text.substr(0, text.size() - head.body.size());
+  return header.find("TextureFile") != std::string_view::npos ||
+         std::ranges::find(head.elements, "material", &Element::name) != head.elements.end();
+}
+
+std::optional<std::vector<std::byte>> mend_ply(std::span<const std::byte> file_bytes) {
+  const PlyHead head = parse_head(text_of(file_bytes));
+  if (head.format == PlyHead::Format::ascii || !head.body.starts_with('\n')) return std::nullopt;
+  // The header's end as CR LF: of these assimp takes just one.
+  const auto place = static_cast<std::ptrdiff_t>(file_bytes.size() - head.body.size() - 1);
+  std::vector<std::byte> mended;
+  mended.reserve(file_bytes.size() + 1);
+  mended.assign(file_bytes.begin(), file_bytes.begin() + place);
+  mended.push_back(std::byte{'\r'});
+  mended.insert(mended.end(), file_bytes.begin() + place, file_bytes.end());
+  return mended;
+}
+
 std::vector<std::string> check_ply(std::span<const std::byte> file_bytes) {
-  PlyHead head = parse_head({reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size()});
+  PlyHead head = parse_head(text_of(file_bytes));
   const bool ascii = head.format == PlyHead::Format::ascii;
   const bool big = head.format == PlyHead::Format::big;
   for (const Element& element : head.elements) {
@@ -266,15 +319,32 @@ std::vector<std::string> check_ply(std::span<const std::byte> file_bytes) {
 }
 
 void check_stl(std::span<const std::byte> file_bytes) {
-  constexpr std::size_t header = 80, triangle = 50;
-  const std::string_view text(reinterpret_cast<const char*>(file_bytes.data()), file_bytes.size());
-  if (text.starts_with("solid")) return;  // the words of an ascii file, or told apart by assimp
-  if (text.size() < header + 4) refuse("it is cut short: it ends in its header");
-  const std::uint64_t count = list_count(text.substr(header, 4), false);
-  if (count * triangle > text.size() - header - 4) {
+  const std::string_view text = text_of(file_bytes);
+  if (begins_as_words(words_of_stl(text))) return;  // ascii, or told apart by assimp
+  if (text.size() < stl_header + 4) refuse("it is cut short: it ends in its header");
+  const std::uint64_t count = list_count(text.substr(stl_header, 4), false);
+  if (count * stl_triangle > text.size() - stl_header - 4) {
     refuse("it is cut short: its header says " + std::to_string(count) +
-           " triangles, but there are " + std::to_string((text.size() - header - 4) / triangle));
+           " triangles, but there are " +
+           std::to_string((text.size() - stl_header - 4) / stl_triangle));
   }
+}
+
+bool stl_has_paint(std::span<const std::byte> file_bytes) {
+  return text_of(file_bytes).substr(0, stl_header).find("COLOR=") != std::string_view::npos;
+}
+
+std::optional<std::vector<std::byte>> mend_stl(std::span<const std::byte> file_bytes) {
+  const std::string_view text = text_of(file_bytes), words = words_of_stl(text);
+  if (text.starts_with("solid") || !begins_as_words(words) || is_binary_stl(text)) {
+    return std::nullopt;
+  }
+  const bool capitals = !words.starts_with("solid");
+  std::vector<std::byte> mended(words.size());
+  std::ranges::transform(words, mended.begin(), [&](char c) {
+    return static_cast<std::byte>(capitals ? small_letter(c) : c);
+  });
+  return mended;
 }
 
 bool hides_by_visibility(std::span<const std::byte> file_bytes) {

@@ -37,6 +37,7 @@ namespace {
 constexpr int max_depth = 256;
 // Metres from the origin: farther out, floats and Embree overflow.
 constexpr float farthest = 1e9F;
+constexpr float grey_paint = 0.6F;  // of what tells no colour; so does assimp for OBJ
 bool is_near(float x) { return std::abs(x) <= farthest; }  // nor what is no number
 
 // A file in memory, for assimp.
@@ -98,20 +99,29 @@ class GivenFiles : public Assimp::IOSystem {
     if (mended_ && name.ends_with(mended_vertices))
       return new MemoryStream(std::span(mended_->vertices));
     const bool library = format_.obj && name.ends_with(".mtl");
-    if (auto bytes = files_.read(file)) {
-      return new MemoryStream(format_.x3d ? mend_x3d(*bytes)
-                              : library   ? mend_mtl(*bytes, libraries_)
-                                          : std::move(*bytes));
-    }
-    if (library) {
-      if (auto bytes = read_each(file)) return new MemoryStream(mend_mtl(*bytes, libraries_));
-    }
+    auto bytes = files_.read(file);
+    if (!bytes && library) bytes = read_each(file);
+    if (bytes) return new MemoryStream(in_plainer_words(std::move(*bytes), library));
     miss(file);
     return nullptr;
   }
   void Close(Assimp::IOStream* stream) override { delete stream; }
 
  private:
+  std::vector<std::byte> in_plainer_words(std::vector<std::byte> bytes, bool library) {
+    constexpr std::array byte_order_mark{std::byte{0xEF}, std::byte{0xBB}, std::byte{0xBF}};
+    const bool marked = bytes.size() >= byte_order_mark.size() &&
+                        std::equal(byte_order_mark.begin(), byte_order_mark.end(), bytes.begin());
+    if (marked && (format_.obj || format_.gltf)) {
+      bytes.erase(bytes.begin(), bytes.begin() + byte_order_mark.size());
+    }
+    if (format_.x3d) return mend_x3d(bytes);
+    if (library) return mend_mtl(bytes, libraries_);
+    std::optional<std::vector<std::byte>> mended;
+    if (format_.ply) mended = mend_ply(bytes);
+    if (format_.stl) mended = mend_stl(bytes);
+    return mended ? std::move(*mended) : std::move(bytes);
+  }
   // Of a line that names several libraries, all that are there, one after the other. assimp takes
   // it for one name.
   std::optional<std::vector<std::byte>> read_each(const std::string& line) {
@@ -148,15 +158,26 @@ class GivenFiles : public Assimp::IOSystem {
 // What assimp drops of material libraries, put where it keeps it of other files.
 void apply_libraries(const aiScene& scene, const MtlFacts& libraries) {
   const auto type_of = [](const std::string& keyword) {
-    return keyword == "map_kd"   ? aiTextureType_DIFFUSE
-           : keyword == "map_ke" ? aiTextureType_EMISSIVE
-           : keyword == "map_d"  ? aiTextureType_OPACITY
-           : keyword == "norm"   ? aiTextureType_NORMALS
-                                 : aiTextureType_NONE;
+    return keyword == "map_kd"                        ? aiTextureType_DIFFUSE
+           : keyword == "map_ke"                      ? aiTextureType_EMISSIVE
+           : keyword == "map_d"                       ? aiTextureType_OPACITY
+           : keyword == "norm" || keyword == "map_kn" ? aiTextureType_NORMALS
+                                                      : aiTextureType_NONE;
+  };
+  // A colour that is not stated does not take a map's.
+  const auto whiten = [](aiMaterial& material, const char* key, unsigned type, unsigned slot) {
+    const aiColor3D white(1, 1, 1);
+    material.AddProperty(&white, 1, key, type, slot);
   };
   for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
     aiString name;
     if (scene.mMaterials[i]->Get(AI_MATKEY_NAME, name) != aiReturn_SUCCESS) continue;
+    const auto only_map = [&](const std::string& colour) {
+      return libraries.states(name.C_Str(), "map_" + colour) &&
+             !libraries.states(name.C_Str(), colour);
+    };
+    if (only_map("kd")) whiten(*scene.mMaterials[i], AI_MATKEY_COLOR_DIFFUSE);
+    if (only_map("ke")) whiten(*scene.mMaterials[i], AI_MATKEY_COLOR_EMISSIVE);
     for (const MtlMap& map : libraries.maps) {
       const aiTextureType type = type_of(map.keyword);
       if (map.material != name.C_Str() || type == aiTextureType_NONE) continue;
@@ -189,9 +210,8 @@ void apply_materials(const aiScene& scene, std::span<const MendedMaterial> mater
 void note_libraries(const MtlFacts& libraries, RawModel& model) {
   std::vector<std::string>& notes = model.report.notes;
   notes.insert(notes.end(), libraries.notes.begin(), libraries.notes.end());
-  if (libraries.materials.empty()) return;
   for (const RawMaterial& material : model.materials) {
-    if (material.name != AI_DEFAULT_MATERIAL_NAME && !libraries.materials.contains(material.name))
+    if (material.name != AI_DEFAULT_MATERIAL_NAME && !libraries.stated.contains(material.name))
       notes.push_back("material '" + material.name +
                       "' is in none of its libraries: a grey paint stands in its place");
   }
@@ -449,9 +469,21 @@ void check_faces(const aiScene& scene, const GltfFacts& facts) {
                              " triangles name vertices that are not there");
 }
 
+void check_ending(std::span<const std::byte> bytes, const std::string& file) {
+  const bool binary = bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
+  const bool named_binary = file.ends_with('b') || file.ends_with('B');
+  if (binary && !named_binary) throw std::runtime_error("it is binary glTF: let it end in .glb");
+  if (!binary && named_binary) {
+    throw std::runtime_error("it is no binary glTF; where it is glTF as text, let it end in .gltf");
+  }
+}
+
 // What can be told before assimp sees the file. It never ends on a PLY file that ends too soon.
-GltfFacts check_first(std::span<const std::byte> bytes, const ModelFormat& format) {
+GltfFacts check_first(std::span<const std::byte> bytes,
+                      const ModelFormat& format,
+                      const std::string& file) {
   if (bytes.empty()) throw std::runtime_error("the file is empty");
+  if (format.gltf) check_ending(bytes, file);
   if (format.gltf) return check_gltf(bytes);
   GltfFacts facts;
   if (format.ply) facts.notes = check_ply(bytes);
@@ -481,9 +513,11 @@ void translate(const std::exception_ptr& error) {
 RawModel import_model(ModelFiles& files, const std::string& file, const LoadOptions& options) {
   const ModelFormat format = model_format(file).value();
   std::optional<MendedGltf> mended;
+  bool painted = true;
   const GltfFacts facts = [&] {
     const std::vector<std::byte> bytes = files.read(file).value_or(std::vector<std::byte>{});
-    const GltfFacts checked = check_first(bytes, format);
+    const GltfFacts checked = check_first(bytes, format, file);
+    painted = (!format.ply || ply_has_paint(bytes)) && (!format.stl || stl_has_paint(bytes));
     if (format.gltf)
       mended = mend_gltf(bytes, [&](const std::string& name) { return files.read(name); });
     return checked;
@@ -499,6 +533,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
     if (const std::exception_ptr error = importer.GetException()) translate(error);
     std::string why = importer.GetErrorString();
     if (why.find("mNumMeshes is 0") != std::string::npos) why = "it holds no meshes";
+    if (why.find("contains no faces") != std::string::npos) why = "it has vertices without faces";
     for (const std::string& name : missing) why += "; '" + name + "' is not there";
     throw std::runtime_error(why);
   }
@@ -517,6 +552,10 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
   apply_libraries(*scene, libraries);
   if (mended) apply_materials(*scene, mended->materials);
   RawModel model = ModelBuilder(*scene, options, format).build(set_from_root);
+  if (!painted) {
+    for (RawMaterial& material : model.materials)
+      std::fill_n(material.parameters.base_color, 3, grey_paint);
+  }
   auto& notes = model.report.notes;
   std::vector<std::string> more = facts.notes;
   if (mended) more.insert(more.end(), mended->notes.begin(), mended->notes.end());
@@ -524,7 +563,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
     if (std::find(notes.begin(), notes.end(), note) == notes.end())
       notes.push_back(std::move(note));
   }
-  note_libraries(libraries, model);
+  if (format.obj) note_libraries(libraries, model);
   for (const std::string& name : missing)
     model.report.notes.push_back("'" + name + "' is not there");
   return model;

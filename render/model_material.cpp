@@ -2,6 +2,7 @@
 #include "render/model_material.h"
 
 #include <assimp/GltfMaterial.h>
+#include <assimp/ObjMaterial.h>
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
@@ -9,6 +10,7 @@
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace render {
 namespace {
@@ -97,34 +99,12 @@ GlassParameters glass_of(const aiMaterial& material, const StandardParameters& p
   const float distance_m = number(material, AI_MATKEY_VOLUME_ATTENUATION_DISTANCE, 0);
   for (int c = 0; c < 3; ++c) {
     const float share = std::clamp(left[c], 1e-4F, 1.0F);
-    if (distance_m > 1e-4F) glass.absorption[c] = -std::log(share) / distance_m;
-    glass.shadow[c] *= std::sqrt(share);
     glass.tint[c] = p.base_color[c];
+    if (!(distance_m > 1e-4F)) continue;  // endless where it is not stated
+    glass.absorption[c] = -std::log(share) / distance_m;
+    glass.shadow[c] *= std::sqrt(share);
   }
   return glass;
-}
-
-// A transform that all textures share is the mesh's.
-void share_transform(ImportedMaterial& material) {
-  StandardParameters& p = material.parameters;
-  const std::array<std::pair<std::int32_t, UvTransform*>, 8> places{
-      {{p.base_color_texture, &p.base_color_uv},
-       {p.metallic_roughness_texture, &p.metallic_roughness_uv},
-       {p.normal_texture, &p.normal_uv},
-       {p.clearcoat_texture, &p.clearcoat_uv},
-       {p.transmission_texture, &p.transmission_uv},
-       {p.emission_texture, &p.emission_uv},
-       {p.clearcoat_roughness_texture, &p.clearcoat_roughness_uv},
-       {p.alpha_texture, &p.alpha_uv}}};
-  std::optional<UvTransform> shared;
-  for (const auto& [texture, uv] : places) {
-    if (texture < 0) continue;
-    if (!shared) shared = *uv;
-    if (*shared != *uv) return;
-  }
-  if (!shared) return;
-  material.uv = *shared;
-  for (const auto& [texture, uv] : places) *uv = {};
 }
 
 }  // namespace
@@ -308,6 +288,29 @@ void MaterialImport::take_specular_glossiness(const aiMaterial& material,
          "': its mirror colour (specular-glossiness) is left out: it mirrors as paint does");
 }
 
+// Of OBJ, whose libraries say what shows reflections (illum 3 and above). What is not matte at all
+// is a metal; else it mirrors as paint does.
+void MaterialImport::take_mirror(const aiMaterial& material,
+                                 const std::string& name,
+                                 StandardParameters& p) {
+  constexpr int with_reflections = 3;
+  constexpr float of_dielectric = 0.04F;
+  int illum = 0;
+  float specular[3] = {};
+  if (material.Get(AI_MATKEY_OBJ_ILLUM, illum) != aiReturn_SUCCESS || illum < with_reflections ||
+      !colour(material, AI_MATKEY_COLOR_SPECULAR, specular) ||
+      *std::max_element(specular, specular + 3) <= of_dielectric)
+    return;
+  const bool black = std::all_of(p.base_color, p.base_color + 3, [](float x) { return x == 0; });
+  if (black && p.opacity == 1) {
+    p.metallic = 1;
+    for (int c = 0; c < 3; ++c) p.base_color[c] = std::min(specular[c], 1.0F);
+    p.base_color_texture = -1;
+  } else {
+    note("material '" + name + "': its mirror colour (Ks) is left out: it mirrors as paint does");
+  }
+}
+
 void MaterialImport::take_volume(const aiMaterial& material,
                                  const std::string& name,
                                  ImportedMaterial& result) {
@@ -406,6 +409,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   p.transmission = std::clamp(number(material, AI_MATKEY_TRANSMISSION_FACTOR, 0), 0.0F, 1.0F);
   if (!metallic_roughness)
     p.opacity = std::clamp(number(material, AI_MATKEY_OPACITY, 1), 0.0F, 1.0F);
+  if (format_.obj) take_mirror(material, name, p);
   colour(material, AI_MATKEY_COLOR_EMISSIVE, p.emission);
   p.emission_gain = std::max(0.0F, number(material, AI_MATKEY_EMISSIVE_INTENSITY, 1));
   p.normal_scale = number(material, AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), 1);
@@ -418,13 +422,14 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
     const std::string mode = alpha_mode.C_Str();
     if (mode == "MASK")
       p.alpha_cutoff = std::clamp(number(material, AI_MATKEY_GLTF_ALPHACUTOFF, 0.5F), 0.0F, 1.0F);
-    if (mode == "BLEND") {
+    if (mode == "BLEND" && p.base_color_texture < 0) {
+      p.opacity = std::exchange(p.base_color_alpha, 1.0F);
+    } else if (mode == "BLEND") {
       p.alpha_cutoff = 0.5F;
       note("material '" + name + "': blended alpha is cut at a half");
     }
   }
   result.uv_set = uv_set_.value_or(0);
-  share_transform(result);
   take_volume(material, name, result);
   constexpr float frosted = 0.1F;
   if (p.transmission > 0 && p.metallic < 1 && p.roughness > frosted)

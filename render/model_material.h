@@ -27,10 +27,7 @@ inline constexpr const char* dispersion_key = "$mat.dispersion";
 struct ImportedMaterial {
   StandardParameters parameters;
   std::optional<GlassParameters> glass;  // a volume that light passes: this, in place of those
-  // What its mesh's coordinates are: those of one of the file's sets, transformed as all textures
-  // want it, or, where they do not agree, as they are.
-  UvTransform uv;
-  unsigned uv_set = 0;
+  unsigned uv_set = 0;  // of the file's sets of coordinates: that which its mesh has
 };
 
 // Takes materials, and collects the textures that they ask for.
@@ -65,6 +62,7 @@ class MaterialImport {
   void take_specular_glossiness(const aiMaterial& material,
                                 const std::string& name,
                                 StandardParameters& p);
+  void take_mirror(const aiMaterial& material, const std::string& name, StandardParameters& p);
   void take_volume(const aiMaterial& material, const std::string& name, ImportedMaterial& result);
   void note_unhandled(const aiMaterial& material, const std::string& name);
   void note(const std::string& text);

@@ -211,7 +211,7 @@ Mesh convert_mesh(const aiMesh& source,
     mesh.uvs.reserve(source.mNumVertices);
     for (unsigned i = 0; i < source.mNumVertices; ++i) {
       const aiVector3D& t = source.mTextureCoords[set][i];
-      const auto [u, v] = material.uv.of_place({t.x, 1 - t.y});
+      const float u = t.x, v = 1 - t.y;
       constexpr float most = 1e6F;
       const bool sound = std::abs(u) <= most && std::abs(v) <= most;
       mesh.uvs.push_back(sound ? std::array<float, 2>{u, v} : std::array<float, 2>{});

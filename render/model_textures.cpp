@@ -51,6 +51,21 @@ std::size_t claimed_bytes(const RawTexture& raw, const Source& source) {
   return texture_bytes(static_cast<int>(width), static_cast<int>(height), 4);
 }
 
+// Without an alpha that is opaque everywhere: colours then, or a grey, of which masks are read.
+void drop_opaque_alpha(capture::Still8& still) {
+  if (still.channels % 2 != 0) return;
+  const auto channels = static_cast<std::size_t>(still.channels);
+  for (std::size_t i = channels - 1; i < still.texels.size(); i += channels) {
+    if (still.texels[i] != 255) return;
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < still.texels.size(); ++i) {
+    if (i % channels != channels - 1) still.texels[kept++] = still.texels[i];
+  }
+  still.texels.resize(kept);
+  --still.channels;
+}
+
 void decode(const RawTexture& raw, Source& source) {
   try {
     if (raw.width > 0) {
@@ -58,7 +73,8 @@ void decode(const RawTexture& raw, Source& source) {
       source.texture = std::make_shared<const Texture>(
           make_texture(raw.width, raw.height, 4, raw.srgb, {texels, source.file.size()}, raw.wrap));
     } else {
-      const capture::Still8 still = capture::decode_still8(source.file, "it");
+      capture::Still8 still = capture::decode_still8(source.file, "it");
+      drop_opaque_alpha(still);
       source.texture = std::make_shared<const Texture>(make_texture(
           still.width, still.height, still.channels, raw.srgb, still.texels, raw.wrap));
     }

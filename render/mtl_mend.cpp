@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <optional>
 #include <string_view>
 
@@ -28,7 +29,8 @@ class Words {
   // The next word if it is a number; else it stays.
   std::optional<float> number() {
     const std::string_view before = rest_;
-    const std::string_view word = next();
+    std::string_view word = next();
+    if (word.starts_with('+')) word.remove_prefix(1);
     float value = 0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (!word.empty() && error == std::errc{} && end == word.data() + word.size() &&
@@ -57,17 +59,23 @@ void take_numbers(Words& words, std::array<float, 2>& values) {
   }
 }
 
-void take_options(const std::string& keyword,
-                  const std::string& material,
-                  Words words,
-                  MtlFacts& facts) {
+void note_once(const std::string& note, MtlFacts& facts) {
+  if (std::ranges::find(facts.notes, note) == facts.notes.end()) facts.notes.push_back(note);
+}
+
+// Takes the options of a map's line; returns the name of its file, which may have blanks.
+std::string_view take_options(const std::string& keyword,
+                              const std::string& material,
+                              Words words,
+                              MtlFacts& facts) {
   MtlMap map{.material = material, .keyword = keyword};
   const auto leave_out = [&](std::string_view option) {
-    const std::string note =
-        "material '" + material + "': option " + std::string(option) + " of a map is left out";
-    if (std::ranges::find(facts.notes, note) == facts.notes.end()) facts.notes.push_back(note);
+    note_once(
+        "material '" + material + "': option " + std::string(option) + " of a map is left out",
+        facts);
   };
   bool taken = false;
+  std::string_view rest = words.all();
   for (std::string_view word = words.next(); word.starts_with('-'); word = words.next()) {
     std::array<float, 2> numbers{0, 1};
     if (word == "-s") {
@@ -91,8 +99,10 @@ void take_options(const std::string& keyword,
       if (word == "-imfchan") leave_out(word);
       words.next();
     }
+    rest = words.all();
   }
   if (taken) facts.maps.push_back(map);
+  return rest;
 }
 
 std::string in_small_letters(std::string_view word) {
@@ -101,35 +111,112 @@ std::string in_small_letters(std::string_view word) {
   return text;
 }
 
+bool is_in(std::initializer_list<std::string_view> names, std::string_view name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+bool is_map(std::string_view keyword) {
+  return keyword.starts_with("map_") || is_in({"norm", "disp", "bump"}, keyword);
+}
+
+// Writes one library anew, line by line.
+class LibraryMender {
+ public:
+  explicit LibraryMender(MtlFacts& facts) : facts_(facts) {}
+
+  void take(std::string_view line) {
+    Words words(line);
+    const std::string_view own = words.next();
+    const std::string keyword = in_small_letters(own);
+    if (keyword == "newmtl") {
+      material_ = words.all();
+      facts_.stated[material_];
+      write(line);
+    } else if (is_map(keyword)) {
+      const std::string_view file = take_options(keyword, material_, words, facts_);
+      state(keyword);
+      write(own, file);
+    } else if (is_in({"decal", "refl"}, keyword)) {
+      leave_out(Words(line).all());
+    } else if (is_in({"ka", "kd", "ks", "ke", "tf"}, keyword)) {
+      take_colour(keyword, line, own, words);
+    } else if (is_in({"d", "tr", "ns", "ni", "illum", "pr", "pm", "ps", "pc", "pcr"}, keyword)) {
+      take_number(keyword, line, own, words);
+    } else {
+      write(line);
+    }
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  void take_colour(const std::string& keyword,
+                   std::string_view line,
+                   std::string_view own,
+                   Words words) {
+    Words values = words;
+    const std::string one(words.next());
+    if (!is_number(one)) return leave_out(Words(line).all());
+    const auto red = values.number();
+    const bool grey = red && values.all().empty();
+    if (keyword == "tf") {
+      const auto green = values.number(), blue = values.number();
+      if (red.value_or(1) != 1 || green.value_or(1) != 1 || blue.value_or(1) != 1) {
+        leave_out("its filter (Tf)");
+      }
+    }
+    state(keyword);
+    if (!grey) return write(line);
+    write(own, one + " " + one + " " + one);
+  }
+  void take_number(const std::string& keyword,
+                   std::string_view line,
+                   std::string_view own,
+                   Words words) {
+    std::string_view value = words.next();
+    if (keyword == "d" && value == "-halo") {
+      leave_out("option -halo of its opacity");
+      value = words.next();
+    }
+    if (!is_number(value)) return leave_out(Words(line).all());
+    state(keyword);
+    write(own, value);
+  }
+  // As assimp takes them: else it gives up.
+  static bool is_number(std::string_view word) {
+    const std::size_t begin = word.find_first_not_of("+-");
+    if (begin == std::string_view::npos || begin > 1) return false;
+    const std::string start = in_small_letters(word.substr(begin, 3));
+    return (start[0] >= '0' && start[0] <= '9') || start == "nan" || start == "inf" ||
+           (start.size() > 1 && start[0] == '.' && start[1] >= '0' && start[1] <= '9');
+  }
+
+  void leave_out(std::string_view what) {
+    constexpr std::size_t most = 80;
+    note_once("material '" + material_ + "': " + std::string(what.substr(0, most)) + " is left out",
+              facts_);
+  }
+  void state(const std::string& keyword) { facts_.stated[material_].insert(keyword); }
+  void write(std::string_view line) { text_.append(line).append("\n"); }
+  void write(std::string_view keyword, std::string_view value) {
+    text_.append(keyword).append(" ").append(value).append("\n");
+  }
+
+  MtlFacts& facts_;
+  std::string material_;
+  std::string text_;
+};
+
 }  // namespace
 
 std::vector<std::byte> mend_mtl(std::span<const std::byte> library, MtlFacts& facts) {
   std::string_view text(reinterpret_cast<const char*>(library.data()), library.size());
-  std::string mended, material;
-  mended.reserve(text.size());
+  LibraryMender mender(facts);
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
     text.remove_prefix(std::min(line.size() + 1, text.size()));
-    Words words(line);
-    const std::string keyword = in_small_letters(words.next());
-    if (keyword == "newmtl") {
-      material = words.all();
-      facts.materials.insert(material);
-    }
-    mended.append(line);
-    if (keyword == "ka" || keyword == "kd" || keyword == "ks" || keyword == "ke") {
-      Words values = words;
-      const std::string one(Words(words).next());
-      if (values.number() && values.all().empty()) {
-        while (!mended.empty() && blanks_of_mtl.find(mended.back()) != std::string_view::npos)
-          mended.pop_back();
-        mended.append(" ").append(one).append(" ").append(one);
-      }
-    } else if (keyword.starts_with("map_") || keyword == "norm" || keyword == "disp") {
-      take_options(keyword, material, words, facts);
-    }
-    mended.append("\n");
+    mender.take(line);
   }
+  const std::string& mended = mender.text();
   std::vector<std::byte> bytes(mended.size());
   std::transform(mended.begin(), mended.end(), bytes.begin(),
                  [](char c) { return static_cast<std::byte>(c); });

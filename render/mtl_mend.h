@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <map>
 #include <set>
 #include <span>
 #include <string>
@@ -19,12 +20,19 @@ struct MtlMap {
 };
 
 struct MtlFacts {
-  std::set<std::string> materials;  // that the libraries describe
-  std::vector<MtlMap> maps;         // those with options
-  std::vector<std::string> notes;   // of options that nobody takes
+  // Of each material that the libraries describe: what they state of it, in small letters.
+  std::map<std::string, std::set<std::string>> stated;
+  std::vector<MtlMap> maps;        // those with options
+  std::vector<std::string> notes;  // of what nobody takes
+
+  bool states(const std::string& material, const std::string& keyword) const {
+    const auto found = stated.find(material);
+    return found != stated.end() && found->second.contains(keyword);
+  }
 };
 
-// A library's bytes, colours of one number written out as three. Adds to `facts`.
+// A library's bytes: colours of one number written out as three; maps without their options, which
+// `facts` get; without lines that would make assimp give up the whole model. Adds to `facts`.
 std::vector<std::byte> mend_mtl(std::span<const std::byte> library, MtlFacts& facts);
 
 }  // namespace render

@@ -90,6 +90,22 @@ std::vector<std::string> left_out_of_x3d(std::span<const std::byte> file_bytes) 
   if (find_tag(text, "ProtoInstance") != std::string_view::npos) {
     notes.emplace_back("instances of prototypes (ProtoInstance) are left out");
   }
+  for (const std::string name : {"Anchor", "Billboard", "Collision", "LOD"}) {
+    if (find_tag(text, name) != std::string_view::npos) {
+      notes.push_back("what is below " + name + " nodes is left out");
+    }
+  }
+  for (const std::string name : {"MovieTexture", "MultiTexture", "PixelTexture"}) {
+    if (find_tag(text, name) != std::string_view::npos) {
+      notes.push_back("pictures of " + name + " nodes are left out");
+    }
+  }
+  for (std::size_t at = find_tag(text, "unit"); at != std::string_view::npos;
+       at = find_tag(text, "unit", at + 1)) {
+    if (text.substr(at, text.find('>', at) - at).find("length") == std::string_view::npos) continue;
+    notes.emplace_back("its unit of length is taken for a metre: set the object's scale");
+    break;
+  }
   return notes;
 }
 

@@ -247,7 +247,7 @@ TEST_F(LockedTakeTest, GoesOnInBothWithEveryFrameWhenItIsTheExrFramesThatFail) {
   settings.exr_dir = path("take");
   Recorder recorder(settings);
   for (int n = 0; n < 5; ++n) EXPECT_TRUE(recorder.push(frame(settings, n, Larger::key)));
-  while (recorder.status().written < 5) std::this_thread::yield();
+  while (recorder.status().outputs.back().written < 5) std::this_thread::yield();
   fs::remove_all(settings.exr_dir);
   for (int n = 5; n < 8; ++n) EXPECT_TRUE(recorder.push(frame(settings, n, Larger::key)));
   recorder.close();

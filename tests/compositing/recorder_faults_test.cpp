@@ -166,7 +166,7 @@ TEST_F(RecorderFaultsTest, GoesOnInItsVideosWhenItIsTheExrFramesThatFail) {
   Recorder recorder(settings);
   int n = 0;
   for (; n < 5; ++n) EXPECT_TRUE(recorder.push(complete_frame(n)));
-  while (recorder.status().written < 5) std::this_thread::yield();
+  while (recorder.status().outputs.back().written < 5) std::this_thread::yield();
   fs::remove_all(settings.exr_dir);
   for (; n < 20; ++n) EXPECT_TRUE(recorder.push(complete_frame(n)));
   recorder.close();

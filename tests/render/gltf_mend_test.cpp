@@ -309,6 +309,26 @@ TEST_F(GltfMendTest, NotesEveryExtensionThatIsNotShown) {
 "KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_volume":{"thicknessFactor":1},)" +
                         index + "}}"),
               IsEmpty());
+  EXPECT_THAT(notes(R"("KHR_materials_ior","KHR_materials_volume","KHR_materials_transmission")",
+                    R"({"pbrMetallicRoughness":{"roughnessFactor":0},"extensions":{
+"KHR_materials_transmission":{"transmissionFactor":1},"KHR_materials_volume":{},)" +
+                        index + "}}"),
+              ElementsAre(HasSubstr("KHR_materials_ior is left out")));
+}
+
+// Tens of thousands of parts, as assemblies have: in a time that grows as their number.
+TEST_F(GltfMendTest, ReadsManyParts) {
+  GltfMaker maker;
+  const std::string position = text(maker.values<float>(3, corners));
+  constexpr int count = 30'000;
+  std::string parts, children;
+  for (int i = 1; i <= count; ++i) {
+    parts += ",{\"mesh\":0,\"translation\":[" + text(i) + ",0,0]}";
+    children += (i > 1 ? "," : "") + text(i);
+  }
+  const LoadedModel model = load(maker.glb("\"nodes\":[{\"children\":[" + children + "]}" + parts +
+                                           "]," + triangle("\"POSITION\":" + position)));
+  EXPECT_EQ(model.report.triangles, std::size_t{count});
 }
 
 TEST_F(GltfMendTest, RefusesBuffersThatHoldLessThanTheFileSays) {

@@ -173,6 +173,13 @@ TEST(LoadModel, TakesClearVolumesForSolidGlass) {
   EXPECT_NEAR(glass.absorption[0], std::log(2.0) / 0.02, 1e-3);
   EXPECT_NEAR(glass.absorption[1], 0, 1e-6);
   EXPECT_LT(glass.shadow[2], glass.shadow[0]);
+  // A colour of no stated distance is never reached, in the shadow neither.
+  const render::GlassParameters clear = render::glass_parameters(
+      load(R"("pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0},"extensions":{
+"KHR_materials_transmission":{"transmissionFactor":1},
+"KHR_materials_volume":{"thicknessFactor":0.01,"attenuationColor":[0.5,1,0.25]}})"));
+  EXPECT_EQ(clear.absorption[2], 0);
+  EXPECT_EQ(clear.shadow[2], clear.shadow[1]);
   // Without a volume it is a thin sheet; rough, it is not glass.
   EXPECT_EQ(load(R"("extensions":{"KHR_materials_transmission":{"transmissionFactor":1}})").shader,
             "standard");

@@ -228,6 +228,23 @@ TEST(ModelFaults, RefusesClaimsOfMoreThanThereIs) {
        {"a.x3d", made::x3d_triangle("0 1 1000000000 -1", "0 0 0 1 0 0 0 1 0"), "out of range"}});
 }
 
+TEST(ModelFaults, RefusesFormsThatAreNotRead) {
+  GlbParts parts;
+  const std::string glb = make_glb(parts);
+  const std::string json = claiming(R"("bufferView":0,"count":3)", 36);
+  std::string first = json;
+  first.replace(first.find("2.0"), 3, "1.0");
+  expect_refused({{"a.gltf", glb, "let it end in .glb"},
+                  {"a.glb", json, "let it end in .gltf"},
+                  {"b.gltf", first, "it is glTF 1.0, of which only version 2 is read"},
+                  {"a.ply",
+                   "ply\nformat ascii 1.0\nelement label 1\nproperty int x\nelement vertex 3\n"
+                   "property float x\nproperty float y\nproperty float z\nelement face 1\n"
+                   "property list uchar int vertex_indices\nend_header\n7\n0 0 0\n1 0 0\n0 1 0\n"
+                   "3 0 1 2\n",
+                   "'label' stands before its vertices"}});
+}
+
 TEST(ModelFaults, RefusesNestingAndCycles) {
   GlbParts nested;
   nested.more = ",\"x\":" + std::string(100000, '[') + std::string(100000, ']');

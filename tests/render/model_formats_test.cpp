@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <assimp/Exporter.hpp>
+#include <cctype>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -426,6 +428,71 @@ TEST_F(FormatsTest, TellsWhatOfAnX3dIsLeftOut) {
       notes("a.x3d", made::x3d("<ProtoDeclare name='P'><ProtoBody>" + shape +
                                "</ProtoBody></ProtoDeclare><ProtoInstance name='P'/>" + shape)),
       testing::ElementsAre(HasSubstr("(ProtoInstance) are left out")));
+}
+
+TEST_F(FormatsTest, TellsWhatAssimpPassesOverInAnX3d) {
+  const std::string shape =
+      "<Shape><IndexedFaceSet coordIndex='0 1 2 -1'><Coordinate point='0 0 0 1 0 0 0 1 0'/>"
+      "</IndexedFaceSet></Shape>";
+  EXPECT_THAT(notes("a.x3d", made::x3d("<LOD>" + shape + "</LOD>" + shape)),
+              testing::ElementsAre("what is below LOD nodes is left out"));
+  const auto with_unit = [&](const std::string& unit) {
+    std::string file = made::x3d(shape);
+    return notes("a.x3d", file.insert(file.find("<Scene"), "<head>" + unit + "</head>"));
+  };
+  EXPECT_THAT(with_unit("<unit category='angle' conversionFactor='1'/>"), testing::IsEmpty());
+  EXPECT_THAT(with_unit("<unit category='length' conversionFactor='.001'/>"),
+              testing::ElementsAre(HasSubstr("set the object's scale")));
+}
+
+// All of the bytes that a file's data may begin with.
+TEST_F(FormatsTest, ReadsBinaryPlyWhateverItsFirstByteIs) {
+  for (const char first : {'\n', '\r', ' ', '\0', 'e'}) {
+    std::string file =
+        "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
+        "property float y\nproperty float z\nelement face 1\n"
+        "property list uchar int vertex_indices\nend_header\n";
+    const std::array<float, 9> places{1, 0, 0, 1, 1, 0, 0, 1, 0};
+    const std::size_t begin = file.size();
+    file.append(reinterpret_cast<const char*>(places.data()), sizeof places);
+    file[begin] = file[begin + 1] = first;  // 1, but for its last bits
+    const std::array<std::int32_t, 3> corners{0, 1, 2};
+    file.push_back(3);
+    file.append(reinterpret_cast<const char*>(corners.data()), sizeof corners);
+    const LoadedModel model = load("a.ply", file);
+    EXPECT_EQ(model.report.triangles, 1U) << int{first};
+    EXPECT_NEAR(model.report.upper.x, 1, 0.01F);
+    EXPECT_EQ(model.scene.meshes.at(0)->positions.size(), 3U);
+  }
+}
+
+TEST_F(FormatsTest, ReadsAsciiStlInCapitalsAndBehindBlanks) {
+  const std::string words =
+      "solid part\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+      "endloop\nendfacet\nendsolid part\n";
+  std::string capitals = words;
+  for (char& c : capitals) c = static_cast<char>(std::toupper(c));
+  for (const std::string& file :
+       {words, " \n" + words, "\xEF\xBB\xBF" + words, capitals, "\t" + capitals}) {
+    EXPECT_EQ(load("a.stl", file).report.triangles, 1U) << file.substr(0, 10);
+  }
+}
+
+TEST_F(FormatsTest, PaintsGreyWhatTellsNoColour) {
+  const auto base = [](const LoadedModel& model) {
+    return standard_parameters(model.scene.materials.at(0), model.scene.textures.size())
+        .base_color[0];
+  };
+  const std::string ply =
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+      "property list uchar int vertex_indices\n";
+  const std::string rows = "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", head = "ply\nformat ascii 1.0\n";
+  EXPECT_EQ(base(load("a.ply", head + ply + "end_header\n" + rows)), 0.6F);
+  EXPECT_EQ(base(load("a.stl", made::stl({0, 0, 1}))), 0.6F);
+  const std::string material =
+      "element material 1\nproperty uchar diffuse_red\nproperty uchar diffuse_green\n"
+      "property uchar diffuse_blue\n";
+  EXPECT_EQ(base(load("a.ply", head + ply + material + "end_header\n" + rows + "255 0 0\n")), 1);
 }
 
 TEST_F(FormatsTest, TellsOfPointsAndLines) {
