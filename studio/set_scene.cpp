@@ -131,22 +131,39 @@ std::string name_of(const StandInSettings& stand_in, std::size_t number) {
   return stand_in.name.empty() ? fmt::format("stand-in {}", number) : stand_in.name;
 }
 
-Mesh plane_mesh(double width_m, double depth_m, std::uint32_t material) {
+// How far below its face a stand-in lies: just more than rays are moved off a surface anywhere on
+// it, and a millimetre at most. So glass that stands on a floor ends before the floor begins, for
+// every ray. Where both were one plane, rays would meet the one or the other by chance.
+double gap_m(const StandInSettings& stand_in) {
+  constexpr double most_m = 1e-3, of_coordinates = 2.5e-5;  // see render::offset_origin
+  const calibrate::Vec3 at = stand_in.pose.position;
+  const double reach =
+      stand_in.pose.scale * std::hypot(stand_in.size.x / 2, stand_in.size.y / 2, stand_in.size.z);
+  const double farthest = std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)}) + reach;
+  return std::min(most_m, of_coordinates * farthest) / stand_in.pose.scale;
+}
+
+// Of a plane of z = 0.
+Mesh plane_mesh(double width_m, double depth_m, double gap_m, std::uint32_t material) {
   const auto x = static_cast<float>(width_m / 2);
   const auto y = static_cast<float>(depth_m / 2);
+  const auto z = static_cast<float>(-gap_m);
   Mesh mesh;
-  mesh.positions = {{-x, -y, 0}, {x, -y, 0}, {x, y, 0}, {-x, y, 0}};
+  mesh.positions = {{-x, -y, z}, {x, -y, z}, {x, y, z}, {-x, y, z}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   mesh.materials = {material};
   return mesh;
 }
 
 // Corner i has x from bit 0, y from bit 1, z from bit 2; the box stands on z = 0.
-Mesh box_mesh(calibrate::Vec3 size, std::uint32_t material) {
+Mesh box_mesh(calibrate::Vec3 size, double gap_m, std::uint32_t material) {
+  const auto within = [&](double whole) { return std::max(whole - 2 * gap_m, whole / 2); };
+  const double top = std::max(size.z - gap_m, size.z / 2);
   Mesh mesh;
   for (unsigned i = 0; i < 8; ++i) {
-    mesh.positions.push_back(calibrate::to_float(
-        {(i & 1U ? 0.5 : -0.5) * size.x, (i & 2U ? 0.5 : -0.5) * size.y, i & 4U ? size.z : 0.0}));
+    mesh.positions.push_back(
+        calibrate::to_float({(i & 1U ? 0.5 : -0.5) * within(size.x),
+                             (i & 2U ? 0.5 : -0.5) * within(size.y), i & 4U ? top : 0.0}));
   }
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
@@ -189,9 +206,10 @@ void add_stand_in(SceneDescription& scene,
     parts = std::move(model.instances);
   } else {
     const bool box = stand_in.shape == StandInSettings::Shape::box;
+    const double gap = gap_m(stand_in);
     scene.meshes.push_back(
-        std::make_shared<Mesh>(box ? box_mesh(stand_in.size, material)
-                                   : plane_mesh(stand_in.size.x, stand_in.size.y, material)));
+        std::make_shared<Mesh>(box ? box_mesh(stand_in.size, gap, material)
+                                   : plane_mesh(stand_in.size.x, stand_in.size.y, gap, material)));
     Instance part;
     part.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
     parts.push_back(part);

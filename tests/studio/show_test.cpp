@@ -14,6 +14,8 @@
 #include <thread>
 
 #include "capture/png.h"
+#include "render/trace.h"
+#include "render/transform.h"
 #include "studio/set_scene.h"
 #include "studio/tone_follower.h"
 #include "tests/made_files.h"
@@ -217,6 +219,41 @@ TEST_F(ShowTest, HidesPartsOfMadeThings) {
   } catch (const SetError& error) {
     EXPECT_THAT(error.what(), HasSubstr("cannot hide 'no such part': its parts are"));
     EXPECT_THAT(error.what(), HasSubstr(part->name));
+  }
+}
+
+// Whatever their size and place: of what stands on them, rays leave the lower side above them.
+TEST_F(ShowTest, BeginsStandInsBelowWhatStandsOnThem) {
+  Set set = made_set("grey:1,25,0");
+  ASSERT_FALSE(set.stand_ins.empty());
+  set.stand_ins.resize(1);
+  StandInSettings& floor = set.stand_ins[0];
+  for (const auto shape : {StandInSettings::Shape::plane, StandInSettings::Shape::box}) {
+    for (const double size_m : {0.01, 3.0, 20.0}) {
+      for (const double scale : {1.0, 0.5}) {
+        floor.shape = shape;
+        floor.size = {size_m, size_m, 0.1 * size_m};
+        floor.pose = {.position = {size_m, -0.5 * size_m, 0}, .scale = scale};
+        const double top_m = shape == StandInSettings::Shape::box ? scale * floor.size.z : 0;
+        const render::SceneDescription scene = describe_scene(set).description;
+        const auto stand_in = std::ranges::find(scene.instances, render::ObjectKind::stand_in,
+                                                &render::Instance::kind);
+        ASSERT_NE(stand_in, scene.instances.end());
+        float highest = -1e9F;
+        for (const calibrate::Vec3f p : scene.meshes[stand_in->mesh]->positions) {
+          highest = std::max(highest, render::transform_point(stand_in->set_from_object, p).z);
+        }
+        EXPECT_GT(highest, static_cast<float>(top_m) - 1.01e-3F);
+        for (const double along : {-0.49, 0.0, 0.49}) {
+          render::HitPoint under;
+          under.position = calibrate::to_float(
+              {size_m * (1 + scale * along), size_m * (scale * along - 0.5), top_m});
+          under.geometric_normal = {0, 0, 1};
+          under.largest_coordinate = under.position.x;
+          EXPECT_GT(render::offset_origin(under, {0, 0, -1}).z, highest) << size_m << ' ' << along;
+        }
+      }
+    }
   }
 }
 
