@@ -584,8 +584,8 @@ TEST(ModelMaterial, ReadsObjWithByteOrderMarks) {
 }
 
 TEST(ModelMaterial, TakesBlendedAlphaWithoutAPictureForOpacity) {
-  const LoadedModel pane =
-      load_glb(R"({"alphaMode":"BLEND","pbrMetallicRoughness":{"baseColorFactor":[1,0.5,1,0.25]}})");
+  const LoadedModel pane = load_glb(
+      R"({"alphaMode":"BLEND","pbrMetallicRoughness":{"baseColorFactor":[1,0.5,1,0.25]}})");
   const StandardParameters p = parameters_of(pane);
   EXPECT_EQ(p.opacity, 0.25F);
   EXPECT_EQ(p.base_color_alpha, 1);
