@@ -232,6 +232,10 @@ CameraResponse read_response(const std::string& path) {
 }
 
 void write_response(const std::string& path, const CameraResponse& response) {
+  if (!response.linear && !is_sound(response.curve)) {
+    throw std::invalid_argument(path + ": its curve falls somewhere, or does not end near 1, and " +
+                                "would not be read back; are the exposures in the shots' order?");
+  }
   if (ends_as(path, ".toml")) {
     write_file(path, std::as_bytes(std::span<const char>(toml_of(response))));
     return;

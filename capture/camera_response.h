@@ -38,8 +38,8 @@ CameraResponse read_response(const std::string& path);
 // Writes a .toml file: `model = "linear"` with the keys of LinearResponse and a table [noise] with
 // read, shot and saturation; or `model = "curve"`, `name`, and the 256 lights of `red`, `green` and
 // `blue`. Or a .rsp file, for polynomials, and for linear sensors without a black level. Throws
-// std::invalid_argument for what the kind of file cannot hold or another ending,
-// std::runtime_error if it cannot be written.
+// std::invalid_argument for what the kind of file cannot hold, a curve that is not sound
+// (response.h) or another ending, std::runtime_error if it cannot be written.
 void write_response(const std::string& path, const CameraResponse& response);
 
 }  // namespace capture

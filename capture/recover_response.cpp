@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <future>
 #include <limits>
 #include <stdexcept>
@@ -11,6 +12,7 @@
 
 #include "capture/comparagram.h"
 #include "capture/curve_family.h"
+#include "capture/median.h"
 #include "capture/response.h"
 #include "capture/response_fit.h"
 
@@ -126,6 +128,28 @@ std::vector<std::string> warnings_of(std::span<const CodeFall> falls, double hel
   return warnings;
 }
 
+// Exposures that stand out from how the others relate to their labels.
+void warn_of_labels(std::span<const CodedShot> shots,
+                    std::span<const double> exposures_s,
+                    std::vector<std::string>& warnings) {
+  constexpr double much = 1.25;
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    ratios.push_back(exposures_s[i] / shots[i].exposure_s);
+  }
+  const double usual = median(ratios);
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    const double off = ratios[i] / usual;
+    if (off < much && off > 1 / much) continue;
+    std::array<char, 200> text{};
+    std::snprintf(text.data(), text.size(),
+                  "the shot of %.4g s has the light of %.4g s, as the others have it: is its "
+                  "exposure right, and does the scene stand still?",
+                  shots[i].exposure_s, exposures_s[i] / usual);
+    warnings.emplace_back(text.data());
+  }
+}
+
 }  // namespace
 
 ResponseFit recover_response(std::span<const CodedShot> shots) {
@@ -149,6 +173,14 @@ ResponseFit recover_response(std::span<const CodedShot> shots) {
   }
   const std::size_t chosen = simplest_that_suffices(fit.candidates);
   if (!std::isfinite(fit.candidates[chosen].heldout_error)) throw too_little_shared(shots);
+  constexpr double nothing_like_it = 0.3;
+  if (fit.candidates[chosen].heldout_error > nothing_like_it) {
+    throw std::runtime_error(
+        "no curve foretells the shots better than to " +
+        std::to_string(std::lround(100 * fit.candidates[chosen].heldout_error)) +
+        " %: are the exposures in the shots' order, and does the scene stand "
+        "still?");
+  }
   const CurveFamily& family = families[chosen];
   CurveFit curve = fit_curve(family, matches, claimed);
   fit.response = family.response(curve.parameters.data());
@@ -157,6 +189,7 @@ ResponseFit recover_response(std::span<const CodedShot> shots) {
   fit.pixel_error = fit.candidates[chosen].pixel_error;
   fit.changed = changed[chosen];
   fit.warnings = warnings_of(comparison.falls, fit.heldout_error);
+  warn_of_labels(shots, fit.exposures_s, fit.warnings);
   return fit;
 }
 

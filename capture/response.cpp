@@ -1,6 +1,7 @@
 // Known responses, and those in files.
 #include "capture/response.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
@@ -82,6 +83,15 @@ void tabulate(const std::vector<double>& coefficients, std::array<double, Respon
 }
 
 }  // namespace
+
+bool is_sound(const Response& response) {
+  constexpr double near_white = 0.05;
+  return std::ranges::all_of(response.light, [](const auto& light) {
+    return light.front() >= 0 && light.back() > 1 - near_white && light.back() <= 1 + near_white &&
+           std::ranges::all_of(light, [](double x) { return std::isfinite(x); }) &&
+           std::ranges::is_sorted(light);
+  });
+}
 
 Response srgb_response() {
   return response_of("sRGB", [](double z) { return decode(Transfer::srgb, z); });

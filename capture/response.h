@@ -19,6 +19,10 @@ struct Response {
   std::array<std::vector<double>, 3> coefficients;
 };
 
+// Whether it is one that is read back from a file: of numbers from 0 to 1.05 that do not fall and
+// end at .95 or above.
+bool is_sound(const Response& response);
+
 Response srgb_response();
 Response linear_response();
 

@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
 #include <stdexcept>
 
 #include "capture/camera.h"
@@ -65,6 +70,19 @@ TEST(WriteResponse, RefusesWhatAKindOfFileCannotHold) {
   EXPECT_THROW(write_response(directory / "a.rsp", {srgb_response(), std::nullopt}),
                std::invalid_argument);
   EXPECT_THROW(write_response(directory / "a.txt", made_linear()), std::invalid_argument);
+  for (const double power : {-1.0, 0.0}) {
+    Response curve;
+    for (auto& channel : curve.light) {
+      for (std::size_t z = 0; z < channel.size(); ++z) {
+        channel[z] = std::pow(static_cast<double>(z + 1) / 256, power);
+      }
+    }
+    EXPECT_EQ(is_sound(curve), power == 0);
+    curve.light[1][0] = 2;
+    EXPECT_THROW(write_response(directory / "a.toml", {curve, std::nullopt}),
+                 std::invalid_argument);
+    EXPECT_FALSE(std::filesystem::exists(directory / "a.toml"));
+  }
   EXPECT_THROW(write_response(directory / "absent" / "a.toml", made_linear()), std::runtime_error);
 }
 
@@ -103,7 +121,14 @@ TEST(ReadResponse, RefusesCurvesThatFallOrEndFarFromWhite) {
   const auto refusal = [&](auto change) -> std::string {
     CameraResponse response{linear_response(), std::nullopt};
     change(response.curve.light[1]);
-    write_response(path, response);
+    std::ofstream file(path);  // write_response refuses them as well
+    file << std::setprecision(17) << "model = \"curve\"\nname = \"linear\"\n";
+    for (std::size_t c = 0; c < 3; ++c) {
+      file << std::array{"red", "green", "blue"}[c] << " = [";
+      for (const double light : response.curve.light[c]) file << light << ", ";
+      file << "]\n";
+    }
+    file.close();
     try {
       read_response(path);
     } catch (const std::runtime_error& error) {

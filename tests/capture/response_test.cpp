@@ -7,6 +7,7 @@
 #include <functional>
 #include <random>
 #include <stdexcept>
+#include <utility>
 
 #include "capture/colour.h"
 #include "capture/exif.h"
@@ -148,6 +149,24 @@ TEST(RecoverResponse, SolvesShuttersThatAreOffBySeveralPercent) {
       EXPECT_NEAR(bend(fit.exposures_s, i), bend(bracket.true_exposures_s, i), 0.02) << seed;
     }
   }
+}
+
+TEST(RecoverResponse, TellsALabelThatIsWrong) {
+  MadeBracket bracket = made_bracket(made_cameras()[2].light_of_code, 0, 6);
+  EXPECT_TRUE(recover_response(bracket.shots).warnings.empty());
+  bracket.shots[2].exposure_s *= 2;
+  const std::vector<std::string> warnings = recover_response(bracket.shots).warnings;
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("as the others have it"), std::string::npos) << warnings[0];
+}
+
+TEST(RecoverResponse, RefusesExposuresInReverse) {
+  MadeBracket bracket = made_bracket(made_cameras()[2].light_of_code, 0, 6);
+  const std::size_t count = bracket.shots.size();
+  for (std::size_t i = 0; i < count / 2; ++i) {
+    std::swap(bracket.shots[i].exposure_s, bracket.shots[count - 1 - i].exposure_s);
+  }
+  EXPECT_THROW(recover_response(bracket.shots), std::runtime_error);
 }
 
 TEST(RecoverResponse, DoesNotMindThatThingsMove) {
