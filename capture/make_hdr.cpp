@@ -2,12 +2,14 @@
 #include "capture/make_hdr.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <future>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "capture/camera_response.h"
 #include "capture/exif.h"
@@ -54,6 +56,7 @@ ShotFile read_shot(const std::string& path) {
       break;
     case Kind::rgbe:
       file.picture = read_rgbe(path);
+      limit_infinite(file.picture);
       break;
     case Kind::still:
       file.still = decode_still8(bytes, path);
@@ -167,10 +170,10 @@ void merge_stills(std::vector<ShotFile> files, const HdrOptions& options, HdrRes
   } else {
     result.response = read_response(options.response).curve;
   }
-  MergeTables tables(
-      {response_code_table(result.response, 0), response_code_table(result.response, 1),
-       response_code_table(result.response, 2)},
-      static_cast<int>(shots.size()));
+  const std::array channels{response_code_table(result.response, 0),
+                            response_code_table(result.response, 1),
+                            response_code_table(result.response, 2)};
+  MergeTables tables(channels, static_cast<int>(shots.size()));
   tables.set_exposures(result.exposures_s);
   std::vector<const std::uint8_t*> codes;
   for (const CodedShot& shot : shots) codes.push_back(shot.still.texels.data());
@@ -185,6 +188,24 @@ void merge_stills(std::vector<ShotFile> files, const HdrOptions& options, HdrRes
     }));
   }
   for (std::future<void>& strip : merging) strip.get();
+  result.shares = check_bracket(codes, result.exposures_s, channels, result.radiance);
+  for (std::string& warning : warnings_of(result.shares)) {
+    result.warnings.push_back(std::move(warning));
+  }
+}
+
+// Makes what is no number 0, and says of how many values; "" of none.
+std::string without_nan(Image& image) {
+  std::size_t count = 0;
+  for (float& value : image.pixels) {
+    if (!std::isnan(value)) continue;
+    value = 0;
+    ++count;
+  }
+  if (count == 0) return "";
+  const double share = static_cast<double>(count) / static_cast<double>(image.pixels.size());
+  const std::string percent = share < 0.01 ? "below 1" : std::to_string(std::lround(100 * share));
+  return std::to_string(count) + " values (" + percent + " %) are no numbers and count as black";
 }
 
 void merge_pictures(std::vector<ShotFile> files, HdrResult& result) {
@@ -214,6 +235,9 @@ HdrResult make_hdr(std::span<const std::string> paths, const HdrOptions& options
   } else if (files.size() == 1 && options.exposures_s.empty()) {
     result.response = linear_response();
     result.radiance = three_channels(files[0].picture);
+    if (std::string warning = without_nan(result.radiance); !warning.empty()) {
+      result.warnings.push_back(std::move(warning));
+    }
   } else {
     result.exposures_s = exposures_of(paths, files, options);
     merge_pictures(std::move(files), result);

@@ -1,10 +1,12 @@
 // From files of a bracket, or of one HDR picture, to a radiance image.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "capture/bracket_check.h"
 #include "capture/image.h"
 #include "capture/response.h"
 
@@ -21,20 +23,22 @@ struct HdrOptions {
 };
 
 struct HdrResult {
-  Image radiance;                   // (height, width, 3), sensor units per second
-  std::vector<double> exposures_s;  // used, in the files' order; empty for a single HDR picture
-  Response response;                // light of codes; unused for HDR pictures
-  double heldout_error = 0;         // of a recovered response (ResponseFit), else 0
+  Image radiance;                       // (height, width, 3), sensor units per second
+  std::vector<double> exposures_s;      // used, in the files' order; empty for a single HDR picture
+  Response response;                    // light of codes; unused for HDR pictures
+  std::optional<double> heldout_error;  // of a recovered response (ResponseFit)
   std::vector<ResponseCandidate> candidates;  // that were tried, if it was recovered
-  std::vector<std::string> warnings;          // of its recovery
+  BracketShares shares;                       // of stills
+  std::vector<std::string> warnings;          // what to know before it is used
   double time_ms = 0;
 };
 
 // Merges JPEG or PNG shots (8 bit; one or more, of one size, in any order) or converts one EXR or
-// Radiance picture. EXR or Radiance files as shots of a bracket count as linear, 1 = saturated, and
-// need stated exposures. Throws std::invalid_argument for no paths or exposures that do not match
-// them; std::runtime_error naming the file and the reason otherwise, such as shots of two sizes or
-// without exposure times.
+// Radiance picture, whose infinite values become finite (limit_infinite) and whose values that are
+// no numbers become 0, with a warning. EXR or Radiance files as shots of a bracket count as linear,
+// 1 = saturated, and need stated exposures. Throws std::invalid_argument for no paths or exposures
+// that do not match them; std::runtime_error naming the file and the reason otherwise, such as
+// shots of two sizes or without exposure times.
 HdrResult make_hdr(std::span<const std::string> paths, const HdrOptions& options = {});
 
 // The range of luminance in stops, without the faintest and the brightest thousandth of those

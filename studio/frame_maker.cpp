@@ -261,6 +261,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
 std::vector<std::string> FrameMaker::take_notes() {
   std::vector<std::string> notes = std::exchange(notes_, {});
   std::ranges::move(std::exchange(set_scene_.notes, {}), std::back_inserter(notes));
+  std::ranges::move(light_->take_notes(), std::back_inserter(notes));
   return notes;
 }
 

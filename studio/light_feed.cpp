@@ -119,6 +119,10 @@ LightFeed::LightFeed(const Set& set, const LightFeed* before, std::optional<capt
   }
 }
 
+std::vector<std::string> LightFeed::take_notes() {
+  return source_ ? source_->take_notes() : std::vector<std::string>{};
+}
+
 bool LightFeed::serves(const Set& set) const {
   if (!settings_ || !set.probe) return !settings_ && !set.probe;
   if (!source_->serves(set)) return false;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
@@ -60,6 +61,9 @@ class LightFeed {
   std::shared_ptr<const render::Environment> begin(const LightRequest& request);
 
   Light at(const LightRequest& request);
+
+  // What a user should know of the probe's material, since the last call.
+  std::vector<std::string> take_notes();
 
  private:
   const capture::Image* even_plate(const LightRequest& request);

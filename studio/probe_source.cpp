@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "calibrate/lens.h"
 #include "capture/bracketed_camera.h"
 #include "capture/camera_response.h"
@@ -139,6 +141,14 @@ Bracketed bracket(std::unique_ptr<capture::Camera> camera,
   throw SetError({{set.path, place.line, place.column, message}});
 }
 
+// Which pixels of a picture count as black since they tell no number; "" of none.
+std::string note_of_nan(const capture::Image& image) {
+  const auto count = std::ranges::count_if(image.pixels, [](float v) { return std::isnan(v); });
+  if (count == 0) return "";
+  return fmt::format("the probe: {:.2g} % of its values are no numbers and count as black",
+                     100.0 * static_cast<double>(count) / static_cast<double>(image.pixels.size()));
+}
+
 }  // namespace
 
 ProbeSource::ProbeSource(const Set& set, std::optional<capture::Time> from)
@@ -179,8 +189,16 @@ void ProbeSource::open(const Set& set, std::optional<capture::Time> from) {
     capture::HdrOptions options;
     options.exposures_s = probe.exposures_s;
     if (!probe.response.empty()) options.response = probe.response;
-    newest_.image =
-        std::make_shared<capture::Image>(capture::make_hdr(probe.shots, options).radiance);
+    capture::HdrResult merged = capture::make_hdr(probe.shots, options);
+    newest_.image = std::make_shared<capture::Image>(std::move(merged.radiance));
+    using capture::MergeStatus;
+    const auto share_of = [&](MergeStatus status) -> double& {
+      return status_.shares[static_cast<std::size_t>(status)];
+    };
+    share_of(MergeStatus::inconsistent) = merged.shares.contradicting;
+    share_of(MergeStatus::lower_bound) = merged.shares.saturated;
+    share_of(MergeStatus::dark) = merged.shares.black;
+    for (const std::string& warning : merged.warnings) notes_.push_back("the probe: " + warning);
   } catch (const std::runtime_error& error) {
     fail(set, error.what());
   } catch (const std::invalid_argument& error) {
@@ -221,6 +239,7 @@ void ProbeSource::open_camera(const Set& set,
   }
   if (camera_->is_still()) {
     newest_ = {camera_->first().image, camera_->first().time};
+    if (const std::string note = note_of_nan(*newest_.image); !note.empty()) notes_.push_back(note);
     camera_.reset();
     return;
   }

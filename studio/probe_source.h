@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "capture/flicker.h"
@@ -69,6 +70,8 @@ class ProbeSource {
   // is, for its plate is live, a recording begins when it is first asked.
   Radiance at(capture::Time time, bool on_clock = true);
   const ProbeStatus& status() const { return status_; }
+  // What a user should know of a bracket of shots, since the last call.
+  std::vector<std::string> take_notes() { return std::exchange(notes_, {}); }
 
  private:
   void open(const Set& set, std::optional<capture::Time> from);
@@ -108,6 +111,7 @@ class ProbeSource {
   std::vector<capture::Frame> ahead_;        // read already, and not due yet
   Radiance newest_;
   ProbeStatus status_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace studio

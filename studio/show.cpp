@@ -556,7 +556,7 @@ class Show::Stages {
   std::shared_ptr<const ShowStatus> status_;  // what was published last; by mutex_
 };
 
-void check_show(const Set& set) {
+std::vector<std::string> check_show(const Set& set) {
   std::vector<Diagnostic> faults;
   const auto collecting = [&](const auto& act) {
     try {
@@ -578,6 +578,7 @@ void check_show(const Set& set) {
     });
   }
   if (!faults.empty()) throw SetError(std::move(faults));
+  return maker->take_notes();
 }
 
 Show::Show(Set set, ShowOptions options)

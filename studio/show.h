@@ -140,8 +140,9 @@ struct ShowOptions {
 };
 
 // Opens all that a show of the set would, and looks whether it could be displayed and recorded.
-// Shows and writes nothing. Throws SetError with the faults that only this finds.
-void check_show(const Set& set);
+// Shows and writes nothing. Returns what it would note before the first frame. Throws SetError with
+// the faults that only this finds.
+std::vector<std::string> check_show(const Set& set);
 
 // Inputs of a frame are made on a thread of the show's own while the frame before is rendered on
 // the caller's and oneTBB's. When not live, the frames are the same bits whatever the timing.

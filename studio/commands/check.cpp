@@ -95,6 +95,20 @@ std::vector<std::string> notes_of_sources(const Set& set) {
   return notes;
 }
 
+// What the show would note, but for what is said of the models.
+void add_unsaid(const std::vector<std::string>& of_show,
+                const std::vector<ModelReport>& models,
+                std::vector<std::string>& notes) {
+  for (const std::string& note : of_show) {
+    const bool said = std::ranges::any_of(models, [&](const ModelReport& model) {
+      return std::ranges::any_of(model.report.notes, [&](const std::string& of_model) {
+        return note.ends_with(of_model);
+      });
+    });
+    if (!said) notes.push_back(note);
+  }
+}
+
 void check(const std::string& path, Console& console) {
   spare_set_file(path, console.figures_file());
   try {
@@ -102,8 +116,8 @@ void check(const std::string& path, Console& console) {
     spare_sources(set, console.figures_file());
     const std::vector<ModelReport> models = check_models(set);
     const std::vector<std::string> devices = devices_of(set);
-    if (devices.empty()) check_show(set);
-    const std::vector<std::string> notes = notes_of_sources(set);
+    std::vector<std::string> notes = notes_of_sources(set);
+    if (devices.empty()) add_unsaid(check_show(set), models, notes);
     console.figures(json_text(nlohmann::ordered_json{
         {"diagnostics", nlohmann::json::array()}, {"models", to_json(models)}, {"notes", notes}}));
     for (const ModelReport& model : models) say(model, console);

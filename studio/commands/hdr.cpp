@@ -52,8 +52,12 @@ nlohmann::ordered_json to_json(const capture::HdrResult& result, double stops) {
           {"response",
            {{"name", result.response.name},
             {"coefficients", result.response.coefficients},
-            {"heldout_error", result.heldout_error},
+            {"heldout_error", result.heldout_error ? nlohmann::ordered_json(*result.heldout_error)
+                                                   : nlohmann::ordered_json(nullptr)},
             {"candidates", candidates}}},
+          {"contradicting", result.shares.contradicting},
+          {"saturated", result.shares.saturated},
+          {"black", result.shares.black},
           {"warnings", result.warnings},
           {"stops", stops},
           {"time_ms", result.time_ms}};

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -83,6 +84,43 @@ TEST(MakeHdr, ConvertsOneHdrPictureBitForBit) {
   EXPECT_EQ(make_hdr(std::vector<std::string>{directory / "a.exr"}).radiance.pixels, image.pixels);
   EXPECT_EQ(make_hdr(std::vector<std::string>{directory / "a.hdr"}).radiance.pixels,
             read_rgbe(directory / "a.hdr").pixels);
+}
+
+TEST(MakeHdr, CountsWhatIsNoNumberAsBlackAndSaysSo) {
+  const auto directory = made::make_temporary_directory();
+  Image image = make_image(2, 4);
+  std::ranges::fill(image.pixels, 0.5F);
+  image.pixels[3] = image.pixels[7] = std::nanf("");
+  image.pixels[11] = HUGE_VALF;
+  write_exr(directory / "a.exr", image);
+  const HdrResult result = make_hdr(std::vector<std::string>{directory / "a.exr"});
+  EXPECT_EQ(result.radiance.pixels[3], 0);
+  EXPECT_EQ(result.radiance.pixels[4], 0.5F);
+  EXPECT_TRUE(std::isfinite(result.radiance.pixels[11]));
+  ASSERT_EQ(result.warnings.size(), 1U);
+  EXPECT_EQ(result.warnings[0], "2 values (8 %) are no numbers and count as black");
+  EXPECT_FALSE(result.heldout_error.has_value());
+}
+
+TEST(MakeHdr, WarnsOfABracketThatContradictsItself) {
+  const auto directory = made::make_temporary_directory();
+  const made::Scene scene = made::patches(240, 160, 1);
+  std::vector<std::string> paths;
+  HdrOptions options{.exposures_s = {}, .response = "sRGB"};
+  for (int i = -2; i <= 2; ++i) {
+    options.exposures_s.push_back(std::exp2(2 * i));
+    paths.push_back(write_still(
+        directory / (std::to_string(i + 2) + ".png"),
+        made::photograph(
+            scene, options.exposures_s.back(), [](double z) { return decode(Transfer::srgb, z); },
+            static_cast<unsigned>(i + 50))));
+  }
+  EXPECT_LT(make_hdr(paths, options).shares.contradicting, 0.02);
+  std::ranges::reverse(options.exposures_s);
+  const HdrResult reversed = make_hdr(paths, options);
+  EXPECT_GT(reversed.shares.contradicting, 0.8);
+  ASSERT_FALSE(reversed.warnings.empty());
+  EXPECT_NE(reversed.warnings[0].find("the shots contradict each other"), std::string::npos);
 }
 
 TEST(MakeHdr, MergesLinearShotsInExrFiles) {

@@ -397,6 +397,29 @@ TEST_F(Runs, AreToldOfPicturesThatAreMissing) {
   EXPECT_EQ(nlohmann::json::parse(content_of(json))["notes"].size(), 1U);
 }
 
+// Exposures that are the wrong way round.
+TEST_F(Runs, AreToldOfAProbeWhoseShotsContradictEachOther) {
+  const std::vector<std::uint8_t> dark(32 * 16 * 3, 60), bright(32 * 16 * 3, 200);
+  capture::write_png(dir_ / "dark.png", 32, 16, 3, dark);
+  capture::write_png(dir_ / "bright.png", 32, 16, 3, bright);
+  const auto with = [&](const std::string& exposures) {
+    write_set();
+    return write("probe.toml",
+                 "[show]\nwidth = 64\nheight = 48\n"
+                 "[camera]\nsource = \"plate_%d.png\"\nmodel = \"pinhole\"\nfocal_px = 60\n"
+                 "pose = { position = [0, -8, 4], look_at = [0, 0, 0.5] }\n"
+                 "[probe]\nsource = [\"dark.png\", \"bright.png\"]\nexposures = [" +
+                     exposures + "]\nlens = \"latlong\"\nmatch = [1, 1, 1]\n");
+  };
+  EXPECT_THAT(run("check " + with("0.01, 0.13")).out, Not(HasSubstr("contradict")));
+  const std::string set = with("0.13, 0.01"), json = (dir_ / "run.json").string();
+  EXPECT_THAT(run("check " + set).out, HasSubstr("note: the probe: in 100 % of the pixels"));
+  const Outcome outcome = run("run " + set + " --frames 1 --json " + json);
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("the shots contradict each other"));
+  EXPECT_EQ(nlohmann::json::parse(content_of(json))["probe"]["inconsistent"], 1);
+}
+
 TEST_F(Runs, AreCheckedForTheFaultsOfAllSources) {
   write("plate.png", "\x89PNG\r\n\x1a\nnothing");
   write("light.hdr", "no light");
