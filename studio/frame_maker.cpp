@@ -282,6 +282,10 @@ void FrameMaker::note_plate(const capture::Frame& frame) {
     plate_is_told_gone_ = false;
   }
   plate_frames_lost_ = lost ? plate_frames_lost_ + 1 : 0;
+  if (frame.status == capture::FrameStatus::damaged && !plate_is_told_damaged_) {
+    notes_.push_back(fmt::format("the plate's frame {} is damaged{}", frame.number, why()));
+    plate_is_told_damaged_ = true;
+  }
   if (plate_->is_live() || plate_is_cut_short_) return;
   const std::string how = plate_->statistics().cut_short;
   plate_is_cut_short_ = !how.empty();

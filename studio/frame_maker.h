@@ -243,7 +243,8 @@ class FrameMaker {
   std::future<std::shared_ptr<VideoFeed::Player>> opening_;  // of the first
   std::vector<std::string> notes_;                           // for the next frame
   std::int64_t plate_frames_lost_ = 0;                       // in a row
-  bool plate_is_told_gone_ = false, plate_is_cut_short_ = false, is_off_track_ = false;
+  bool plate_is_told_gone_ = false, plate_is_told_damaged_ = false, plate_is_cut_short_ = false;
+  bool is_off_track_ = false;
   std::optional<capture::Time> live_track_begins_;  // beside a live plate
   std::optional<capture::Frame> first_due_;         // of a live plate
   Due last_due_;

@@ -37,6 +37,25 @@ struct Shot {
   double saturation = 0;
 };
 
+// Throws if so much of a shot is saturated or black that the rest tells nothing.
+void require_exposed(const std::string& source, const Shot& shot) {
+  constexpr double much_saturated = 0.4, nearly_all = 0.9;  // a fish-eye's rim is black
+  std::size_t saturated = 0, black = 0;
+  for (const float value : shot.radiance->pixels) {
+    saturated += static_cast<double>(value) >= shot.saturation ? 1 : 0;
+    black += value > 0 ? 0 : 1;
+  }
+  const auto all = static_cast<double>(shot.radiance->pixels.size());
+  const auto refuse = [&](std::size_t count, const char* what) {
+    throw std::runtime_error(fmt::format("{}: {:.0f} % of it is {} exposure", source,
+                                         100.0 * static_cast<double>(count) / all, what));
+  };
+  if (static_cast<double>(saturated) > much_saturated * all) {
+    refuse(saturated, "saturated; take a shorter");
+  }
+  if (static_cast<double>(black) > nearly_all * all) refuse(black, "black; take a longer");
+}
+
 // The first frame of a picture, video or camera.
 Shot read_shot(const std::string& source, const VignettingOptions& options) {
   capture::CameraOptions reading;
@@ -46,7 +65,9 @@ Shot read_shot(const std::string& source, const VignettingOptions& options) {
   if (!frame || frame->image == nullptr) throw std::runtime_error(source + ": has no picture");
   bool codes = true;
   for (const float value : frame->image->pixels) codes &= !(value > 1);
-  return {frame->image, codes ? saturation_of_codes : HUGE_VAL};
+  const Shot shot{frame->image, codes ? saturation_of_codes : HUGE_VAL};
+  require_exposed(source, shot);
+  return shot;
 }
 
 std::vector<std::string> split(const std::string& list) {

@@ -178,11 +178,13 @@ std::vector<const char*> changed_at_start(const Set& on_air, const Set& changed)
 }
 
 void report_end(const ShowStatus& status, Console& console) {
-  console.say(
-      fmt::format("{} frames at {:.2f} fps, {} dropped, {} lost in the plate; frame time "
-                  "{:.1f} ms (p99 {:.1f}), delay {:.1f} frames",
-                  status.frames, status.fps, status.dropped, status.lost_plate_frames,
-                  status.frame_ms_p50, status.frame_ms_p99, status.delay_frames));
+  console.say(fmt::format(
+      "{} frames at {:.2f} fps, {} dropped, {} lost in the plate{}; frame time "
+      "{:.1f} ms (p99 {:.1f}), delay {:.1f} frames",
+      status.frames, status.fps, status.dropped, status.lost_plate_frames,
+      status.damaged_plate_frames > 0 ? fmt::format(", {} damaged", status.damaged_plate_frames)
+                                      : "",
+      status.frame_ms_p50, status.frame_ms_p99, status.delay_frames));
   std::string match;
   for (const float gain : status.match.gain) match += fmt::format(" {:.4g}", gain);
   if (status.match.matrix) {
