@@ -94,6 +94,31 @@ class GapCamera final : public GreyCamera {
   }
 };
 
+// Frames that came, but not whole.
+class DamagedCamera : public GreyCamera {
+ public:
+  DamagedCamera() : GreyCamera(12, {25, 1}, 0) {}
+  std::optional<capture::Frame> next() override {
+    auto frame = GreyCamera::next();
+    if (frame && frame->number >= 5) {
+      frame->status = capture::FrameStatus::damaged;
+      frame->note = "its stream is damaged";
+    }
+    return frame;
+  }
+};
+
+TEST_F(ShowNotes, NotesTheFirstFrameOfThePlateThatIsDamaged) {
+  capture::register_camera("damaged", [](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<DamagedCamera>();
+  });
+  Show show(made_set("damaged:"));
+  show.run();
+  EXPECT_THAT(show.status()->notes,
+              Contains("the plate's frame 5 is damaged: its stream is damaged").Times(1));
+  EXPECT_THAT(show.status()->notes, Not(Contains(HasSubstr("frame 6 is damaged"))));
+}
+
 TEST_F(ShowNotes, NotesThatThePlateIsGoneAndThatItIsBack) {
   capture::register_camera("gap", [](std::string_view, const capture::CameraOptions&) {
     return std::make_unique<GapCamera>();
