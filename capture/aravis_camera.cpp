@@ -153,8 +153,9 @@ void AravisCamera::wait_for_first() {
     fail(stream_->format_name() + " " +
          words_of(PictureSize{frames_.layout().width, frames_.layout().height}) +
          " was asked for, and no picture came: " +
-         (frames_.last_note().empty() ? "it gave none (is it waiting for a trigger?)"
-                                      : frames_.last_note()));
+         (frames_.last_note().empty()
+              ? "it gave none (does it wait for a trigger, or send pictures in parts?)"
+              : frames_.last_note()));
   }
   frames_.begin();  // what came before the first picture is no loss
   describe();
@@ -164,7 +165,10 @@ void AravisCamera::describe() {
   info_.description = device_.vendor + " " + device_.model + " " + device_.serial + " at " +
                       device_.address + ", " + stream_->format_name() + ": " +
                       frames_.description() +
-                      (stream_->tells_exposures() ? ", exposures told with frames" : "");
+                      (stream_->tells_exposures() ? ", exposures told with frames" : "") +
+                      (stream_->unguarded().empty()
+                           ? ""
+                           : ", other senders' packets are not kept out: " + stream_->unguarded());
 }
 
 Time AravisCamera::period() const {

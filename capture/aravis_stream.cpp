@@ -10,6 +10,8 @@
 #include <arv.h>
 #include <linux/videodev2.h>
 
+#include "capture/gige_wire.h"
+#include "capture/gvsp_filter.h"
 #include "capture/live_reader.h"
 
 namespace capture {
@@ -47,13 +49,19 @@ std::string words_of_status(ArvBufferStatus status) {
   }
 }
 
+// In the machine's byte order; nothing if it is not of IPv4.
+std::optional<std::uint32_t> ipv4_of(GSocketAddress* socket) {
+  if (!G_IS_INET_SOCKET_ADDRESS(socket)) return std::nullopt;
+  GInetAddress* address = g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(socket));
+  if (g_inet_address_get_family(address) != G_SOCKET_FAMILY_IPV4) return std::nullopt;
+  return gige::get32(g_inet_address_to_bytes(address));
+}
+
 // Whether nothing arrives by raw packets: within this machine they pass by.
 bool is_loopback(ArvCamera* camera) {
-  GSocketAddress* address =
-      arv_gv_device_get_device_address(ARV_GV_DEVICE(arv_camera_get_device(camera)));
-  if (!G_IS_INET_SOCKET_ADDRESS(address)) return true;
-  return g_inet_address_get_is_loopback(
-             g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(address))) != 0;
+  const auto address =
+      ipv4_of(arv_gv_device_get_device_address(ARV_GV_DEVICE(arv_camera_get_device(camera))));
+  return !address || *address >> 24U == 127;
 }
 
 }  // namespace
@@ -281,7 +289,7 @@ void AravisStream::set_gain(double gain) {
 
 void AravisStream::set_packets(const AravisRequest& request) {
   ArvCamera* const camera = camera_.get();
-  const bool raw = request.packet_socket.value_or(true) && !is_loopback(camera);
+  const bool raw = request.packet_socket.value_or(false) && !is_loopback(camera);
   arv_camera_gv_set_stream_options(
       camera, raw ? ARV_GV_STREAM_OPTION_NONE : ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   AravisError error;
@@ -377,6 +385,7 @@ void AravisStream::start(const AravisRequest& request) {
         "frame-retention", retention_us, "packet-resend",
         request.resend ? ARV_GV_STREAM_PACKET_RESEND_ALWAYS : ARV_GV_STREAM_PACKET_RESEND_NEVER,
         nullptr);
+    guard();
   }
   for (int i = 0; i < buffers; ++i) {
     arv_stream_push_buffer(stream_, arv_buffer_new_allocate(payload_bytes_));
@@ -385,6 +394,32 @@ void AravisStream::start(const AravisRequest& request) {
   error.clear();
   arv_camera_start_acquisition(camera, &error);
   error.check("it does not start to stream");
+}
+
+// The library takes packets from anyone, and does not check where in a buffer their numbers are.
+void AravisStream::guard() {
+  ArvCamera* const camera = camera_.get();
+  ArvGvDevice* const device = ARV_GV_DEVICE(arv_camera_get_device(camera));
+  AravisError error;
+  const guint packet_bytes = arv_camera_gv_get_packet_size(camera, &error);
+  error.check("the camera does not tell how large its packets are");
+  if (packet_bytes < least_gvsp_packet) {
+    throw std::runtime_error("the camera sends packets of " + std::to_string(packet_bytes) +
+                             " bytes; they need " + std::to_string(least_gvsp_packet));
+  }
+  // Its thread reads already, but has no buffers: what it still holds is gone once it stops.
+  arv_stream_stop_thread(stream_, FALSE);
+  try {
+    const auto from = ipv4_of(arv_gv_device_get_device_address(device));
+    const auto to = ipv4_of(arv_gv_device_get_interface_address(device));
+    const auto socket =
+        to ? udp_socket_at(*to, arv_gv_stream_get_port(ARV_GV_STREAM(stream_))) : std::nullopt;
+    if (!from || !socket) throw std::runtime_error("the stream's socket is not found");
+    filter_gvsp(*socket, {*from, payload_bytes_, packet_bytes});
+  } catch (const std::runtime_error& problem) {
+    unguarded_ = problem.what();
+  }
+  arv_stream_start_thread(stream_);
 }
 
 void AravisStream::give_back() {
@@ -456,7 +491,10 @@ std::span<const std::byte> AravisStream::picture_in(_ArvBuffer& buffer, std::str
 }
 
 double AravisStream::exposure_of(_ArvBuffer& buffer) const {
-  if (chunk_parser_ != nullptr && arv_buffer_has_chunks(&buffer)) {
+  std::size_t size = 0;
+  arv_buffer_get_data(&buffer, &size);
+  // Chunks are found from the end of what came, which packets of both kinds of ids may count twice.
+  if (chunk_parser_ != nullptr && arv_buffer_has_chunks(&buffer) && size <= payload_bytes_) {
     AravisError error;
     const double us =
         arv_chunk_parser_get_float_value(chunk_parser_, &buffer, "ChunkExposureTime", &error);

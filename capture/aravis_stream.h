@@ -48,6 +48,8 @@ class AravisStream {
   Rational rate() const { return rate_; }  // 0/1 = not told
   // Whether frame numbers are 16 bits that go from 65535 to 1.
   bool counts_in_16_bits() const { return is_gige_; }
+  // Why packets of other senders are not kept out (see gvsp_filter.h), or "".
+  const std::string& unguarded() const { return unguarded_; }
   bool tells_exposures() const { return chunk_parser_ != nullptr; }
   std::optional<ExposureRange> exposure_range() const { return exposures_; }
   // What it was opened with; 0 = automatic, not told, or changed by set_exposure since.
@@ -72,6 +74,7 @@ class AravisStream {
   void set_chunks(bool wanted);
   double write_exposure(double exposure_s);
   void start(const AravisRequest& request);
+  void guard();
   void give_back();
   AravisBuffer read(_ArvBuffer& buffer);
   std::span<const std::byte> picture_in(_ArvBuffer& buffer, std::string& fault);
@@ -80,6 +83,7 @@ class AravisStream {
   AravisDevice device_;
   AravisHandle camera_;
   bool is_gige_ = false;
+  std::string unguarded_;
   std::string format_name_;
   GenicamFormat format_;
   std::array<int, 4> region_{};
