@@ -335,7 +335,9 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   double views = 0;
   for (const ViewReport& view : result.views) views += view.rejected.empty() ? 1 : 0;
   result.sigma_px *= std::sqrt(views > 1 ? views / (views - 1) : 4.0);
-  result.overlay.emplace(problem, result.start, believed(result.selection), result.sigma_px);
+  result.focal = focal_agreement(problem, result.start, *chosen.solve);
+  result.overlay.emplace(problem, result.start, believed(result.selection),
+                         result.sigma_px * result.focal.error_factor());
   result.coverage_deg = result.overlay->max_angle_rad() / degree;
   result.lens = chosen.solve->lens;
   if (!is_mrcal_model(result.lens.model)) {

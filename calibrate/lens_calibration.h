@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calibrate/focal_agreement.h"
 #include "calibrate/lens_selection.h"
 #include "calibrate/lens_solve.h"
 #include "calibrate/overlay_error.h"
@@ -44,6 +45,8 @@ struct LensCalibration {
   double coverage_deg = 0;    // off the axis, of the farthest corner in use
   std::vector<ViewReport> views;
   LensSelection selection;
+  // Where the pictures disagree, all predicted errors are larger by its error_factor().
+  FocalAgreement focal;
   std::vector<std::string> warnings;
   double time_ms = 0;
 

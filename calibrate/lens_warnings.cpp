@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <numbers>
 #include <optional>
 
@@ -21,6 +22,9 @@ constexpr std::size_t few_views = 5;
 constexpr double tilt_rad = 8 * degree;
 constexpr double unseen_share = 0.25;  // of the picture that the lens sees
 constexpr double large_error_px = 3;
+// Pictures that lie farthest off are named: so many at most, of such a deviation.
+constexpr std::size_t most_named = 3;
+constexpr double named_sigmas = 3;
 // Fish-eyes show nothing beyond, and the picture is black there.
 constexpr double image_circle_rad = 95 * degree;
 
@@ -98,6 +102,30 @@ void warn_of_views(const LensCalibration& c, std::vector<std::string>& warnings)
              "distance cannot be told apart; tilt the board by 30 degrees and more",
              most_tilt / degree));
   }
+}
+
+// A lens that is fitted to pictures of two has an error that no spread foretells, so it is not only
+// told as larger.
+void warn_of_focal_lengths(const LensCalibration& c, std::vector<std::string>& warnings) {
+  if (!c.focal.disagree()) return;
+  std::vector<std::size_t> order;
+  for (std::size_t view = 0; view < c.views.size(); ++view) {
+    if (c.focal.views[view]) order.push_back(view);
+  }
+  std::ranges::sort(order, std::greater{}, [&](std::size_t v) { return c.focal.deviation(v); });
+  std::string named;
+  for (std::size_t i = 0; i < std::min(order.size(), most_named); ++i) {
+    if (i > 0 && c.focal.deviation(order[i]) < named_sigmas) break;
+    const double off = c.focal.views[order[i]]->factor / c.focal.mean_factor - 1;
+    named += (i > 0 ? ", " : "") + c.views[order[i]].name + text(" (%+.1f %%)", 100 * off);
+  }
+  warnings.push_back(
+      "the pictures do not agree on one focal length (zoom or focus changed, a rolling shutter, or "
+      "a board that is not flat or longer one way); farthest off: " +
+      named +
+      text(". The error is told %.1f times larger, but if zoom or focus changed it is larger yet "
+           "and the lens not to be trusted: take them anew with one zoom and focus",
+           c.focal.error_factor()));
 }
 
 // Beyond the image circle of a fish-eye there is nothing to see; such lenses fill their pictures.
@@ -190,6 +218,7 @@ std::vector<std::string> warnings_of(const LensProblem& problem,
   std::vector<std::string> warnings;
   warn_of_corners(problem, calibration, warnings);
   warn_of_views(calibration, warnings);
+  warn_of_focal_lengths(calibration, warnings);
   warn_of_coverage(problem, calibration, warnings);
   return warnings;
 }

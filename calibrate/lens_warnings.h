@@ -17,8 +17,9 @@ double agreement_of_neighbours(const LensProblem& problem,
 inline constexpr double suspicious_agreement = 0.25;
 
 // One sentence for each doubt: corners that scatter or agree among neighbours, a bent board, too
-// few or too similar pictures, parts of the picture without corners or directions, a focal length
-// that is hardly known. `calibration` is finished but for its warnings.
+// few or too similar pictures, or such that do not agree on a focal length, parts of the picture
+// without corners or directions, a focal length that is hardly known. `calibration` is finished but
+// for its warnings.
 std::vector<std::string> warnings_of(const LensProblem& problem,
                                      const LensCalibration& calibration);
 

@@ -192,11 +192,14 @@ Json figures_of(const Result& result,
                 double detection_ms) {
   const LensCalibration& c = result.calibration;
   Json views = Json::array();
-  for (const calibrate::ViewReport& view : c.views) {
+  for (std::size_t i = 0; i < c.views.size(); ++i) {
+    const calibrate::ViewReport& view = c.views[i];
+    const auto& focal = c.focal.views[i];
     views.push_back({{"name", view.name},
                      {"corners", view.seen},
                      {"used", view.used},
                      {"rms_px", view.rms_px},
+                     {"focal_factor", focal ? Json(focal->factor) : Json()},
                      {"rejected", view.rejected}});
   }
   for (std::size_t i = 0; i < pictures.size(); ++i) {
@@ -205,6 +208,7 @@ Json figures_of(const Result& result,
                      {"corners", 0},
                      {"used", 0},
                      {"rms_px", nullptr},
+                     {"focal_factor", nullptr},
                      {"rejected", found.detections[i].reason}});
   }
   return {{"model", c.lens.model},
@@ -213,6 +217,8 @@ Json figures_of(const Result& result,
           {"heldout_rms_px", c.heldout_rms_px},
           {"sigma_px", c.sigma_px},
           {"board_warp_mm", {1000 * c.warp_m.x, 1000 * c.warp_m.y}},
+          {"focal_agreement", c.focal.chi_squared ? Json(*c.focal.chi_squared) : Json()},
+          {"error_factor", c.focal.error_factor()},
           {"candidates", candidates_json(c)},
           {"coverage_deg", c.coverage_deg},
           {"views", views},
