@@ -15,7 +15,7 @@
 namespace capture::exif_test {
 namespace {
 
-using made::Bytes, made::append, made::made_exif;
+using made::ExifBytes, made::append, made::made_exif;
 
 TEST(SnappedExposureS, IsTheNearestThirdOfAStopForEveryMark) {
   for (const double shown :
@@ -64,10 +64,10 @@ TEST(ShotSettings, AreZeroWhereNothingUsableStands) {
 }
 
 TEST(ShotSettings, SurviveDamageAnywhere) {
-  const Bytes good = made_exif(1, 80, 56, 400);
+  const ExifBytes good = made_exif(1, 80, 56, 400);
   std::mt19937 random(1);
   for (int i = 0; i < 2000; ++i) {
-    Bytes bytes = good;
+    ExifBytes bytes = good;
     for (int flips = 0; flips < 3; ++flips) {
       bytes[random() % bytes.size()] = static_cast<std::byte>(random());
     }

@@ -7,21 +7,21 @@
 
 namespace made {
 
-using Bytes = std::vector<std::byte>;
+using ExifBytes = std::vector<std::byte>;
 
-inline void append(Bytes& bytes, std::uint32_t value, int count) {  // big-endian
+inline void append(ExifBytes& bytes, std::uint32_t value, int count) {  // big-endian
   for (int i = count - 1; i >= 0; --i) bytes.push_back(static_cast<std::byte>(value >> (8 * i)));
 }
 
 // The start of a JPEG file with EXIF data: exposure time, f-number and ISO, as numbers or ratios;
 // an f-number of 0 tells none, nor does an ISO of 0.
-inline Bytes made_exif(std::uint32_t seconds,
-                       std::uint32_t per,
-                       std::uint32_t f_number_tenths,
-                       std::uint16_t iso) {
+inline ExifBytes made_exif(std::uint32_t seconds,
+                           std::uint32_t per,
+                           std::uint32_t f_number_tenths,
+                           std::uint16_t iso) {
   constexpr std::uint32_t exif_offset = 26;
   constexpr std::uint32_t ratios_offset = exif_offset + 2 + 3 * 12 + 4;
-  Bytes tiff;
+  ExifBytes tiff;
   append(tiff, 0x4D4D002A, 4);
   append(tiff, 8, 4);
   append(tiff, 1, 2);
@@ -43,7 +43,7 @@ inline Bytes made_exif(std::uint32_t seconds,
   for (const std::uint32_t number : {seconds, per, f_number_tenths, std::uint32_t{10}}) {
     append(tiff, number, 4);
   }
-  Bytes file;
+  ExifBytes file;
   append(file, 0xFFD8FFE1, 4);
   append(file, static_cast<std::uint32_t>(tiff.size() + 8), 2);
   for (const char c : {'E', 'x', 'i', 'f', '\0', '\0'}) file.push_back(static_cast<std::byte>(c));

@@ -172,7 +172,7 @@ std::string write_told(const std::string& path, std::uint32_t f_number_tenths, s
   independent::ffmpeg("-f lavfi -i color=gray:size=16x16 -frames:v 1 '" + path + "'");
   std::ifstream in(path, std::ios::binary);
   const std::string jpeg((std::istreambuf_iterator<char>(in)), {});
-  const made::Bytes told = made::made_exif(1, 100, f_number_tenths, iso);
+  const made::ExifBytes told = made::made_exif(1, 100, f_number_tenths, iso);
   std::ofstream out(path, std::ios::binary);
   out.write(reinterpret_cast<const char*>(told.data()), std::ssize(told) - 2);  // but for its end
   out << jpeg.substr(2);
