@@ -270,6 +270,12 @@ CameraModel read_camera_model(const std::string& path) {
     if (!std::ranges::all_of(rt, [](double x) { return std::abs(x) <= most; })) {
       reader.fail_at(contents.extrinsics->line, "'extrinsics' must be within 1e9 of 0");
     }
+    constexpr double full_turn = 2 * std::numbers::pi;
+    if (std::hypot(rt[0], rt[1], rt[2]) > 1.001 * full_turn) {
+      reader.fail_at(contents.extrinsics->line,
+                     "'extrinsics' turn by more than a full turn: are these degrees? They begin "
+                     "with a rotation vector in radians");
+    }
     model.cam_from_ref = Pose{rotation_of({rt[0], rt[1], rt[2]}), {rt[3], rt[4], rt[5]}};
   }
   return model;

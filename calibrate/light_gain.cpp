@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <stdexcept>
 #include <unordered_map>
@@ -324,6 +325,19 @@ void set_sigmas(std::span<const LightPair> pairs,
   }
 }
 
+// Between the pairs that the gains make most too bright and most too dark.
+double largest_factor(std::span<const LightPair> pairs, const Logs& logs) {
+  double low = 0, high = 0;
+  for (const LightPair& pair : pairs) {
+    double off = -logs.exposure[pair.frame];
+    for (std::size_t c = 0; c < 3; ++c) {
+      off += (std::log(pair.plate[c] / pair.probe[c]) - logs.gain[c]) / 3;
+    }
+    low = std::min(low, off), high = std::max(high, off);
+  }
+  return std::exp(high - low);
+}
+
 }  // namespace
 
 LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOptions& options) {
@@ -339,6 +353,14 @@ LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOption
                            (things.count == 1 ? " thing" : " things") +
                            " only, and nothing is left to check them by");
     fit.heldout_error = std::numeric_limits<double>::quiet_NaN();
+    const double factor = largest_factor(pairs, logs);
+    constexpr double much = 1.3;
+    if (factor > much) {
+      std::array<char, 100> text{};
+      std::snprintf(text.data(), text.size(),
+                    "these differ by a factor of %.1f: is an albedo or a normal wrong?", factor);
+      fit.warnings.emplace_back(text.data());
+    }
     return fit;
   }
   const HeldOut held_out = hold_out(pairs, things, things.count >= fewest_for_matrix);

@@ -220,28 +220,50 @@ std::optional<Solved> refine(const std::vector<MarkedLine>& lines,
   return solved;
 }
 
-// The best of many focal lengths, with the centre where it is to be expected.
-std::optional<State> search(const LineMarks& marks,
-                            const std::vector<Group>& groups,
-                            const LineFitOptions& options) {
-  const Vec2 centre =
-      marks.centre.value_or(Vec2{0.5 * (marks.width - 1), 0.5 * (marks.height - 1)});
+double farthest_mark(const LineMarks& marks, Vec2 centre) {
   double farthest = 0;
   for (const MarkedLine& line : marks.lines) {
     for (const Vec2 q : line.pixels) {
       farthest = std::max(farthest, hypotenuse(q.x - centre.x, q.y - centre.y));
     }
   }
-  const double least = 1.001 * farthest / (options.law == FisheyeLaw::equisolid ? 2 : pi);
+  return farthest;
+}
+
+// Whether the farthest mark would lie farther off the axis than any lens sees. Lines through the
+// middle, which agree with every focal length, end in the least one.
+bool sees_too_far(const LineMarks& marks, const Block& lens, FisheyeLaw law) {
+  constexpr double widest_rad = 145 * pi / 180;
+  const double over = farthest_mark(marks, {lens[1], lens[2]}) / lens[0];
+  return law == FisheyeLaw::equisolid ? over > 2 * std::sin(widest_rad / 2) : over > widest_rad;
+}
+
+struct Searched {
+  State best;
+  // Of the longest focal length, through which every picture is nearly flat.
+  double flat_cost = HUGE_VAL;
+};
+
+// The best of many focal lengths, with the centre where it is to be expected.
+std::optional<Searched> search(const LineMarks& marks,
+                               const std::vector<Group>& groups,
+                               const LineFitOptions& options) {
+  const Vec2 centre =
+      marks.centre.value_or(Vec2{0.5 * (marks.width - 1), 0.5 * (marks.height - 1)});
+  const double least =
+      1.001 * farthest_mark(marks, centre) / (options.law == FisheyeLaw::equisolid ? 2 : pi);
   constexpr int steps = 100;
   constexpr double range = 40;
-  std::optional<State> best;
+  std::optional<Searched> found;
   for (int i = 0; i <= steps; ++i) {
     const double f = least * std::pow(range, static_cast<double>(i) / steps);
     const auto state = state_of(marks.lines, groups, options, {f, centre.x, centre.y});
-    if (state && (!best || state->cost < best->cost)) best = state;
+    if (!state) continue;
+    if (!found) found = Searched{*state};
+    if (state->cost < found->best.cost) found->best = *state;
+    if (i == steps) found->flat_cost = state->cost;
   }
-  return best;
+  return found;
 }
 
 double rms(std::span<const double> values) {
@@ -356,10 +378,14 @@ LineFit fit_lens_to_lines(const LineMarks& marks, const LineFitOptions& options)
   }
   const std::vector<Group> groups = groups_of(marks.lines);
   const auto start = search(marks, groups, options);
-  const auto solved = start ? refine(marks.lines, groups, options, *start, true) : std::nullopt;
+  const auto solved =
+      start ? refine(marks.lines, groups, options, start->best, true) : std::nullopt;
   constexpr double most_unknown = 0.1;  // of the focal length
   const double sigma = solved ? std::sqrt(solved->covariance[0]) : 0;
-  if (!solved || !(sigma < most_unknown * solved->state.lens[0])) {
+  constexpr double least_told = 9;  // three standard deviations
+  if (!solved || !(sigma < most_unknown * solved->state.lens[0]) ||
+      !(solved->state.cost + least_told < start->flat_cost) ||
+      sees_too_far(marks, solved->state.lens, options.law)) {
     throw std::runtime_error(
         "these lines do not tell the lens: mark more, long ones that pass far from the picture's "
         "middle, or parallel ones" +

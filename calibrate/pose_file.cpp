@@ -23,7 +23,7 @@ Pose read_toml_pose(const std::string& path) {
   }
   reader.refuse_unknown(root, {"pose"});
   reader.refuse_unknown(*table, {"position", "rotation"});
-  const auto p = reader.numbers<3>(reader.required(*table, "position"), "position", true);
+  const auto p = reader.numbers<3>(reader.required(*table, "position"), "position");
   Mat3 rotation;
   rotation.m = reader.numbers<9>(reader.required(*table, "rotation"), "rotation", true);
   try {

@@ -99,7 +99,7 @@ void check_spread(std::span<const Sight> sights, const Spread& spread) {
         "a pose needs four markers at different places; several are at one: measure them again, or "
         "add others");
   }
-  if (spread.extent[1] < thin * spread.extent[0]) {
+  if (!(spread.extent[1] >= thin * spread.extent[0])) {
     throw std::runtime_error(
         "the markers lie on a line, about which the camera could turn: add one well off it");
   }

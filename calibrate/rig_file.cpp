@@ -40,6 +40,10 @@ class RigReader : public TomlReader {
     }
     if (const toml::node* offset = table.get("time_offset")) {
       member.time_offset_s = number(*offset, "time_offset");
+      constexpr double most_s = 60;
+      if (std::abs(member.time_offset_s) > most_s) {
+        fail(offset->source(), "\"time_offset\" must be within 60 seconds");
+      }
     }
     if (const toml::node* response = table.get("response")) {
       member.response = file(*response, "response");

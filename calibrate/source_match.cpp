@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
+#include <string>
 
 namespace calibrate {
 namespace {
@@ -47,6 +48,7 @@ struct Candidate {
   Mat3 probe_from_set;
   std::vector<Pair> pairs;
   double score = 0;
+  int missing = 0;  // sources that the other picture should show, too
 };
 
 // Everything that rotations are judged by.
@@ -68,7 +70,6 @@ struct Matcher {
 Candidate Matcher::judge(const Mat3& probe_from_set) const {
   Candidate candidate{probe_from_set, {}, 0};
   std::vector<bool> used(probe_sources.size(), false);
-  double missing = 0;
   for (std::size_t i = 0; i < v_set.size(); ++i) {
     const Vec3 expected = probe_from_set * v_set[i];
     std::optional<std::size_t> nearest;
@@ -85,16 +86,16 @@ Candidate Matcher::judge(const Mat3& probe_from_set) const {
       // The nearer, the better: of like sets of pairs, the tightest.
       candidate.score += 1 - 0.2 * least / tolerance_rad;
     } else if (pixel_inside(*probe.lens, expected)) {
-      missing += 1;
+      ++candidate.missing;
     }
   }
   const Mat3 cam_from_probe = cam_from_set * probe_from_set.transposed();
   for (std::size_t k = 0; k < probe_sources.size(); ++k) {
     if (!used[k] && pixel_inside(*camera.lens, cam_from_probe * probe_sources[k].v_cam)) {
-      missing += 1;
+      ++candidate.missing;
     }
   }
-  candidate.score -= missing_cost * missing;
+  candidate.score -= missing_cost * candidate.missing;
   return candidate;
 }
 
@@ -242,6 +243,13 @@ SourceMatch match_sources(const LensedPicture& camera,
   }
   if (best.pairs.size() == 2) {
     match.warnings.emplace_back("only two sources are in common: a third would confirm them");
+  }
+  if (best.missing > 0) {
+    match.warnings.push_back(
+        std::to_string(best.missing) +
+        (best.missing == 1 ? " bright source is" : " bright sources are") +
+        " not where the other camera should see it too: is one hidden or too faint there, is a "
+        "picture mirrored, or the lens another's?");
   }
   return match;
 }

@@ -119,6 +119,12 @@ Track read_track(const std::string& path) {
       fail(path, line, "a quaternion of zeros is no rotation");
     if (!std::isfinite(dot(q, q)))
       fail(path, line, "a quaternion of such length is no rotation: its squares overflow");
+    constexpr double rounding = 0.1;
+    if (std::abs(std::sqrt(dot(q, q)) - 1) > rounding) {
+      fail(path, line,
+           "a quaternion of length " + to_text(std::sqrt(dot(q, q))) +
+               " is no rotation, for which it is 1: are these angles?");
+    }
     for (std::size_t i = 1; i < 4; ++i) {
       if (std::abs(v[i]) <= farthest) continue;
       fail(path, line, "a place of " + to_text(v[i]) + " m is beyond 1e6 m");

@@ -395,9 +395,14 @@ Vec3f radiance_of(const Environment& env, Vec3f direction, float roughness, cons
 
 namespace {
 
+struct LitFrom {
+  Vec3f irradiance;
+  double cosines = 0;  // over their solid angles
+};
+
 // Of the texels that count.
 template <class Counts>
-Vec3f sum_irradiance(const Environment& env, Vec3f normal, const Counts& counts) {
+LitFrom sum_irradiance(const Environment& env, Vec3f normal, const Counts& counts) {
   const capture::Image& map = env.radiance;
   // What the cosine owes to a column, before the row's sine.
   std::vector<float> across(static_cast<std::size_t>(map.width));
@@ -408,34 +413,41 @@ Vec3f sum_irradiance(const Environment& env, Vec3f normal, const Counts& counts)
         normal.x * std::cos(azimuth_rad) + normal.y * std::sin(azimuth_rad);
   }
   std::array<double, 3> sum{};
+  double cosines = 0;
   for (int y = 0; y < map.height; ++y) {
     const float polar_rad = (static_cast<float>(y) + 0.5F) / static_cast<float>(map.height) * pi_f;
     const float sine = std::sin(polar_rad);
     const float along = normal.z * std::cos(polar_rad);
     std::array<float, 3> row{};
+    float row_cosines = 0;
     const float* p = &map.pixels[map.index(y, 0)];
     const std::size_t first = map.index(y, 0) / 3;
     for (std::size_t x = 0; x < across.size(); ++x, p += 3) {
       if (!counts(first + x)) continue;
       const float cosine = std::max(sine * across[x] + along, 0.0F);
       for (std::size_t c = 0; c < 3; ++c) row[c] += cosine * counted_radiance(p[c]);
+      row_cosines += cosine;
     }
     const double solid_angle = texel_solid_angle(y, map.width, map.height);
     for (std::size_t c = 0; c < 3; ++c) sum[c] += row[c] * solid_angle;
+    cosines += row_cosines * solid_angle;
   }
-  return {static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2])};
+  return {{static_cast<float>(sum[0]), static_cast<float>(sum[1]), static_cast<float>(sum[2])},
+          cosines};
 }
 
 }  // namespace
 
 Vec3f irradiance_of(const Environment& env, Vec3f normal) {
-  return sum_irradiance(env, normal, [](std::size_t) { return true; });
+  return sum_irradiance(env, normal, [](std::size_t) { return true; }).irradiance;
 }
 
 SplitIrradiance split_irradiance_of(const Environment& env, Vec3f normal) {
   const auto is_seen = [&](std::size_t t) { return env.seen.empty() || env.seen[t] != 0; };
-  return {sum_irradiance(env, normal, is_seen),
-          sum_irradiance(env, normal, [&](std::size_t t) { return !is_seen(t); })};
+  const LitFrom seen = sum_irradiance(env, normal, is_seen);
+  const LitFrom filled = sum_irradiance(env, normal, [&](std::size_t t) { return !is_seen(t); });
+  return {seen.irradiance, filled.irradiance,
+          static_cast<float>(seen.cosines / (seen.cosines + filled.cosines))};
 }
 
 void smooth_for_reflections(Environment& env, int levels) {

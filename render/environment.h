@@ -112,6 +112,7 @@ Vec3f irradiance_of(const Environment& env, Vec3f normal);
 // The same of texels that the probe saw, and of those that were filled in.
 struct SplitIrradiance {
   Vec3f seen, filled;
+  float seen_share = 1;  // of what lights the surface, were all directions alike
 };
 SplitIrradiance split_irradiance_of(const Environment& env, Vec3f normal);
 

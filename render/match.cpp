@@ -229,6 +229,13 @@ MatchResult match_by_patch(const capture::Image& plate,
   return result;
 }
 
+std::string doubt_of_patch(float seen_share) {
+  constexpr float enough = 0.5F;
+  if (seen_share >= enough) return "";
+  return "doubtful: the probe sees only " + std::to_string(std::lround(100 * seen_share)) +
+         " % of what lights the patch: is the probe's pose right, and the patch's normal?";
+}
+
 MatchResult match_given(std::array<float, 3> gain, double exposure) {
   MatchResult result;
   for (std::size_t c = 0; c < 3; ++c) result.gain[c] = gain[c] * static_cast<float>(exposure);

@@ -76,6 +76,10 @@ MatchResult match_by_patch(const capture::Image& plate,
                            const MatchSettings& settings = {},
                            Vec3f filled = {});
 
+// Why the light on a patch is doubtful, of which the probe sees that share (SplitIrradiance); "" if
+// it sees a half of it or more.
+std::string doubt_of_patch(float seen_share);
+
 // A given gain, or matrix, of a plate whose exposure is another by this factor.
 MatchResult match_given(std::array<float, 3> gain, double exposure = 1);
 MatchResult match_by_matrix(const ColourMatrix& matrix, double exposure = 1);

@@ -65,10 +65,15 @@ void ExposureFollower::follow(double exposure_s,
     measured_ = true;
   }
   level_ = per_second_ * unit;
+  constexpr double doubtful_spread = 0.3;
+  const bool doubtful = found && spread_ > doubtful_spread;
   note_ = found ? fmt::format(
                       "the plate's exposure is {:.3f} of the calibrated one, by {} "
-                      "directions that both cameras see",
-                      level_, pairs.size())
+                      "directions that both cameras see{}",
+                      level_, pairs.size(),
+                      doubtful ? "; doubtful: they disagree, so things may be near, poses wrong, "
+                                 "or the gain of another way than these directions"
+                               : "")
                 : fmt::format(
                       "too little is seen by both cameras, unclipped and not dark, to "
                       "follow the plate's exposure: {} at {:.3f} of the calibrated one",

@@ -120,7 +120,13 @@ LightFeed::LightFeed(const Set& set, const LightFeed* before, std::optional<capt
 }
 
 std::vector<std::string> LightFeed::take_notes() {
-  return source_ ? source_->take_notes() : std::vector<std::string>{};
+  std::vector<std::string> notes = source_ ? source_->take_notes() : std::vector<std::string>{};
+  const bool given = settings_ && settings_->match.method == MatchSettings::Method::given;
+  const bool lacks_gain = !given && !matched_ && !match_.note.empty();
+  const bool is_doubtful = lacks_gain || match_.note.find("doubtful") != std::string::npos;
+  if (is_doubtful && !was_doubtful_) notes.push_back("the light's match: " + match_.note);
+  was_doubtful_ = is_doubtful;
+  return notes;
 }
 
 bool LightFeed::serves(const Set& set) const {
@@ -184,9 +190,13 @@ render::MatchResult LightFeed::measure_match(const LightRequest& request) const 
     const auto [x, y, width, height] = match.patch;
     const calibrate::Vec3f normal = calibrate::to_float(calibrate::normalize(match.normal));
     render::SplitIrradiance light = render::split_irradiance_of(*environment_, normal);
-    if (!floor_) light = {light.seen + light.filled, {}};  // what is filled in goes with the gain
-    return render::match_by_patch(*plate_, {x, y, width, height}, match.albedo, light.seen,
-                                  matching, light.filled);
+    // What is filled in goes with the gain, but for a floor of the plate's.
+    if (!floor_) light = {light.seen + light.filled, {}, light.seen_share};
+    render::MatchResult found = render::match_by_patch(*plate_, {x, y, width, height}, match.albedo,
+                                                       light.seen, matching, light.filled);
+    const std::string doubt = render::doubt_of_patch(light.seen_share);
+    if (found.pixels > 0 && !doubt.empty()) found.note += "; " + doubt;
+    return found;
   }
   return render::match_by_overlap(*plate_, *request.directions, request.cam_from_set, *environment_,
                                   matching);

@@ -62,7 +62,8 @@ class LightFeed {
 
   Light at(const LightRequest& request);
 
-  // What a user should know of the probe's material, since the last call.
+  // What a user should know of the probe's material, and of a match that is doubtful or not found,
+  // since the last call.
   std::vector<std::string> take_notes();
 
  private:
@@ -90,6 +91,7 @@ class LightFeed {
   std::array<double, 3> averaged_gain_{1, 1, 1};
   ExposureFollower exposure_;  // of a given match
   render::MatchResult match_;
+  bool was_doubtful_ = false;    // when notes were taken last
   double share_below_zero_ = 0;  // of the probe's directions, by the match
   // Another one for every change, never touched once it was handed out.
   std::shared_ptr<render::Environment> environment_;

@@ -96,11 +96,14 @@ void add_patches(const std::vector<PaintedPatch>& patches,
                  const capture::Image& plate,
                  const render::Environment& env,
                  std::size_t frame,
-                 std::vector<calibrate::LightPair>& pairs) {
+                 std::vector<calibrate::LightPair>& pairs,
+                 std::string& doubt) {
   for (std::size_t p = 0; p < patches.size(); ++p) {
     const PaintedPatch& patch = patches[p];
-    const render::Vec3f light =
-        render::irradiance_of(env, calibrate::to_float(normalize(patch.normal)));
+    const auto split =
+        render::split_irradiance_of(env, calibrate::to_float(normalize(patch.normal)));
+    if (doubt.empty()) doubt = render::doubt_of_patch(split.seen_share);
+    const render::Vec3f light = split.seen + split.filled;
     const auto match = render::match_by_patch(plate, patch.place, patch.albedo, light);
     if (match.pixels == 0) continue;
     const Colour irradiance{light.x, light.y, light.z};
@@ -139,6 +142,7 @@ std::vector<std::string> untold_patches(const std::vector<PaintedPatch>& patches
 struct Collected {
   std::vector<calibrate::LightPair> pairs;
   double exposure_s = 0;  // of the plate's first frame that tells anything; 0 = not told
+  std::string doubt;      // about the light on patches, "" = none
 };
 
 Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std::int64_t frames) {
@@ -159,7 +163,7 @@ Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std:
     if (patches.empty()) {
       add_overlap(*prepared, plate, frame, pairs);
     } else {
-      add_patches(patches, plate, *prepared->environment, frame, pairs);
+      add_patches(patches, plate, *prepared->environment, frame, pairs, collected.doubt);
     }
   }
   return collected;
@@ -254,6 +258,7 @@ void calibrate_light(const LightOptions& options, Console& console) {
   }
   const std::vector<std::string> untold = untold_patches(patches, collected.pairs);
   found.warnings.insert(found.warnings.begin(), untold.begin(), untold.end());
+  if (!collected.doubt.empty()) found.warnings.push_back("the gains are " + collected.doubt);
   const std::size_t pairs = collected.pairs.size();
   const std::string match = match_line(found, collected.exposure_s);
   Json figures{
@@ -266,11 +271,14 @@ void calibrate_light(const LightOptions& options, Console& console) {
   console.figures(json_text(figures));
   for (const std::string& warning : found.warnings) console.warn(warning);
   const bool too_few = std::ranges::all_of(found.sigma, [](double sigma) { return sigma >= 1; });
+  constexpr double disagree = 0.3;  // then errors have a common cause, and no mean lessens them
   console.say(fmt::format("from {} {}: {}{}", pairs,
                           patches.empty() ? "directions that both cameras see" : "painted patches",
                           too_few ? "too few to tell how sure it is"
-                                  : fmt::format("+- {:.2f}, {:.2f}, {:.2f} %", 100 * found.sigma[0],
-                                                100 * found.sigma[1], 100 * found.sigma[2]),
+                          : found.heldout_error > disagree
+                              ? "how sure it is cannot be told, for they disagree"
+                              : fmt::format("+- {:.2f}, {:.2f}, {:.2f} %", 100 * found.sigma[0],
+                                            100 * found.sigma[1], 100 * found.sigma[2]),
                           std::isfinite(found.heldout_error)
                               ? fmt::format("; held-out error {:.1f} %", 100 * found.heldout_error)
                               : ""));

@@ -1,4 +1,5 @@
 // platelight calibrate lines: a fish-eye's lens, from straight lines of the scene.
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -121,6 +122,28 @@ void say(const calibrate::LineMarks& marks, const calibrate::LineFit& fit, Conso
   }
 }
 
+std::vector<std::string> warnings_of(const calibrate::LineMarks& marks,
+                                     const calibrate::LineFit& fit,
+                                     double noise_px) {
+  constexpr double far_above = 5, most_deg = 5;
+  std::vector<std::string> warnings;
+  if (fit.rms_px > far_above * noise_px) {
+    const auto worst = std::ranges::max_element(fit.lines, {}, &calibrate::LineReport::rms_px);
+    warnings.push_back(fmt::format(
+        "the lines are {:.1f} px off, far above the noise to be expected: are they straight, and "
+        "of a picture of this size? farthest off: {}",
+        fit.rms_px, marks.lines[static_cast<std::size_t>(worst - fit.lines.begin())].name));
+  }
+  for (const calibrate::ParallelReport& parallel : fit.parallels) {
+    if (parallel.lines < 3 || parallel.rms_rad < most_deg * degree) continue;
+    warnings.push_back(
+        fmt::format("lines of \"{}\" are up to {:.0f} degrees from parallel: does "
+                    "one of them belong elsewhere?",
+                    parallel.name, parallel.rms_rad / degree));
+  }
+  return warnings;
+}
+
 void calibrate_lines(const LinesOptions& options, Console& console) {
   const ReadFile lines{"the lines", options.lines};
   spare_files(std::span(&lines, 1), options.out);
@@ -139,7 +162,11 @@ void calibrate_lines(const LinesOptions& options, Console& console) {
   }();
   calibrate::write_lens(options.out, fit.lens);
   say(marks, fit, console);
-  console.figures(json_text(figures_of(marks, fit)));
+  const std::vector<std::string> warnings = warnings_of(marks, fit, fitting.noise_px);
+  Json figures = figures_of(marks, fit);
+  figures["warnings"] = warnings;
+  console.figures(json_text(figures));
+  for (const std::string& warning : warnings) console.warn(warning);
   console.say(fmt::format("{}: {}, f = {:.1f} +- {:.1f} px, from {} lines, {:.2f} px off",
                           options.out, options.model, fit.lens.parameters[0], fit.focal_sigma_px,
                           marks.lines.size(), fit.rms_px));

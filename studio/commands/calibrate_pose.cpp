@@ -1,4 +1,5 @@
 // platelight calibrate pose: where a camera stands and looks, from surveyed markers or a board.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -94,6 +95,48 @@ void warn_of_turned_board(const BoardOptions& options, calibrate::Registration& 
       options.corners, quarters == 1 ? "a quarter of a turn" : "half a turn"));
 }
 
+// What the residuals do not show: a plane of markers that is mirrored has an exact pose, too, from
+// its other side. A set is right-handed, in metres, with z up, and pixels count downwards.
+void warn_of_place(const std::vector<calibrate::Marker>& markers,
+                   const std::vector<calibrate::Sight>& sights,
+                   const calibrate::RegistrationOptions& options,
+                   calibrate::Registration& found) {
+  const calibrate::Vec3 at = position_of(found.cam_from_set);
+  double lowest_m = HUGE_VAL, nearest_m = HUGE_VAL;
+  for (const calibrate::Marker& marker : markers) {
+    lowest_m = std::min(lowest_m, marker.p_set.z);
+    nearest_m = std::min(nearest_m, length(marker.p_set - at));
+  }
+  constexpr double far_m = 500, downwards = 0.5, clear_m = 0.05;
+  if (at.z < std::min(0.0, lowest_m) - clear_m) {
+    found.warnings.push_back(
+        fmt::format("the camera comes out {:.2f} m below all that it is found by: a set is "
+                    "right-handed with z up, and pixels count downwards; is an axis mirrored?",
+                    lowest_m - at.z));
+  }
+  if ((found.cam_from_set.R * calibrate::Vec3{0, 0, 1}).y > downwards) {
+    found.warnings.emplace_back(
+        "z points down in the picture: are the positions of a set with y up, or hangs the camera "
+        "upside down?");
+  }
+  if (nearest_m > far_m) {
+    found.warnings.push_back(fmt::format(
+        "the camera comes out {:.0f} m from the nearest: are the positions in metres?", nearest_m));
+  }
+  const auto agreeing = std::ranges::count(found.agrees, true);
+  if (agreeing == std::ssize(found.agrees)) return;
+  std::vector<calibrate::Sight> turned_over = sights;
+  for (calibrate::Sight& sight : turned_over) sight.p_set.y = -sight.p_set.y;
+  try {
+    const auto other = calibrate::register_camera(turned_over, options);
+    if (std::ranges::count(other.agrees, true) <= agreeing) return;
+    found.warnings.emplace_back(
+        "with their y of the other sign more of them agree: is an axis of the positions mirrored?");
+  } catch (const std::runtime_error&) {
+    return;  // nor do these
+  }
+}
+
 void say_markers(const std::vector<calibrate::Marker>& markers,
                  const calibrate::Registration& found,
                  bool all,
@@ -125,16 +168,19 @@ void calibrate_pose(const PoseOptions& options, Console& console) {
   check_pose_file_takes(options.out, lens);
   const std::vector<calibrate::Marker> markers =
       by_board ? find_board(options, lens) : read_markers_of(options.markers, options.picture);
+  const calibrate::RegistrationOptions fitting{options.noise_px.value_or(usual_noise_px),
+                                               error_of(lens)};
+  std::vector<calibrate::Sight> sights;
   calibrate::Registration found = [&] {
     try {
-      return calibrate::register_camera(
-          calibrate::sights_of(lens, markers),
-          {options.noise_px.value_or(usual_noise_px), error_of(lens)});
+      sights = calibrate::sights_of(lens, markers);
+      return calibrate::register_camera(sights, fitting);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("{}: {}", source, error.what()));
     }
   }();
   if (by_board) warn_of_turned_board(options.board, found);
+  warn_of_place(markers, sights, fitting, found);
   const double sigma_deg = found.turn_sigma_rad / degree;
   const double sigma_mm = 1000 * found.position_sigma_m;
   Json figures = pose_json(found.cam_from_set);

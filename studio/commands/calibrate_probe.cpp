@@ -1,4 +1,5 @@
 // platelight calibrate probe: how a lightprobe is turned, from markers or from bright sources.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -87,6 +88,11 @@ Found turn_by_markers(const std::vector<calibrate::Marker>& markers,
     found.warnings.emplace_back(
         "the residuals are far above the noise to be expected: a marker or the position is wrong, "
         "or the lens is off");
+  }
+  if (std::ranges::count(fit.agrees, true) == 2) {
+    found.warnings.emplace_back(
+        "the turn rests on two markers, which would agree swapped or mirrored as well: a third "
+        "would confirm them");
   }
   found.probe_from_set = calibrate::pose_from_rotation(fit.cam_from_set, position);
   found.sigma_deg = fit.turn_sigma_rad / degree;

@@ -154,6 +154,7 @@ TEST(ReadCameraModel, RefusesEveryBadFileWithLineAndReason) {
        {"negative_size.cameramodel", ":5: 'imagersize' must be"},
        {"size_of_three.cameramodel", ":5: 'imagersize' must be"},
        {"five_extrinsics.cameramodel", ":4: 'extrinsics' must be 6 numbers"},
+       {"extrinsics_in_degrees.cameramodel", ":4: 'extrinsics' turn by more than a full turn"},
        {"negative_error.cameramodel", ":5: platelight_error_px must be 0 or above"},
        {"open_quote.cameramodel", ":2: a string has no closing quote"},
        {"key_twice.cameramodel", ":4: 'intrinsics' stands here for the second time"},

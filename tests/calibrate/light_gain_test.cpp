@@ -86,6 +86,15 @@ TEST(FitLightGain, TakesOneGreyCardAndSaysThatItIsOne) {
   EXPECT_TRUE(std::isnan(fit.heldout_error));
 }
 
+TEST(FitLightGain, TellsThatFewThingsContradictEachOther) {
+  made::Random random(3);
+  std::vector<LightPair> pairs = made_pairs(2, diagonal(made_gain), 0, random);
+  EXPECT_THAT(fit_light_gain(pairs).warnings, ElementsAre(HasSubstr("2 things only")));
+  for (double& shown : pairs[1].plate) shown *= 17;  // as where an albedo is stated wrongly
+  EXPECT_THAT(fit_light_gain(pairs).warnings,
+              ElementsAre(HasSubstr("2 things only"), HasSubstr("differ by a factor of 17.0")));
+}
+
 TEST(FitLightGain, TakesManyFramesOfOneGreyCardForOneThing) {
   made::Random random(3);
   auto pairs = made_pairs(25, diagonal(made_gain), 0.01, random);

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
+#include <stdexcept>
 
 #include "calibrate/grey_picture.h"
 #include "calibrate/pose.h"
@@ -88,6 +90,29 @@ TEST(FitLensToLines, FindsTheFocalLengthWithinItsUncertainty) {
   }
   EXPECT_GT(squares / rooms, 0.3);
   EXPECT_LT(squares / rooms, 2.0);
+}
+
+// Straight whatever the lens: all lie in planes through the axis.
+TEST(FitLensToLines, RefusesLinesThroughTheMiddle) {
+  for (unsigned seed = 0; seed < 6; ++seed) {
+    for (const std::size_t count : {3U, 6U}) {
+      made::Random random(seed);
+      LineMarks marks = made_room(made_equisolid(), {0, 1, 0}, 0, 1, 0.3, 0, seed);
+      marks.lines.clear();
+      for (std::size_t i = 0; i < count; ++i) {
+        const double turn = std::numbers::pi * (static_cast<double>(i) + random.uniform(0, 0.5)) /
+                            static_cast<double>(count);
+        MarkedLine line;
+        line.name = std::to_string(i);
+        for (int k = -6; k <= 6; ++k) {
+          line.pixels.push_back({705.3 + 70 * k * std::cos(turn) + 0.5 * random.normal(),
+                                 492.8 + 70 * k * std::sin(turn) + 0.5 * random.normal()});
+        }
+        marks.lines.push_back(line);
+      }
+      EXPECT_THROW(fit_lens_to_lines(marks, {}), std::runtime_error) << seed << ' ' << count;
+    }
+  }
 }
 
 TEST(FitLensToLines, FindsTheCentreTooIfItIsFree) {

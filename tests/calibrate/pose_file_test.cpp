@@ -46,7 +46,8 @@ TEST(ReadPose, RefusesEveryBadFileWithPlaceAndReason) {
        {"pose_no_rotation.toml", ":1:8: this pose has no \"rotation\""},
        {"pose_eight_numbers.toml", ":1:43: \"rotation\" must be a list of 9 numbers"},
        {"pose_mirror.toml", "mirror image"},
-       {"pose_nan.toml", ":1:25: \"position\" must be"}},
+       {"pose_nan.toml", ":1:25: \"position\" must hold numbers"},
+       {"pose_too_far.toml", ":1:22: \"position\" must hold numbers of at most 1e6"}},
       read_pose);
   EXPECT_THROW(read_pose("pose.txt"), std::runtime_error);
 }

@@ -55,6 +55,7 @@ TEST(ReadRig, RefusesEveryBadFileWithPlaceAndReason) {
        {"rig_mirror.toml", ":5:12: \"rotation\": "},
        {"rig_eight_numbers.toml", ":5:12: \"rotation\" must be a list of 9 numbers"},
        {"rig_nan.toml", ":4:16: \"position\" must hold numbers"},
+       {"rig_offset_of_hours.toml", ":6:15: \"time_offset\" must be within 60 seconds"},
        {"rig_word_for_number.toml", ":6:15: \"time_offset\" must hold numbers"}},
       read_rig);
 }

@@ -110,7 +110,7 @@ TEST(ReadTrack, TakesASpreadsheetsByteOrderMark) {
 TEST(ReadTrack, PassesOverCommentsSpacesAndCarriageReturns) {
   const std::string path = made::make_temporary_directory() / "track.csv";
   std::ofstream(path) << "# from the tracker\r\ntime_s,px,py,pz,qw,qx,qy,qz\r\n\r\n"
-                         "0, 1, 2, 3, 2, 0, 0, 0\r\n1,1,2,3,+1,0,0,0";
+                         "0, 1, 2, 3, 1.02, 0, 0, 0\r\n1,1,2,3,+1,0,0,0";
   const Track track = read_track(path);
   ASSERT_EQ(track.keys.size(), 2U);
   EXPECT_EQ(track.keys[0].position, (Vec3{1, 2, 3}));
@@ -129,6 +129,7 @@ TEST(ReadTrack, RefusesEveryBadFileWithLineAndReason) {
                          {"track_zero_quaternion.csv", ":2: a quaternion of zeros"},
                          {"track_far_away.csv", ":3: a place of -1e+300 m is beyond 1e6 m"},
                          {"track_huge_quaternion.csv", ":2: a quaternion of such length"},
+                         {"track_of_angles.csv", ":3: a quaternion of length 80.8"},
                          {"track_time_stands_still.csv", ":3: time 0 does not come after 0"}},
                         read_track);
 }

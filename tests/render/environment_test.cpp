@@ -78,6 +78,20 @@ TEST(IrradianceOf, IsPiUnderAnEvenSkyFromEverySide) {
   }
 }
 
+TEST(SplitIrradianceOf, TellsHowMuchOfWhatLightsASurfaceWasSeen) {
+  Environment env;
+  env.radiance = capture::make_image(64, 128);
+  std::ranges::fill(env.radiance.pixels, 1.0F);
+  EXPECT_EQ(split_irradiance_of(env, {0, 0, 1}).seen_share, 1) << "all is seen";
+  env.seen.assign(64 * 128, 0);
+  std::fill_n(env.seen.begin(), 32 * 128, std::uint8_t{1});  // the upper half
+  EXPECT_NEAR(split_irradiance_of(env, {0, 0, 1}).seen_share, 1, 1e-6);
+  EXPECT_NEAR(split_irradiance_of(env, {0, 0, -1}).seen_share, 0, 1e-6);
+  const SplitIrradiance sideways = split_irradiance_of(env, {1, 0, 0});
+  EXPECT_NEAR(sideways.seen_share, 0.5F, 1e-3F);
+  EXPECT_NEAR(sideways.seen.x, sideways.filled.x, 1e-3F);
+}
+
 TEST(RadianceOf, IsTheTexelAtItsCentreAndContinuousEverywhere) {
   const Environment env = make_sun_and_sky({}, 32);
   for (int y = 0; y < 32; ++y) {

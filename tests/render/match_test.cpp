@@ -136,6 +136,9 @@ TEST(MatchByPatch, LeavesLightThatNoGainChangesToItself) {
 TEST(MatchByPatch, SaysWhyAPatchIsOfNoUse) {
   capture::Image plate = capture::make_image(8, 8);
   const std::array<float, 3> grey{0.18F, 0.18F, 0.18F};
+  EXPECT_EQ(doubt_of_patch(0.5F), "");
+  EXPECT_NE(doubt_of_patch(0.03F).find("sees only 3 % of what lights the patch"),
+            std::string::npos);
   EXPECT_NE(match_by_patch(plate, {0, 0, 8, 8}, grey, {1, 1, 1}).note.find("clipped or dark"),
             std::string::npos);
   for (float& value : plate.pixels) value = 0.5F;

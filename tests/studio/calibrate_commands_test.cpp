@@ -167,6 +167,31 @@ TEST_F(CalibrateCommands, PoseOfAFishEyeComesOutAsALineForASet) {
   EXPECT_THAT(no_model.err, HasSubstr("a .toml file takes the pose of any lens"));
 }
 
+TEST_F(CalibrateCommands, PoseWarnsWhereItCannotBeThatOfASet) {
+  const calibrate::Lens lens{"LENSMODEL_PINHOLE", 1280, 720, {900, 900, 640, 360}};
+  const calibrate::Pose truth = calibrate::look_at({1, -7, 1.6}, {0, 0, 0}, 0);
+  calibrate::write_lens(path("lens.cameramodel"), lens);
+  // On the ground, with one axis of the other sign, or scaled.
+  const auto warnings = [&](calibrate::Vec3 written) {
+    std::string text;
+    for (int i = 0; i < 9; ++i) {
+      const calibrate::Vec3 p{1.2 * (i % 3) - 1.1, 1.3 * (i / 3) - 1.0, 0};
+      const auto q = project(lens, truth * p);
+      text += fmt::format("[[marker]]\nname = \"m{}\"\nposition = [{}, {}, 0]\npixel = [{}, {}]\n",
+                          i, written.x * p.x, written.y * p.y, q->x, q->y);
+    }
+    const Outcome outcome =
+        run("calibrate pose --lens " + path("lens.cameramodel") + " --markers " +
+            write("markers.toml", text) + " -o " + path("pose.toml"));
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(warnings({1, 1, 0}), testing::Not(HasSubstr("below all")));
+  EXPECT_THAT(warnings({1, -1, 0}), testing::AllOf(HasSubstr("m below all that it is found by"),
+                                                   HasSubstr("z points down in the picture")));
+  EXPECT_THAT(warnings({1000, 1000, 0}), HasSubstr("are the positions in metres?"));
+}
+
 TEST_F(CalibrateCommands, PoseOfMrcalsLensesGoesIntoTheirFiles) {
   const calibrate::Lens lens{"LENSMODEL_PINHOLE", 1280, 720, {900, 900, 640, 360}};
   const calibrate::Pose truth = calibrate::look_at({0, -7, 1.6}, {0, 0, 0.6}, 0);
@@ -339,6 +364,9 @@ TEST_F(CalibrateCommands, ProbeIsTurnedByMarkersFromAKnownPosition) {
   EXPECT_LT(error_deg(), 4 * double{figures()["sigma_deg"]});
   EXPECT_GT(figures()["sigma_mm"], 0);
 
+  const std::string two = write("two.toml", markers_text(made::fish_eye(), truth, 2, "probe"));
+  EXPECT_THAT(run(command + two + " --position 0.4,-0.3,1.2").err,
+              HasSubstr("the turn rests on two markers"));
   const Outcome too_few = run(command + few);
   EXPECT_EQ(too_few.status, 1);
   EXPECT_THAT(too_few.err, HasSubstr("--position needs only two"));

@@ -136,6 +136,29 @@ class LightMatch : public CommandLine {
 
 const std::string matrix_text = "[1.3, -0.4, 0.1, -0.1, 1.2, -0.2, 0, 0.3, 0.8]";
 
+// A gain by a patch is too large by as much of its light as the probe does not see.
+TEST_F(LightMatch, IsDoubtfulByAPatchWhoseLightTheProbeDoesNotSee) {
+  capture::Image even = capture::make_image(128, 128);
+  std::ranges::fill(even.pixels, 0.5F);
+  capture::write_exr((dir_ / "fish_eye.exr").string(), even);
+  const auto notes = [&](const std::string& axis) {
+    const std::string path = (dir_ / "set.toml").string();
+    std::ofstream(path)
+        << "[show]\nwidth = 320\nheight = 240\n[camera]\nsource = \"replay:untold\"\n"
+        << "model = \"pinhole\"\nfocal_px = 215\n"
+        << "pose = { position = [0, 0, 1], look_at = [0, 1, 1] }\n"
+        << "[probe]\nsource = \"fish_eye.exr\"\nlens = { model = \"equisolid\", size = "
+           "[128, 128], focal_px = 42, max_angle = 88 }\npose = { axis = "
+        << axis << ", roll = 0 }\nmatch = { patch = [10, 10, 20, 20], albedo = 0.4 }\n";
+    return FrameMaker(read_set(path)).make(0).value().notes;
+  };
+  EXPECT_THAT(notes("[0, 0, 1]"), testing::IsEmpty());
+  EXPECT_THAT(notes("[0, 0.3, -1]"),
+              testing::ElementsAre(HasSubstr("doubtful: the probe sees only ")));
+  EXPECT_THAT(notes("[0, 0, -1]"),
+              testing::ElementsAre(HasSubstr("puts no light on the patch: gain left at 1")));
+}
+
 TEST_F(LightMatch, RendersTheRightColourByAMatrix) {
   const auto truth = colour_of_cube("plate_sees.exr", "[1, 1, 1]");
   const auto by_matrix = colour_of_cube("probe_sees.exr", matrix_text);
