@@ -383,8 +383,7 @@ LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOption
           first * *matrix;
     }
   }
-  constexpr double doubtful = 0.3;
-  if (held_out.gains > doubtful) {
+  if (held_out.gains > doubtful_heldout_error) {
     fit.warnings.emplace_back(
         "the pairs disagree widely: things may be near, poses wrong, or the plate not linear");
   }

@@ -20,6 +20,9 @@ struct LightPair {
   std::size_t thing = of_its_own;
 };
 
+// A held-out error from here on has a common cause, which no mean lessens: the sigmas do not hold.
+inline constexpr double doubtful_heldout_error = 0.3;
+
 struct LightGainOptions {
   // A matrix is taken if it lowers the held-out error by more than this share of it, the gains' is
   // above `good_enough`, and the probe's colours differ by five times the matrix's or more.

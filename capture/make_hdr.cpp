@@ -194,20 +194,6 @@ void merge_stills(std::vector<ShotFile> files, const HdrOptions& options, HdrRes
   }
 }
 
-// Makes what is no number 0, and says of how many values; "" of none.
-std::string without_nan(Image& image) {
-  std::size_t count = 0;
-  for (float& value : image.pixels) {
-    if (!std::isnan(value)) continue;
-    value = 0;
-    ++count;
-  }
-  if (count == 0) return "";
-  const double share = static_cast<double>(count) / static_cast<double>(image.pixels.size());
-  const std::string percent = share < 0.01 ? "below 1" : std::to_string(std::lround(100 * share));
-  return std::to_string(count) + " values (" + percent + " %) are no numbers and count as black";
-}
-
 void merge_pictures(std::vector<ShotFile> files, HdrResult& result) {
   std::vector<Shot> shots;
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -235,8 +221,10 @@ HdrResult make_hdr(std::span<const std::string> paths, const HdrOptions& options
   } else if (files.size() == 1 && options.exposures_s.empty()) {
     result.response = linear_response();
     result.radiance = three_channels(files[0].picture);
-    if (std::string warning = without_nan(result.radiance); !warning.empty()) {
+    if (std::string warning = warning_of_nan(result.radiance); !warning.empty()) {
       result.warnings.push_back(std::move(warning));
+      std::ranges::replace_if(
+          result.radiance.pixels, [](float v) { return std::isnan(v); }, 0.0F);
     }
   } else {
     result.exposures_s = exposures_of(paths, files, options);
@@ -245,6 +233,14 @@ HdrResult make_hdr(std::span<const std::string> paths, const HdrOptions& options
   result.time_ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   return result;
+}
+
+std::string warning_of_nan(const Image& image) {
+  const auto count = std::ranges::count_if(image.pixels, [](float v) { return std::isnan(v); });
+  if (count == 0) return "";
+  const double share = static_cast<double>(count) / static_cast<double>(image.pixels.size());
+  const std::string percent = share < 0.01 ? "below 1" : std::to_string(std::lround(100 * share));
+  return std::to_string(count) + " values (" + percent + " %) are no numbers and count as black";
 }
 
 double range_stops(const Image& radiance) {

@@ -41,6 +41,9 @@ struct HdrResult {
 // shots of two sizes or without exposure times.
 HdrResult make_hdr(std::span<const std::string> paths, const HdrOptions& options = {});
 
+// How many of a picture's values are no numbers, in words; "" if none are.
+std::string warning_of_nan(const Image& image);
+
 // The range of luminance in stops, without the faintest and the brightest thousandth of those
 // pixels that are brighter than black; 0 if there are none.
 double range_stops(const Image& radiance);

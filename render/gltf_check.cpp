@@ -172,7 +172,7 @@ class Checker {
   void check_version() const {
     static const json::json_pointer place("/asset/version");
     const auto version = document_.value(place, std::string("2.0"));
-    if (!version.starts_with("2."))
+    if (version != "2" && !version.starts_with("2."))
       refuse("it is glTF " + version + ", of which only version 2 is read; export it anew");
   }
 

@@ -19,7 +19,6 @@ constexpr int most_step = 16;
 // Fewer plate pixels than this in a texel are its rim.
 constexpr int least_pixels_per_texel = 4;
 // Above this spread, the two cameras do not look at the same things.
-constexpr double doubtful_spread = 0.3;
 
 using Colour = std::array<float, 3>;
 
@@ -184,7 +183,8 @@ MatchResult match_by_overlap(const capture::Image& plate,
   result.spread = robust.spread;
   result.note =
       "median over " + std::to_string(ratios.size()) + " directions that both cameras see";
-  if (result.spread > doubtful_spread) {
+  result.doubtful = result.spread > doubtful_spread;
+  if (result.doubtful) {
     result.note +=
         "; doubtful: they disagree, so things may be near, poses wrong, or the plate not linear";
   }

@@ -20,9 +20,13 @@ struct MatchResult {
   double exposure = 1;                 // of the plate, over that of a given match: in both
   std::array<float, 3> implied_albedo{0, 0, 0};  // of the patch that was looked at; 0 = none was
   int pixels = 0;                                // of the plate that the gain rests on; 0 = on none
-  double spread = 0;  // relative robust standard deviation of what was averaged
-  std::string note;   // what was done, or why not, in words
+  double spread = 0;      // relative robust standard deviation of what was averaged
+  std::string note;       // what was done, or why not, in words
+  bool doubtful = false;  // then the note says why
 };
+
+// Directions or things that disagree by more than this, relative, have a common cause for it.
+inline constexpr double doubtful_spread = 0.3;
 
 struct MatchSettings {
   float clipped = 0.98F;   // plate values from here on say nothing
@@ -76,8 +80,8 @@ MatchResult match_by_patch(const capture::Image& plate,
                            const MatchSettings& settings = {},
                            Vec3f filled = {});
 
-// Why the light on a patch is doubtful, of which the probe sees that share (SplitIrradiance); "" if
-// it sees a half of it or more.
+// Why the light on a patch is to be doubted, of which the probe sees that share (SplitIrradiance);
+// "" if it sees a half of it or more.
 std::string doubt_of_patch(float seen_share);
 
 // A given gain, or matrix, of a plate whose exposure is another by this factor.

@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "render/model_format.h"
+
 namespace render {
 namespace {
 
@@ -204,8 +206,6 @@ std::vector<std::string> notes_of(const PlyHead& head) {
 }
 
 constexpr std::size_t stl_header = 80, stl_triangle = 50;  // bytes
-
-char small_letter(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 // What an ascii STL file says, without what some programs put before it.
 std::string_view words_of_stl(std::string_view text) {

@@ -1,4 +1,4 @@
-// PLY, STL and FBX files, checked before anything is built from them.
+// PLY, STL and FBX files, checked before anything is built from them, and put in plainer words.
 #pragma once
 
 #include <cstddef>

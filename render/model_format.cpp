@@ -1,16 +1,12 @@
 // The formats of models.
 #include "render/model_format.h"
 
-#include <algorithm>
 #include <filesystem>
 
 namespace render {
 
 std::optional<ModelFormat> model_format(const std::string& file) {
-  std::string extension = std::filesystem::path(file).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
+  const std::string extension = in_small_letters(std::filesystem::path(file).extension().string());
   if (extension == ".gltf" || extension == ".glb")
     return ModelFormat{.gltf = true, .smooth_normals = false};
   if (extension == ".obj") return ModelFormat{.obj = true};

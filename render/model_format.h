@@ -3,8 +3,19 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 namespace render {
+
+// Of ASCII; whatever else it is stays.
+inline char small_letter(char c) {
+  return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
+inline std::string in_small_letters(std::string_view word) {
+  std::string text(word);
+  for (char& c : text) c = small_letter(c);
+  return text;
+}
 
 struct ModelFormat {
   bool gltf = false, ply = false, stl = false, x3d = false, obj = false, fbx = false;

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "capture/sandbox.h"
+#include "render/model_format.h"
 #include "render/model_wire.h"
 
 namespace render {
@@ -26,14 +27,7 @@ constexpr std::uint64_t most_served = std::uint64_t{4} << 30;
 constexpr int most_questions = 10000;
 constexpr int most_files_beside = 100000;  // that are looked at
 
-// In small letters.
-std::string ending_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return ending;
-}
+std::string ending_of(const fs::path& path) { return in_small_letters(path.extension().string()); }
 
 // Bytes of the model and of what lies in its folder or below that it may want: buffers, material
 // libraries.

@@ -9,6 +9,8 @@
 #include <optional>
 #include <string_view>
 
+#include "render/model_format.h"
+
 namespace render {
 namespace {
 
@@ -103,12 +105,6 @@ std::string_view take_options(const std::string& keyword,
   }
   if (taken) facts.maps.push_back(map);
   return rest;
-}
-
-std::string in_small_letters(std::string_view word) {
-  std::string text(word);
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
 }
 
 bool is_in(std::initializer_list<std::string_view> names, std::string_view name) {

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "capture/median.h"
+#include "render/match.h"
 
 namespace studio {
 namespace {
@@ -41,6 +42,7 @@ void ExposureFollower::follow(double exposure_s,
   const bool told = exposure_s > 0;
   if (told && calibrated_s_) {
     level_ = exposure_s / *calibrated_s_;
+    doubtful_ = false;
     // Where a frame then tells none, it goes on from here.
     timed_ = true;
     per_second_ = level_ / exposure_s;
@@ -65,15 +67,14 @@ void ExposureFollower::follow(double exposure_s,
     measured_ = true;
   }
   level_ = per_second_ * unit;
-  constexpr double doubtful_spread = 0.3;
-  const bool doubtful = found && spread_ > doubtful_spread;
+  doubtful_ = found && spread_ > render::doubtful_spread;
   note_ = found ? fmt::format(
                       "the plate's exposure is {:.3f} of the calibrated one, by {} "
                       "directions that both cameras see{}",
                       level_, pairs.size(),
-                      doubtful ? "; doubtful: they disagree, so things may be near, poses wrong, "
-                                 "or the gain of another way than these directions"
-                               : "")
+                      doubtful_ ? "; doubtful: they disagree, so things may be near, poses wrong, "
+                                  "or the gain was not found by such directions"
+                                : "")
                 : fmt::format(
                       "too little is seen by both cameras, unclipped and not dark, to "
                       "follow the plate's exposure: {} at {:.3f} of the calibrated one",

@@ -29,6 +29,8 @@ class ExposureFollower {
   double level() const { return level_; }
   // By how much the directions last measured by disagree: relative, robust.
   double spread() const { return spread_; }
+  // Whether that is so much that the last frame's exposure is to be doubted; the note says so, too.
+  bool is_doubtful() const { return doubtful_; }
   // How the last frame's was found, in words.
   const std::string& note() const { return note_; }
 
@@ -36,6 +38,7 @@ class ExposureFollower {
   std::optional<double> calibrated_s_;
   double level_ = 1;
   double spread_ = 0;
+  bool doubtful_ = false;
   bool measured_ = false;
   bool timed_ = false;     // what follows is per second of exposure
   double per_second_ = 1;  // level over the told exposure, averaged; the level itself if not told

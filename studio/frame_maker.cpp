@@ -208,7 +208,6 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     prepared.sound = plate_->take_sound(next);
     videos = videos_->at(time, *frame);
     prepared.notes = videos_->take_notes();
-    std::ranges::move(take_notes(), std::back_inserter(prepared.notes));
   }
 
   render::FrameJob& job = prepared.job;
@@ -217,7 +216,7 @@ std::optional<PreparedFrame> FrameMaker::make_at(const Due& due) {
     const StageTimer timer(prepared, Stage::probe);
     light = light_->at({time, frame->image.get(), directions_.get(), job.cam_from_set,
                         prepared.plate_exposure_s, set_.effort.light_samples, plate_->is_live()});
-    std::ranges::move(light_->take_notes(), std::back_inserter(prepared.notes));
+    std::ranges::move(take_notes(), std::back_inserter(prepared.notes));
     const std::lock_guard lock(moment_mutex_);
     moment_ = {time, frame->image, job.cam_from_set, prepared.plate_exposure_s};
   }

@@ -123,7 +123,7 @@ std::vector<std::string> LightFeed::take_notes() {
   std::vector<std::string> notes = source_ ? source_->take_notes() : std::vector<std::string>{};
   const bool given = settings_ && settings_->match.method == MatchSettings::Method::given;
   const bool lacks_gain = !given && !matched_ && !match_.note.empty();
-  const bool is_doubtful = lacks_gain || match_.note.find("doubtful") != std::string::npos;
+  const bool is_doubtful = lacks_gain || match_.doubtful;
   if (is_doubtful && !was_doubtful_) notes.push_back("the light's match: " + match_.note);
   was_doubtful_ = is_doubtful;
   return notes;
@@ -195,7 +195,8 @@ render::MatchResult LightFeed::measure_match(const LightRequest& request) const 
     render::MatchResult found = render::match_by_patch(*plate_, {x, y, width, height}, match.albedo,
                                                        light.seen, matching, light.filled);
     const std::string doubt = render::doubt_of_patch(light.seen_share);
-    if (found.pixels > 0 && !doubt.empty()) found.note += "; " + doubt;
+    found.doubtful = found.pixels > 0 && !doubt.empty();
+    if (found.doubtful) found.note += "; " + doubt;
     return found;
   }
   return render::match_by_overlap(*plate_, *request.directions, request.cam_from_set, *environment_,
@@ -223,6 +224,7 @@ bool LightFeed::follow_exposure(const LightRequest& request) {
   match_ = given_match(changed ? exposure_.level() : match_.exposure);
   match_.pixels = pixels;
   match_.spread = exposure_.spread();
+  match_.doubtful = exposure_.is_doubtful();
   match_.note += "; " + exposure_.note();
   return changed;
 }

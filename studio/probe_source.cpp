@@ -9,8 +9,6 @@
 #include <string_view>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "calibrate/lens.h"
 #include "capture/bracketed_camera.h"
 #include "capture/camera_response.h"
@@ -141,14 +139,6 @@ Bracketed bracket(std::unique_ptr<capture::Camera> camera,
   throw SetError({{set.path, place.line, place.column, message}});
 }
 
-// Which pixels of a picture count as black since they tell no number; "" of none.
-std::string note_of_nan(const capture::Image& image) {
-  const auto count = std::ranges::count_if(image.pixels, [](float v) { return std::isnan(v); });
-  if (count == 0) return "";
-  return fmt::format("the probe: {:.2g} % of its values are no numbers and count as black",
-                     100.0 * static_cast<double>(count) / static_cast<double>(image.pixels.size()));
-}
-
 }  // namespace
 
 ProbeSource::ProbeSource(const Set& set, std::optional<capture::Time> from)
@@ -239,7 +229,8 @@ void ProbeSource::open_camera(const Set& set,
   }
   if (camera_->is_still()) {
     newest_ = {camera_->first().image, camera_->first().time};
-    if (const std::string note = note_of_nan(*newest_.image); !note.empty()) notes_.push_back(note);
+    const std::string warning = capture::warning_of_nan(*newest_.image);
+    if (!warning.empty()) notes_.push_back("the probe: " + warning);
     camera_.reset();
     return;
   }

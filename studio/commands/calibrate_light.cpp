@@ -271,11 +271,10 @@ void calibrate_light(const LightOptions& options, Console& console) {
   console.figures(json_text(figures));
   for (const std::string& warning : found.warnings) console.warn(warning);
   const bool too_few = std::ranges::all_of(found.sigma, [](double sigma) { return sigma >= 1; });
-  constexpr double disagree = 0.3;  // then errors have a common cause, and no mean lessens them
   console.say(fmt::format("from {} {}: {}{}", pairs,
                           patches.empty() ? "directions that both cameras see" : "painted patches",
                           too_few ? "too few to tell how sure it is"
-                          : found.heldout_error > disagree
+                          : found.heldout_error > calibrate::doubtful_heldout_error
                               ? "how sure it is cannot be told, for they disagree"
                               : fmt::format("+- {:.2f}, {:.2f}, {:.2f} %", 100 * found.sigma[0],
                                             100 * found.sigma[1], 100 * found.sigma[2]),

@@ -137,7 +137,7 @@ std::vector<std::string> warnings_of(const calibrate::LineMarks& marks,
   for (const calibrate::ParallelReport& parallel : fit.parallels) {
     if (parallel.lines < 3 || parallel.rms_rad < most_deg * degree) continue;
     warnings.push_back(
-        fmt::format("lines of \"{}\" are up to {:.0f} degrees from parallel: does "
+        fmt::format("lines of \"{}\" are {:.0f} degrees (RMS) from parallel: does "
                     "one of them belong elsewhere?",
                     parallel.name, parallel.rms_rad / degree));
   }

@@ -116,12 +116,14 @@ void warn_of_place(const std::vector<calibrate::Marker>& markers,
   }
   if ((found.cam_from_set.R * calibrate::Vec3{0, 0, 1}).y > downwards) {
     found.warnings.emplace_back(
-        "z points down in the picture: are the positions of a set with y up, or hangs the camera "
+        "z points down in the picture: are the positions of a set with y up, or does the camera "
+        "hang "
         "upside down?");
   }
   if (nearest_m > far_m) {
     found.warnings.push_back(fmt::format(
-        "the camera comes out {:.0f} m from the nearest: are the positions in metres?", nearest_m));
+        "the camera comes out {:.0f} m from all that it is found by: are the positions in metres?",
+        nearest_m));
   }
   const auto agreeing = std::ranges::count(found.agrees, true);
   if (agreeing == std::ssize(found.agrees)) return;

@@ -110,6 +110,18 @@ TEST(MatchSources, TurnsTheProbeByLampsThatTheSceneCameraSeesClipped) {
   }
 }
 
+TEST(MatchSources, TellsOfALampThatOneCameraDoesNotShow) {
+  made::LampWorld world{
+      {{towards(-22, 12)}, {towards(6, 16), 0.03, 8}, {towards(24, -6), 0.015, 300}}};
+  const Shots hidden = shoot(world, 1);
+  world.lamps.push_back({towards(-8, -14), 0.03, 8});
+  Shots shots = shoot(world, 1);
+  shots.probe = hidden.probe;
+  const SourceMatch found = match(shots);
+  EXPECT_LT(error_of(found, shots), 0.3 * degree);
+  EXPECT_THAT(found.warnings, testing::ElementsAre(HasSubstr("1 bright source is not where")));
+}
+
 TEST(MatchSources, TellsTwoLikeLampsApartByTheRestOfThePictures) {
   const made::LampWorld world{{{towards(-20, 10)}, {towards(20, 10)}}};
   for (unsigned seed = 1; seed <= 4; ++seed) {
