@@ -13,10 +13,13 @@ constexpr std::size_t channels_of_codes = 3;
 constexpr int far_off = 30;     // codes
 constexpr int black_up_to = 2;  // the foot of a response tells nothing
 
-// The code that light has, of a table that rises: the nearest one below.
-int code_of(const CodeTable& table, double light) {
-  const auto above = std::ranges::upper_bound(table.value, light);
-  return static_cast<int>(std::max<std::ptrdiff_t>(0, above - table.value.begin() - 1));
+// Whether light that makes a code, the last one whose value is not above it, makes another than
+// this one by more than that; of a table that rises.
+bool is_far_off(const CodeTable& table, int code, double light) {
+  const auto value = [&](int of) { return table.value[static_cast<std::size_t>(of)]; };
+  const int least_above = code + far_off + 1, least_near = code - far_off;
+  return (least_above < Response::codes && value(least_above) <= light) ||
+         (least_near > 0 && value(least_near) > light);
 }
 
 }  // namespace
@@ -40,8 +43,7 @@ BracketShares check_bracket(std::span<const std::uint8_t* const> shots,
       bool bound = true;
       for (std::size_t s = 0; s < shots.size(); ++s) {
         const int code = shots[s][i];
-        const int foretold = code_of(channels[c], light * exposures_s[s]);
-        contradicts = contradicts || std::abs(code - foretold) > far_off;
+        contradicts = contradicts || is_far_off(channels[c], code, light * exposures_s[s]);
         bound = bound && !std::isfinite(channels[c].variance[static_cast<std::size_t>(code)]);
         all_black = all_black && code <= black_up_to;
       }
