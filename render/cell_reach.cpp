@@ -33,18 +33,24 @@ SpaceGrid::SpaceGrid(const Scene::Bounds& bounds) {
   const Vec3f half = half_size(bounds);
   const float least = 1e-3F * std::max({half.x, half.y, half.z, 1e-6F});
   const Vec3f wide{std::max(half.x, least), std::max(half.y, least), std::max(half.z, least)};
-  const Scene::Bounds all = grown({middle(bounds), middle(bounds)}, wide * 1.5F);
+  constexpr float beside_outermost = static_cast<float>(side) / static_cast<float>(side - 2);
+  const Scene::Bounds all =
+      grown({middle(bounds), middle(bounds)}, wide * (1.5F * beside_outermost));
   lower_ = all.lower;
   size_ = (all.upper - all.lower) * (1.0F / side);
   per_size_ = {1 / size_.x, 1 / size_.y, 1 / size_.z};
 }
 
 bool SpaceGrid::holds(const Scene::Bounds& bounds) const {
-  return is_empty(bounds) || (box_at(bounds.lower) >= 0 && box_at(bounds.upper) >= 0);
+  if (is_empty(bounds)) return true;
+  if (!is_laid()) return false;
+  const Vec3f lower = lower_ + size_, upper = lower_ + size_ * static_cast<float>(side - 1);
+  return bounds.lower.x >= lower.x && bounds.upper.x < upper.x && bounds.lower.y >= lower.y &&
+         bounds.upper.y < upper.y && bounds.lower.z >= lower.z && bounds.upper.z < upper.z;
 }
 
 int SpaceGrid::box_at(Vec3f p) const {
-  if (!(per_size_.x > 0)) return -1;  // it is laid over nothing
+  if (!is_laid()) return -1;
   const Vec3f at{(p.x - lower_.x) * per_size_.x, (p.y - lower_.y) * per_size_.y,
                  (p.z - lower_.z) * per_size_.z};
   constexpr auto end = static_cast<float>(side);
@@ -61,6 +67,7 @@ Scene::Bounds SpaceGrid::box(int index) const {
 }
 
 void SpaceGrid::mark_line(Vec3f from, Vec3f direction, float far_m, Mask& mask) const {
+  if (!is_laid()) return;
   constexpr auto end = static_cast<float>(side);
   const Vec3f along = direction * per_size_;
   const Vec3f begin = (from - lower_) * per_size_;
@@ -78,18 +85,16 @@ void SpaceGrid::mark_line(Vec3f from, Vec3f direction, float far_m, Mask& mask) 
     mask[i / 64] |= std::uint64_t{1} << (i % 64);
     return;
   }
-  const auto [first, last] = inside({{0, 0, 0}, {end, end, end}}, begin, along, far_m);
-  if (!(first <= last)) return;
-  std::array<int, 3> box, step;
+  std::array<int, 3> box, step, last;
   std::array<float, 3> next, between;
-  const Vec3f entry = begin + along * first;
   for (int axis = 0; axis < 3; ++axis) {
     const auto a = static_cast<std::size_t>(axis);
-    const float d = part(along, axis);
-    box[a] = std::clamp(static_cast<int>(part(entry, axis)), 0, side - 1);
+    const float d = part(along, axis), o = part(begin, axis);
+    box[a] = static_cast<int>(std::min(std::max(0.0F, o), end - 1));
     step[a] = d < 0 ? -1 : 1;
+    last[a] = d < 0 ? 0 : side - 1;
     const auto wall = static_cast<float>(box[a] + (d < 0 ? 0 : 1));
-    next[a] = d == 0 ? infinite : (wall - part(begin, axis)) / d;
+    next[a] = d == 0 || box[a] == last[a] ? infinite : (wall - o) / d;
     between[a] = d == 0 ? infinite : std::abs(1 / d);
   }
   while (true) {
@@ -97,19 +102,32 @@ void SpaceGrid::mark_line(Vec3f from, Vec3f direction, float far_m, Mask& mask) 
     mask[i / 64] |= std::uint64_t{1} << (i % 64);
     const std::size_t a =
         next[0] < next[1] ? (next[0] < next[2] ? 0U : 2U) : (next[1] < next[2] ? 1U : 2U);
-    if (!(next[a] <= last)) return;
+    if (!(next[a] <= far_m) || next[a] == infinite) return;
     box[a] += step[a];
-    if (box[a] < 0 || box[a] >= side) return;
-    next[a] += between[a];
+    next[a] = box[a] == last[a] ? infinite : next[a] + between[a];
   }
 }
 
 void SpaceGrid::mark_bounds(const Scene::Bounds& bounds, Mask& mask) const {
-  for (int i = 0; i < side * side * side; ++i) {
-    // A little larger: a line that runs along a wall may be counted to either side.
-    const Scene::Bounds b = grown(box(i), size_ * 0.01F);
-    const auto at = static_cast<std::size_t>(i);
-    if (overlap(b, bounds)) mask[at / 64] |= std::uint64_t{1} << (at % 64);
+  if (!is_laid() || is_empty(bounds)) return;
+  // A little larger: a line that runs along a wall may be counted to either side.
+  const Scene::Bounds all = grown(bounds, size_ * 0.01F);
+  std::array<int, 3> first, last;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<std::size_t>(axis);
+    const auto box_of = [&](Vec3f p) {
+      const float at = (part(p, axis) - part(lower_, axis)) * part(per_size_, axis);
+      return static_cast<int>(std::min(std::max(0.0F, at), static_cast<float>(side - 1)));
+    };
+    first[a] = box_of(all.lower), last[a] = box_of(all.upper);
+  }
+  for (int z = first[2]; z <= last[2]; ++z) {
+    for (int y = first[1]; y <= last[1]; ++y) {
+      for (int x = first[0]; x <= last[0]; ++x) {
+        const auto i = static_cast<std::size_t>((z * side + y) * side + x);
+        mask[i / 64] |= std::uint64_t{1} << (i % 64);
+      }
+    }
   }
 }
 

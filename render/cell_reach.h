@@ -17,18 +17,20 @@
 
 namespace render {
 
-// Space around what is virtual, in 16x16x16 boxes.
+// All of space: around what is virtual in 16x16x16 boxes, of which the outermost have no end.
 class SpaceGrid {
  public:
   static constexpr int side = 16;
   using Mask = std::array<std::uint64_t, side * side * side / 64>;  // of boxes
 
   SpaceGrid() = default;
-  // Half as large again as those bounds, to all sides.
+  // All but the outermost half as large again as those bounds, to all sides.
   explicit SpaceGrid(const Scene::Bounds& bounds);
 
+  bool is_laid() const { return per_size_.x > 0; }  // over anything
+  // Whether these lie in none of the outermost.
   bool holds(const Scene::Bounds& bounds) const;
-  // The box that a point lies in, or -1.
+  // As if the outermost had walls, as far apart as others': the box that a point lies in, or -1.
   int box_at(Vec3f p) const;
   Scene::Bounds box(int index) const;
   // Those that a straight line from `from`, `far_m` along the unit `direction`, passes (Amanatides

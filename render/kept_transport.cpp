@@ -94,7 +94,11 @@ void KeptTransport::follow(const FrameKeys& keys, const FrameContext& frame) {
     Changes changes;
     changes.stalls = PictureStalls::changed(stalls_, frame.stalls);
     if (moved->empty() && changes.stalls.empty()) return;
-    if (held(*moved) && held(changes.stalls)) {
+    if (grid_.is_laid()) {
+      // Beyond its walls the grid tells little. It is laid anew as soon as hardly more is lost by
+      // that.
+      const bool beyond = !held(*moved) || !held(changes.stalls);
+      const std::size_t before = beyond ? count_kept() : 0;
       if (caustics_before && frame.caustics && caustics_before->key() != frame.caustics->key()) {
         changes.relit = caustics_before->regions();
         std::ranges::copy(frame.caustics->regions(), std::back_inserter(changes.relit));
@@ -102,6 +106,7 @@ void KeptTransport::follow(const FrameKeys& keys, const FrameContext& frame) {
       changes.but_apart = *Scene::moved_but_apart(places_, scene.places());
       changes.moved = std::move(*moved);
       forget(std::move(changes), frame);
+      if (2 * count_kept() < before) forget_all(scene);
     } else {
       forget_all(scene);
     }
@@ -119,6 +124,11 @@ void KeptTransport::follow(const FrameKeys& keys, const FrameContext& frame) {
   columns_ = frame.columns;
   rows_ = frame.rows;
   full_ = false;
+}
+
+std::size_t KeptTransport::count_kept() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(cells_, [](const Cell& cell) { return cell.stage != none; }));
 }
 
 void KeptTransport::forget_all(const Scene& scene) {

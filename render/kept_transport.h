@@ -133,6 +133,7 @@ class KeptTransport {
   }
   void follow(const FrameKeys& keys, const FrameContext& frame);
   void drop_answers(Cell& cell);
+  std::size_t count_kept() const;  // cells
   void forget_all(const Scene& scene);
   // What moved, where light falls otherwise, and what of that shows no picture apart; where
   // pictures have other stalls.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <random>
+#include <ranges>
 
 #include "made_room.h"
 #include "render/area_light.h"
@@ -36,6 +37,11 @@ bool has(const SpaceGrid::Mask& mask, int box) {
   return (mask[static_cast<std::size_t>(box) / 64] >> (box % 64) & 1) != 0;
 }
 
+bool have_common(const SpaceGrid::Mask& a, const SpaceGrid::Mask& b) {
+  return std::ranges::any_of(std::views::iota(std::size_t{0}, a.size()),
+                             [&](std::size_t i) { return (a[i] & b[i]) != 0; });
+}
+
 TEST(SpaceGrid, MarksEveryBoxThatALinePassesAndNoFarOne) {
   const SpaceGrid grid({{-1, -2, -0.5F}, {1, 2, 0.5F}});
   Dice dice{std::mt19937(1)};
@@ -52,6 +58,10 @@ TEST(SpaceGrid, MarksEveryBoxThatALinePassesAndNoFarOne) {
     EXPECT_LE(marked, 3 * SpaceGrid::side);
     for (int step = 1; step < 1000; ++step) {
       const Vec3f p = from + direction * (far_m * static_cast<float>(step) / 1000);
+      // What is anywhere on it, beyond the outermost walls too, is known to be met.
+      SpaceGrid::Mask there{};
+      grid.mark_bounds({p, p}, there);
+      EXPECT_TRUE(have_common(mask, there)) << i << " " << step;
       const int box = grid.box_at(p);
       if (box < 0 || has(mask, box)) continue;
       // A point on a wall may be counted to the other side of it.
@@ -251,10 +261,10 @@ TEST(MovingThings, LeaveCellsFarAwayAsTheyAre) {
   // From above, so that shadows are short.
   std::erase_if(shot.job.lights.lights, [](const auto& light) { return light.direction.z < 0.6F; });
   render::KeptTransport kept;
+  render::FrameResult result;
   const auto rays = [&](render::KeptTransport* memory) {
     render::FrameInputs inputs = shot.inputs();
     inputs.kept = memory;
-    render::FrameResult result;
     render_frame(inputs, shot.job, shot.plate, result);
     return rays_of(result);
   };
@@ -265,6 +275,15 @@ TEST(MovingThings, LeaveCellsFarAwayAsTheyAre) {
   const std::uint64_t some = rays(&kept);
   EXPECT_GT(some, 0U);
   EXPECT_LT(some, all / 2);
+  // Nor are they lost where it leaves the picture, and all of space that was thought of.
+  for (int step = 1; step <= 8; ++step) {
+    scene.instances.back().set_from_object[3] += 0.4F;
+    shot.scene = std::make_unique<render::Scene>(scene, *shot.scene);
+    const std::uint64_t warm = rays(&kept);
+    const capture::HalfImage shown = result.rgba;
+    EXPECT_LT(warm, rays(nullptr) / 3) << step;
+    EXPECT_EQ(shown.pixels, result.rgba.pixels) << step;
+  }
 }
 
 }  // namespace
