@@ -20,8 +20,6 @@ namespace {
 constexpr double average_frames = 12;
 constexpr double deviations = 4;
 constexpr double least_change = 0.01;
-// Fewer directions may be one thing that moves.
-constexpr std::size_t fewest_pairs = 10;
 
 // By how much the pairs differ from what is common to them, relative and robust.
 double spread_of(std::span<const calibrate::LightPair> pairs, double common) {
@@ -58,7 +56,7 @@ void ExposureFollower::follow(double exposure_s,
   const bool found = pairs.size() >= fewest_pairs;
   if (found) {
     const double over = calibrate::follow_exposure(calibrate::LightGain{}, pairs);
-    const double now = level_of_pairs * over / unit;
+    const double now = level_of_pairs * over / (told_by_pairs_ * unit);
     spread_ = spread_of(pairs, over);
     const double sudden =
         std::max(least_change, deviations * spread_ / std::sqrt(static_cast<double>(pairs.size())));
@@ -72,8 +70,7 @@ void ExposureFollower::follow(double exposure_s,
                       "the plate's exposure is {:.3f} of the calibrated one, by {} "
                       "directions that both cameras see{}",
                       level_, pairs.size(),
-                      doubtful_ ? "; doubtful: they disagree, so things may be near, poses wrong, "
-                                  "or the gain was not found by such directions"
+                      doubtful_ ? "; doubtful: they disagree, so things may be near, or poses wrong"
                                 : "")
                 : fmt::format(
                       "too little is seen by both cameras, unclipped and not dark, to "

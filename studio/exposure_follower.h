@@ -1,6 +1,7 @@
 // The plate's exposure, frame by frame, over the one that a set's match was calibrated at.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,9 +15,14 @@ namespace studio {
 // from directions that both cameras see.
 class ExposureFollower {
  public:
+  // Fewer directions may be one thing that moves.
+  static constexpr std::size_t fewest_pairs = 10;
+
   // `calibrated_s`: the plate's exposure that the match was calibrated at; nothing = not told.
-  explicit ExposureFollower(std::optional<double> calibrated_s = std::nullopt)
-      : calibrated_s_(calibrated_s) {}
+  // `told_by_pairs`: what pairs tell of that exposure, where the match is by something else (> 0).
+  explicit ExposureFollower(std::optional<double> calibrated_s = std::nullopt,
+                            double told_by_pairs = 1)
+      : calibrated_s_(calibrated_s), told_by_pairs_(told_by_pairs) {}
 
   // Takes one frame: its exposure, 0 = not told, and pairs whose probe side is what the plate would
   // show at a level.
@@ -36,6 +42,7 @@ class ExposureFollower {
 
  private:
   std::optional<double> calibrated_s_;
+  double told_by_pairs_ = 1;
   double level_ = 1;
   double spread_ = 0;
   bool doubtful_ = false;

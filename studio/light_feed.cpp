@@ -94,7 +94,7 @@ LightFeed::LightFeed(const Set& set, const LightFeed* before, std::optional<capt
   goes_on_ = before && source_ == before->source_;
   if (settings_->match.method == MatchSettings::Method::given) {
     match_ = given_match(1);
-    exposure_ = ExposureFollower(settings_->match.exposure_s);
+    exposure_ = ExposureFollower(settings_->match.exposure_s, settings_->match.overlap);
   }
   if (!settings_->lens) {
     if (source_->width() != 2 * source_->height()) {

@@ -74,6 +74,7 @@ struct MatchSettings {
   std::optional<render::ColourMatrix> matrix;  // of `given`: in place of the gain
   bool follow = false;               // of `given`: goes with the plate's exposure from then on
   std::optional<double> exposure_s;  // of `given`: the plate's that it was calibrated at
+  double overlap = 1;                // of `given`: what both cameras' directions tell of that one
   std::array<int, 4> patch{};        // of `patch`: x, y, width, height in the show's picture
   std::array<float, 3> albedo{};     // of `patch`: what it is painted
   calibrate::Vec3 normal{0, 0, 1};   // of `patch`: where it faces in the set

@@ -49,8 +49,9 @@ void read_given(Section& table, MatchSettings& match) {
       table.boolean("follow", match.follow) ? !match.follow : !table.has("follow");
   double exposure_s = 0;
   if (table.number("exposure_s", exposure_s, {1e-9, 3600})) match.exposure_s = exposure_s;
-  if (match.exposure_s && is_fixed) {
-    table.fault("exposure_s", "is of use only with follow = true");
+  table.number("overlap", match.overlap, {0.01, 100});
+  for (const std::string_view key : {"exposure_s", "overlap"}) {
+    if (is_fixed && table.has(key)) table.fault(key, "is of use only with follow = true");
   }
 }
 
@@ -82,7 +83,7 @@ void read_match(Section& section, std::array<int, 2> picture, MatchSettings& mat
     for (const std::string_view key : {"albedo", "normal"}) {
       table->of_use_only(patch, key, "patch");
     }
-    for (const std::string_view key : {"follow", "exposure_s"}) {
+    for (const std::string_view key : {"follow", "exposure_s", "overlap"}) {
       table->of_use_only(given_too, key, "gain or matrix");
     }
     table->finish();

@@ -16,8 +16,10 @@
 #include <nlohmann/json.hpp>
 
 #include "calibrate/light_gain.h"
+#include "capture/median.h"
 #include "render/match.h"
 #include "studio/commands/commands.h"
+#include "studio/exposure_follower.h"
 #include "studio/frame_maker.h"
 #include "studio/json_text.h"
 #include "studio/light_pairs.h"
@@ -141,9 +143,17 @@ std::vector<std::string> untold_patches(const std::vector<PaintedPatch>& patches
 // What the frames tell.
 struct Collected {
   std::vector<calibrate::LightPair> pairs;
+  std::vector<calibrate::LightPair> overlap;  // beside patches: what both cameras see
   double exposure_s = 0;  // of the plate's first frame that tells anything; 0 = not told
   std::string doubt;      // about the light on patches, "" = none
 };
+
+// Whether it is known where the plate's camera looks.
+bool is_placed(const Set& set) {
+  const PoseSettings& pose = set.camera.pose;
+  return set.camera.lens.width > 0 &&
+         (!pose.track.empty() || pose.cam_from_set != calibrate::Pose{});
+}
 
 Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std::int64_t frames) {
   FrameMaker maker(set);
@@ -164,21 +174,44 @@ Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std:
       add_overlap(*prepared, plate, frame, pairs);
     } else {
       add_patches(patches, plate, *prepared->environment, frame, pairs, collected.doubt);
+      if (is_placed(set)) add_overlap(*prepared, plate, frame, collected.overlap);
     }
   }
   return collected;
 }
 
+// What both cameras' directions tell of the exposures that a fit by patches found: their ratio, the
+// median of the frames; nothing if too few are seen. They are of things far away, patches are not.
+std::optional<double> told_by_overlap(const calibrate::LightGain& found,
+                                      std::span<const calibrate::LightPair> overlap) {
+  std::vector<double> ratios;
+  for (std::size_t frame = 0; frame < found.exposures.size(); ++frame) {
+    std::vector<calibrate::LightPair> pairs;
+    std::ranges::copy_if(overlap, std::back_inserter(pairs),
+                         [&](const auto& pair) { return pair.frame == frame; });
+    if (pairs.size() < ExposureFollower::fewest_pairs || !(found.exposures[frame] > 0)) continue;
+    ratios.push_back(calibrate::follow_exposure(found, pairs) / found.exposures[frame]);
+  }
+  if (ratios.empty()) return std::nullopt;
+  return capture::median_in_place(ratios);
+}
+
+struct Fit {
+  calibrate::LightGain light;
+  std::optional<double> overlap;  // beside patches: what both cameras' directions tell
+};
+
 // What the probe did not see is filled from the plate, in its units: with the gain of a first
 // round, both are of one unit.
-calibrate::LightGain fit(Set set,
-                         const std::vector<PaintedPatch>& patches,
-                         std::int64_t frames,
-                         Collected& collected) {
+Fit fit(Set set,
+        const std::vector<PaintedPatch>& patches,
+        std::int64_t frames,
+        Collected& collected) {
   const bool fills =
       !patches.empty() && set.probe->lens.has_value() && set.probe->unseen == render::Unseen::floor;
   Colour before{1, 1, 1};
-  calibrate::LightGain found;
+  Fit all;
+  calibrate::LightGain& found = all.light;
   for (int round = 0; round < (fills ? 3 : 1); ++round) {
     set.probe->match = MatchSettings{};
     set.probe->match.method = MatchSettings::Method::given;
@@ -194,10 +227,11 @@ calibrate::LightGain fit(Set set,
           patches.front().where, patches.size()));
     }
     found = calibrate::fit_light_gain(collected.pairs);
+    if (!patches.empty()) all.overlap = told_by_overlap(found, collected.overlap);
     for (std::size_t c = 0; c < 3; ++c) found.gain[c] *= before[c];
     for (std::size_t i = 0; found.matrix && i < 9; ++i) (*found.matrix)[i] *= before[i % 3];
   }
-  return found;
+  return all;
 }
 
 std::string list_of(std::span<const double> numbers) {
@@ -219,22 +253,22 @@ std::pair<double, double> exposures_of(const calibrate::LightGain& found) {
 }
 
 // As a set's [probe] takes it.
-std::string match_line(const calibrate::LightGain& found, double exposure_s) {
+std::string match_line(const Fit& fit, double exposure_s) {
+  const calibrate::LightGain& found = fit.light;
   const std::span<const double> numbers =
       found.matrix ? std::span<const double>(*found.matrix) : std::span<const double>(found.gain);
   const auto [low, high] = exposures_of(found);
   if (high / low < follows_from) return "match = " + list_of(numbers);
-  return fmt::format("match = {{ {} = {}, follow = true{} }}", found.matrix ? "matrix" : "gain",
+  return fmt::format("match = {{ {} = {}, follow = true{}{} }}", found.matrix ? "matrix" : "gain",
                      list_of(numbers),
-                     exposure_s > 0 ? fmt::format(", exposure_s = {:.9g}", exposure_s) : "");
+                     exposure_s > 0 ? fmt::format(", exposure_s = {:.9g}", exposure_s) : "",
+                     fit.overlap ? fmt::format(", overlap = {:.4g}", *fit.overlap) : "");
 }
 
 void calibrate_light(const LightOptions& options, Console& console) {
   Set set = read_set(options.set);
   if (!set.probe) throw std::runtime_error(set.path + ": has no [probe] to match to the plate");
-  const PoseSettings& pose = set.camera.pose;
-  const bool posed = !pose.track.empty() || pose.cam_from_set != calibrate::Pose{};
-  if (options.patches.empty() && (set.camera.lens.width == 0 || !posed)) {
+  if (options.patches.empty() && !is_placed(set)) {
     throw std::runtime_error(set.path +
                              ": the camera's lens and pose are needed to find what both cameras "
                              "see; or give --patches");
@@ -250,9 +284,10 @@ void calibrate_light(const LightOptions& options, Console& console) {
           ? std::vector<PaintedPatch>{}
           : read_patches(options.patches, std::array{set.show.width, set.show.height});
   Collected collected;
-  calibrate::LightGain found;
+  Fit fitted;
+  calibrate::LightGain& found = fitted.light;
   try {
-    found = fit(set, patches, options.frames.value_or(default_frames), collected);
+    fitted = fit(set, patches, options.frames.value_or(default_frames), collected);
   } catch (const std::invalid_argument& error) {
     throw std::runtime_error(fmt::format("{}: {}", set.path, error.what()));
   }
@@ -260,12 +295,13 @@ void calibrate_light(const LightOptions& options, Console& console) {
   found.warnings.insert(found.warnings.begin(), untold.begin(), untold.end());
   if (!collected.doubt.empty()) found.warnings.push_back("the gains are " + collected.doubt);
   const std::size_t pairs = collected.pairs.size();
-  const std::string match = match_line(found, collected.exposure_s);
+  const std::string match = match_line(fitted, collected.exposure_s);
   Json figures{
       {"gain", found.gain}, {"sigma", found.sigma},       {"heldout_error", found.heldout_error},
       {"pairs", pairs},     {"left_out", found.left_out}, {"exposures", found.exposures}};
   if (found.matrix_heldout_error) figures["matrix_heldout_error"] = *found.matrix_heldout_error;
   if (found.matrix) figures["matrix"] = *found.matrix;
+  if (fitted.overlap) figures["overlap"] = *fitted.overlap;
   figures["match"] = match;
   figures["warnings"] = found.warnings;
   console.figures(json_text(figures));
@@ -289,6 +325,12 @@ void calibrate_light(const LightOptions& options, Console& console) {
     const auto [low, high] = exposures_of(found);
     console.say(fmt::format("the plate's exposure goes from {:.3f} to {:.3f} of its first frame's",
                             low, high));
+  }
+  if (fitted.overlap) {
+    console.say(fmt::format(
+        "directions that both cameras see tell {:.3f} of this gain: with follow = true, say "
+        "overlap = {:.4g}",
+        *fitted.overlap, *fitted.overlap));
   }
   console.say(match);
 }

@@ -154,6 +154,42 @@ TEST_F(CalibrateLight, FindsTheGainFromAGreyCard) {
               HasSubstr("flat.toml:2:"));
 }
 
+// What is around stands in the plate's camera in other light than the card.
+TEST_F(CalibrateLight, TellsWhatBothCamerasSeeOfACardsGain) {
+  constexpr float around = 0.7F;
+  capture::Image plate = capture::read_exr(path("plate.exr"));
+  for (int y = 0; y < plate.height; ++y) {
+    for (int x = y < 20 ? 30 : 0; x < plate.width; ++x) {
+      for (int c = 0; c < 3; ++c) plate.at(y, x, c) *= around;
+    }
+  }
+  capture::write_exr(path("plate.exr"), plate);
+  const std::string card = write("card.toml", "[[patch]]\npixels = [4, 3, 20, 12]\nalbedo = 0.4\n");
+  const Outcome outcome =
+      run_with_figures("calibrate light " + path("set.toml") + " --patches " + card);
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  expect_gain();
+  const double overlap = figures()["overlap"];
+  EXPECT_NEAR(overlap, around, 0.01);
+  EXPECT_THAT(outcome.out, HasSubstr("with follow = true, say overlap = 0."));
+  const std::string set = content_of(path("set.toml"));
+  const auto exposure_with = [&](const std::string& more) {
+    write("follow.toml", set + "match = { gain = [0.9, 0.5, 1.4], follow = true" + more + " }\n" +
+                             "[[object]]\nname = \"ball\"\nmade = \"glass_sphere\"\npose = { "
+                             "position = [0, 5, 1] }\n");
+    const Outcome shown = run_with_figures("run " + path("follow.toml") + " --frames 1");
+    EXPECT_EQ(shown.status, 0) << shown.err;
+    return figures()["match_exposure"].get<double>();
+  };
+  EXPECT_NEAR(exposure_with(""), around, 0.02);
+  EXPECT_NEAR(exposure_with(fmt::format(", overlap = {}", overlap)), 1, 0.02);
+
+  write("follow.toml", set + "match = { gain = [1, 1, 1], overlap = 0.7 }\n");
+  const Outcome fixed = run("check " + path("follow.toml"));
+  EXPECT_THAT(fixed.err, HasSubstr("overlap"));
+  EXPECT_THAT(fixed.err, HasSubstr("is of use only with follow = true"));
+}
+
 TEST_F(CalibrateLight, NamesPatchesThatTellNothing) {
   capture::Image plate = capture::read_exr(path("plate.exr"));
   for (int y = 0; y < 20; ++y) {

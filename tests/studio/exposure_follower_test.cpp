@@ -44,6 +44,15 @@ TEST(ExposureFollower, IsThereAtOnceAfterAStep) {
   }
 }
 
+TEST(ExposureFollower, TakesOutWhatPairsTellOfTheCalibratedExposure) {
+  made::Random random(8);
+  ExposureFollower follower(std::nullopt, 0.8);
+  for (const double truth : {1.0, 1.0, 1.5, 0.6}) {
+    follower.follow(0, follower.level(), made_pairs(0.8 * truth, follower.level(), random));
+    EXPECT_NEAR(follower.level() / truth, 1, 0.01) << truth;
+  }
+}
+
 TEST(ExposureFollower, KeepsUpWithAnExposureThatCreeps) {
   made::Random random(2);
   ExposureFollower follower;
