@@ -36,6 +36,9 @@ using Colour = std::array<double, 3>;
 constexpr std::int64_t default_frames = 25;
 // Frames whose exposures differ by this factor come from a camera that sets its own.
 constexpr double follows_from = 1.03;
+// By what factor a card's gain may differ from that of things far away; a probe that is tilted by
+// thirty degrees has twice that.
+constexpr double most_off_overlap = 1.6;
 
 struct LightOptions {
   std::string set;
@@ -294,6 +297,14 @@ void calibrate_light(const LightOptions& options, Console& console) {
   const std::vector<std::string> untold = untold_patches(patches, collected.pairs);
   found.warnings.insert(found.warnings.begin(), untold.begin(), untold.end());
   if (!collected.doubt.empty()) found.warnings.push_back("the gains are " + collected.doubt);
+  if (const double told = fitted.overlap.value_or(1);
+      told * most_off_overlap < 1 || told > most_off_overlap) {
+    found.warnings.push_back(fmt::format(
+        "directions that both cameras see tell {:.2g} of the patches' gain: the probe or "
+        "the plate's camera looks elsewhere than is said, or a patch has another albedo "
+        "or normal",
+        told));
+  }
   const std::size_t pairs = collected.pairs.size();
   const std::string match = match_line(fitted, collected.exposure_s);
   Json figures{

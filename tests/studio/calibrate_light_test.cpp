@@ -172,6 +172,7 @@ TEST_F(CalibrateLight, TellsWhatBothCamerasSeeOfACardsGain) {
   const double overlap = figures()["overlap"];
   EXPECT_NEAR(overlap, around, 0.01);
   EXPECT_THAT(outcome.out, HasSubstr("with follow = true, say overlap = 0."));
+  EXPECT_THAT(outcome.err, testing::Not(HasSubstr("looks elsewhere")));
   const std::string set = content_of(path("set.toml"));
   const auto exposure_with = [&](const std::string& more) {
     write("follow.toml", set + "match = { gain = [0.9, 0.5, 1.4], follow = true" + more + " }\n" +
@@ -184,6 +185,12 @@ TEST_F(CalibrateLight, TellsWhatBothCamerasSeeOfACardsGain) {
   EXPECT_NEAR(exposure_with(""), around, 0.02);
   EXPECT_NEAR(exposure_with(fmt::format(", overlap = {}", overlap)), 1, 0.02);
 
+  const std::string wrong =
+      write("wrong.toml", "[[patch]]\npixels = [4, 3, 20, 12]\nalbedo = 0.2\n");
+  const Outcome doubtful = run("calibrate light " + path("set.toml") + " --patches " + wrong);
+  EXPECT_EQ(doubtful.status, 0);
+  EXPECT_THAT(doubtful.err, HasSubstr("tell 0.35 of the patches' gain: the probe or the plate's "
+                                      "camera looks elsewhere than is said"));
   write("follow.toml", set + "match = { gain = [1, 1, 1], overlap = 0.7 }\n");
   const Outcome fixed = run("check " + path("follow.toml"));
   EXPECT_THAT(fixed.err, HasSubstr("overlap"));
