@@ -73,7 +73,7 @@ class FeetTracker {
   std::optional<Seen> see(const Feet& feet) const;
   void start(const Seen& seen);
   void predict(double seconds);
-  bool correct(const Seen& seen);
+  bool correct(const Seen& seen, calibrate::Vec2 last, double further);
   Standing standing(FeetStatus status) const;
 
   calibrate::Lens lens_;
@@ -82,6 +82,7 @@ class FeetTracker {
   bool started_ = false;
   double time_s_ = 0;                       // of the last update
   double seen_s_ = 0;                       // when the feet were last followed
+  double looked_s_ = 0;                     // when they were last seen, followed or not
   std::array<double, 4> state_{};           // x, y, their velocities
   std::array<double, 16> covariance_{};     // of the state, row by row
   std::optional<calibrate::Vec2> strange_;  // where they were seen, out of reach

@@ -14,13 +14,15 @@ namespace {
 
 constexpr double acceleration_m_s2 = 30;  // of feet that land
 constexpr double stride_m = 1.2;          // between two feet, sideways in the picture
-constexpr double step_m = 0.45;      // and along the view: that of a foot that overtakes the other
-constexpr double gate = 4;           // standard deviations
-constexpr double strange_s = 0.3;    // so long a place out of reach is not believed
-constexpr double strange_m = 0.6;    // apart, they are not one place
-constexpr double longest_gap_s = 1;  // after it nothing is known of the speed
-constexpr double worst_m = 0.5;      // standard deviation of places worth following
-constexpr double away_m_s = 1;       // how fast what is held becomes uncertain
+constexpr double step_m = 0.55;           // and along the view: of a foot that overtakes the other
+constexpr double picture_s = 0.04;        // both within that time,
+constexpr double reach_m_s = 6;           // and so much further beyond it: some run
+constexpr double gate = 4;                // standard deviations
+constexpr double strange_s = 0.3;         // so long a place out of reach is not believed
+constexpr double strange_m = 0.6;         // apart, they are not one place
+constexpr double longest_gap_s = 1;       // after it nothing is known of the speed
+constexpr double worst_m = 0.5;           // standard deviation of places worth following
+constexpr double away_m_s = 1;            // how fast what is held becomes uncertain
 constexpr double largest_sigma_m = 100;
 constexpr double furthest_m = 1e4;
 
@@ -106,7 +108,7 @@ void FeetTracker::predict(double t) {
 }
 
 // Whether the place was believed.
-bool FeetTracker::correct(const Seen& seen) {
+bool FeetTracker::correct(const Seen& seen, Vec2 last, double further) {
   const Vec2 along = seen.away, across{-along.y, along.x};
   const auto variance = [&](Vec2 v) {
     const auto& p = covariance_;
@@ -115,7 +117,12 @@ bool FeetTracker::correct(const Seen& seen) {
   const auto off = [&](Vec2 v) {
     return v.x * (seen.at.x - state_[0]) + v.y * (seen.at.y - state_[1]);
   };
-  if (std::abs(off(along)) > step_m || std::abs(off(across)) > stride_m) return false;
+  // Feet go on as they went, or have landed.
+  const auto reach = [&](Vec2 v) {
+    const double landed = v.x * (seen.at.x - last.x) + v.y * (seen.at.y - last.y);
+    return std::min(std::abs(off(v)), std::abs(landed));
+  };
+  if (reach(along) > step_m + further || reach(across) > stride_m + further) return false;
   // The other foot: nobody slid there.
   for (const auto& [v, sigma] :
        {std::pair(along, seen.sigma_along), std::pair(across, seen.sigma_across)}) {
@@ -156,12 +163,15 @@ std::optional<Standing> FeetTracker::update(double time_s, const Feet& feet) {
   if (!started_) {
     if (!seen) return std::nullopt;
     start(*seen);
-    time_s_ = seen_s_ = time_s;
+    time_s_ = seen_s_ = looked_s_ = time_s;
     return standing(status);
   }
   if (timed) time_s_ = time_s;
   if (seen) {
     const double gap = time_s - seen_s_;
+    // Beyond what can be reached from picture to picture.
+    const double further = reach_m_s * std::max(0.0, time_s - looked_s_ - picture_s);
+    looked_s_ = time_s;
     const FeetTracker before = *this;
     if (gap > longest_gap_s) {
       start(*seen);
@@ -169,14 +179,14 @@ std::optional<Standing> FeetTracker::update(double time_s, const Feet& feet) {
       return standing(status);
     }
     predict(gap);
-    if (correct(*seen)) {
+    if (correct(*seen, {before.state_[0], before.state_[1]}, further)) {
       strange_.reset();
       seen_s_ = time_s;
       return standing(status);
     }
     *this = before;
     status = FeetStatus::uncertain;
-    if (!strange_ || apart(*strange_, seen->at) > strange_m) strange_since_s_ = time_s;
+    if (!strange_ || apart(*strange_, seen->at) > strange_m + further) strange_since_s_ = time_s;
     strange_ = seen->at;
     if (time_s - strange_since_s_ >= strange_s) {
       start(*seen);

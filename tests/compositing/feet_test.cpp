@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <iostream>
-#include <limits>
 #include <random>
 
 #include "capture/camera.h"
@@ -210,59 +209,6 @@ TEST(Feet, AreFiniteWhateverTheMatteHolds) {
     ASSERT_TRUE(std::isfinite(feet.sigma_px));
     for (const float edge : feet.box) ASSERT_TRUE(std::isfinite(edge));
   }
-}
-
-TEST(FeetTracker, IsFiniteForShallowViewsAndHostileFeet) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (const double height : {0.0, 1e-9, 0.01, 0.3, 1.5, -1.0, 300.0}) {
-    FeetTracker tracker(pinhole_lens(), calibrate::look_at({0, 0, height}, {0, 5, height}, 0), 0);
-    std::mt19937 random(5);
-    for (int i = 0; i < 500; ++i) {
-      Feet feet;
-      feet.status = static_cast<FeetStatus>(random() % 4);
-      feet.q = {static_cast<double>(random() % 1400) - 50, static_cast<double>(random() % 800)};
-      feet.sigma_px = i % 7 ? 0.3 : nan;
-      if (i % 11 == 0) feet.q.x = nan;
-      const auto standing = tracker.update(i % 13 ? 0.04 * (i % 200) : nan, feet);
-      if (!standing) continue;
-      ASSERT_TRUE(std::isfinite(standing->p_set.x) && std::isfinite(standing->p_set.y));
-      ASSERT_TRUE(std::isfinite(standing->sigma_m) && standing->sigma_m >= 0);
-      ASSERT_EQ(standing->p_set.z, 0);
-    }
-  }
-}
-
-// From 1.5 m above the floor, and from 1.5 cm, where a pixel is metres of floor.
-TEST(FeetTracker, SaysHowUncertainAndRefusesWhatItCannotTell) {
-  Feet feet{{639.5, 500}, 0.3, FeetStatus::seen, {}};
-  const MadeView view = made_view(pinhole_lens());
-  FeetTracker high(view.lens, view.cam_from_set, 0);
-  const auto seen = high.update(0, feet);
-  ASSERT_TRUE(seen);
-  EXPECT_GT(seen->sigma_m, 0.001);
-  EXPECT_LT(seen->sigma_m, 0.02);
-  FeetTracker low(view.lens, calibrate::look_at({0, 0, 0.015}, {0, 5, 0.015}, 0), 0);
-  feet.q.y = 361;
-  EXPECT_FALSE(low.update(0, feet));
-  feet.q.y = 300;  // above the horizon
-  EXPECT_FALSE(high.update(0.04, feet)->status == FeetStatus::seen);
-}
-
-TEST(FeetTracker, IgnoresAGlimpseOfAnotherPlaceAndFollowsThereIfItStays) {
-  const MadeView view = made_view(pinhole_lens());
-  FeetTracker tracker(view.lens, view.cam_from_set, 0);
-  const auto at = [&](double y) {
-    return Feet{*project(view.lens, view.cam_from_set * Vec3{0, y, 0}), 0.3, FeetStatus::seen, {}};
-  };
-  double t = 0;
-  for (; t < 0.4; t += frame_s) tracker.update(t, at(6));
-  const auto glimpse = tracker.update(t, at(3.5));
-  EXPECT_TRUE(glimpse->held);
-  EXPECT_NEAR(glimpse->p_set.y, 6, 0.01);
-  std::optional<Standing> standing;
-  for (const double end = t + 0.5; t < end; t += frame_s) standing = tracker.update(t, at(3.5));
-  EXPECT_FALSE(standing->held);
-  EXPECT_NEAR(standing->p_set.y, 3.5, 0.01);
 }
 
 // The lowest row of the front foot, and its left and right, read off enlarged frames by eye.
