@@ -16,6 +16,8 @@ namespace {
 
 constexpr double widest_turn_rad = 1.3;
 constexpr double furthest = 20;      // times the camera's distance
+constexpr double most_nearer_m = 1;  // for the lower edges: two feet stand no further apart
+constexpr double least_away = 0.2;   // of what it was
 constexpr double straight_m = 1e-3;  // what is nearer than this to the vertical has no azimuth
 
 std::optional<double> azimuth(Vec3 from, Vec3 to) {
@@ -50,7 +52,8 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
                                               Vec3 standing,
                                               const std::array<float, 4>& box,
                                               Vec3 viewer,
-                                              double turn_rad) {
+                                              double turn_rad,
+                                              std::span<const Vec2> lower) {
   const Vec3 camera = calibrate::position_of(cam_from_set);
   if (!is_finite(camera) || !is_finite(standing) || !is_finite(viewer)) return std::nullopt;
   if (!std::isfinite(turn_rad) || !(box[2] > box[0]) || !(box[3] > box[1])) return std::nullopt;
@@ -66,16 +69,25 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
   const Vec3 front{std::cos(facing.azimuth_rad), std::sin(facing.azimuth_rad), 0},
       across{-front.y, front.x, 0};
 
-  const double away = dot(camera - standing, front);
   const double distance = calibrate::hypotenuse(camera.x - standing.x, camera.y - standing.y);
   const calibrate::Mat3 set_from_cam = cam_from_set.R.transposed();
+  const double through_standing = dot(camera - standing, front);
+  double away = through_standing;
+  for (const auto& v_cam : calibrate::unproject_all(lens, lower)) {
+    if (!v_cam) continue;
+    const Vec3 v = set_from_cam * *v_cam;
+    const double k = (standing.z - camera.z) / v.z;
+    if (k > 0 && k < furthest * distance) away = std::min(away, -k * dot(v, front));
+  }
+  away = std::max({away, through_standing - most_nearer_m, least_away * through_standing});
+  const Vec3 foot = standing + (through_standing - away) * front;  // of the plane, on the floor
   Extent extent;
   for (const auto& v_cam : calibrate::unproject_all(lens, outline(box))) {
     if (!v_cam) continue;
     const Vec3 v = set_from_cam * *v_cam;
     const double k = -away / dot(v, front);
     if (!(k > 0 && k < furthest * distance)) continue;
-    const Vec3 p = camera + k * v - standing;
+    const Vec3 p = camera + k * v - foot;
     const double x = dot(p, across);
     extent.left = std::min(extent.left, x);
     extent.right = std::max(extent.right, x);
@@ -86,7 +98,7 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
   if (!(extent.right > extent.left && extent.high > extent.low)) return std::nullopt;
 
   const double wide = extent.right - extent.left, middle = 0.5 * (extent.left + extent.right);
-  const Vec3 at = standing + middle * across + Vec3{0, 0, extent.low};
+  const Vec3 at = foot + middle * across + Vec3{0, 0, extent.low};
   const auto f = [](double value) { return static_cast<float>(value); };
   place.set_from_object = {f(wide * across.x),
                            f(-front.x),

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
@@ -22,6 +23,8 @@ struct BillboardPlace {
 // that the part `box` (left, top, right, bottom in pixels of the lens's picture) of that camera's
 // picture falls on it, never below the floor. What falls further away than 20 times the camera's
 // distance is left out. A viewer straight above counts as the person's camera.
+// `lower`: pixels (Feet::lower) that are not to fall below the floor either: the rectangle comes
+// nearer to the camera for them, by at most 1 m, which changes nothing in that camera's view.
 // Nothing if the box is empty or falls wholly below the floor or behind, if the camera is straight
 // above, or anything is not finite.
 std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
@@ -29,7 +32,8 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
                                               calibrate::Vec3 standing,
                                               const std::array<float, 4>& box,
                                               calibrate::Vec3 viewer,
-                                              double turn_rad);
+                                              double turn_rad,
+                                              std::span<const calibrate::Vec2> lower = {});
 
 // An upright thing that turns to a viewer: azimuths about the vertical, of any one sense and zero.
 struct Facing {

@@ -258,6 +258,57 @@ void refine(Feet& feet, const Field& alpha, const Field& body, const End& end, d
   }
 }
 
+// Takes an end's own rows off the body, up to where it meets another one.
+void take_off(Field& body, const End& end) {
+  const auto rows =
+      std::min(static_cast<std::size_t>(end.free > 0 ? end.free : end.length), end.middles.size());
+  for (std::size_t row = 0; row < rows; ++row) {
+    const double half = 0.5 * (end.widths[row] - 1);
+    const int y = end.y - static_cast<int>(row);
+    const int left = static_cast<int>(end.middles[row] - half),
+              right = static_cast<int>(end.middles[row] + half);
+    for (int x = left; x <= right; ++x) body.at(y, x) = 0;
+  }
+}
+
+// Corners of the body's lower convex hull, from left to right: Andrew, "Another Efficient Algorithm
+// for Convex Hulls in Two Dimensions", Information Processing Letters 9, 1979. To parts of a pixel
+// as refine() has it.
+std::vector<calibrate::Vec2> lower_hull(const Field& alpha, const Field& body, double tall) {
+  constexpr int rows = 3;
+  const int wide = std::max(1, static_cast<int>(std::lround(0.004 * tall)));
+  std::vector<double> edges;
+  for (int x = 0; x < body.width; ++x) {
+    int y = body.height - 1;
+    while (y >= 0 && body.at(y, x) == 0) --y;
+    double edge = y - 0.5;
+    for (int v = y; y >= 0 && v <= std::min(body.height - 1, y + rows); ++v) edge += alpha.at(v, x);
+    edges.push_back(edge);
+  }
+  std::vector<calibrate::Vec2> hull;
+  for (int x = 0; x < body.width; ++x) {
+    const double own = edges[static_cast<std::size_t>(x)];
+    if (own < 0) continue;
+    // The mean of what lies beside, not of another height.
+    double sum = 0;
+    int n = 0;
+    for (int u = std::max(0, x - wide); u <= std::min(body.width - 1, x + wide); ++u) {
+      const double edge = edges[static_cast<std::size_t>(u)];
+      if (std::abs(edge - own) > rows) continue;
+      sum += edge;
+      ++n;
+    }
+    const calibrate::Vec2 q{static_cast<double>(x), sum / n};
+    const auto is_above = [&] {
+      const calibrate::Vec2 a = hull[hull.size() - 2], b = hull.back();
+      return (b.x - a.x) * (q.y - a.y) >= (q.x - a.x) * (b.y - a.y);
+    };
+    while (hull.size() > 1 && is_above()) hull.pop_back();
+    hull.push_back(q);
+  }
+  return hull;
+}
+
 std::array<float, 4> box_of(const Field& alpha, std::size_t person) {
   std::array<float, 4> box{1e9F, 1e9F, -1, -1};
   for (const Part& part : parts_of(alpha, faint)) {
@@ -349,7 +400,7 @@ Feet find_feet(const capture::Image& image) {
   const Part* person = largest(near_parts);
   const double tall = person->bottom - person->top + 1;
 
-  const Body body = body_of(*person, alpha.height, alpha.width);
+  Body body = body_of(*person, alpha.height, alpha.width);
   std::vector<End> ends = ends_of(body.mask, end_h * tall);
   feet.status = FeetStatus::uncertain;
   feet.q = {0.5 * (found->left + found->right), found->bottom + 0.5};
@@ -381,6 +432,11 @@ Feet find_feet(const capture::Image& image) {
   } else if (sure && persons == 1) {
     feet.status = FeetStatus::seen;
   }
+  if (!sure) return feet;
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    if (i < chosen || doubted(ends[i])) take_off(body.mask, ends[i]);
+  feet.lower = lower_hull(alpha, body.mask, tall);
+  for (auto& q : feet.lower) q = {q.x + from_x, q.y + from_y - feet.sigma_px};
   return feet;
 }
 

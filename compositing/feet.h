@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "calibrate/lens.h"
 #include "calibrate/pose.h"
@@ -28,6 +29,9 @@ struct Feet {
   // Edges of what belongs to the person, things in hands too: left, top, right, bottom in pixels of
   // the matte; all 0 if absent.
   std::array<float, 4> box{};
+  // Lower convex hull of what stands, both feet and what hangs beside them no lower: corners from
+  // left to right, pixels of the matte, a sigma above its edge. Empty if no end is surely a foot.
+  std::vector<calibrate::Vec2> lower{};
 };
 
 // Finds the feet in a matte: alpha (height, width, 1), may be smaller than the video. The person

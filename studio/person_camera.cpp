@@ -53,7 +53,11 @@ void enlarge(std::array<float, 4>& box, int shrink) {
 
 Feet enlarged(Feet feet, int shrink) {
   const double times = shrink;
-  feet.q = {(feet.q.x + 0.5) * times - 0.5, (feet.q.y + 0.5) * times - 0.5};
+  const auto enlarge_place = [&](calibrate::Vec2& q) {
+    q = {(q.x + 0.5) * times - 0.5, (q.y + 0.5) * times - 0.5};
+  };
+  enlarge_place(feet.q);
+  std::ranges::for_each(feet.lower, enlarge_place);
   feet.sigma_px *= times;
   enlarge(feet.box, shrink);
   return feet;

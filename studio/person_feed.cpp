@@ -60,8 +60,9 @@ struct PersonFeed::Person {
     std::string_view unsure_for{};  // why its key is; "" = it is not
     bool told_clipped = false;
     bool moved = false;
-    bool late = false;                    // its picture is not of this moment
-    std::optional<capture::Time> well{};  // since when, of one that was left out
+    bool late = false;                     // its picture is not of this moment
+    std::optional<capture::Time> well{};   // since when, of one that was left out
+    std::vector<calibrate::Vec2> lower{};  // edge of the feet; held as their place is
     bool is_out() const { return out_for != nullptr; }
     const char* out_for = nullptr;  // why it is left out
   };
@@ -259,6 +260,9 @@ void PersonFeed::show(Person& person, std::size_t index) {
   }
   camera.moved = moved.has_value();
   if (index == 0) stand(person);
+  const compositing::Feet& feet = camera.feed.feet();
+  const bool held = person.standing && person.standing->held;
+  if (!held || feet.status == FeetStatus::cut_off) camera.lower = feet.lower;
 }
 
 void PersonFeed::stand(Person& person) {
@@ -419,8 +423,10 @@ void PersonFeed::place_billboard(Person& person, Vec3 viewer) {
   auto& place = person.frame.places[index];
   if (camera.lens) {
     const std::array<float, 4> box = feed.person_box();
-    const auto placed = compositing::place_billboard(*camera.lens, camera.cam_from_set,
-                                                     status.position, box, viewer, s.turn_rad);
+    const std::vector<calibrate::Vec2> none;
+    const auto placed = compositing::place_billboard(
+        *camera.lens, camera.cam_from_set, status.position, box, viewer, s.turn_rad,
+        s.by_feet ? person.cameras[index].lower : none);
     if (!placed) {
       const bool nobody = !(box[2] > box[0] && box[3] > box[1]);
       if (nobody) return;  // nothing is to be seen of it, wherever it is

@@ -5,7 +5,9 @@
 
 #include <limits>
 #include <numbers>
+#include <vector>
 
+#include "compositing/feet.h"
 #include "compositing/made_walker.h"
 
 namespace compositing::billboard_place_test {
@@ -80,6 +82,48 @@ TEST(PlaceBillboard, TurnsToTheViewerAsFarAsAskedAndSaysWhenThatIsTooLittle) {
     const double turned = std::remainder(std::atan2(n.y, n.x) - camera_at, 2 * std::numbers::pi);
     EXPECT_NEAR(turned, std::clamp(off, -0.45, 0.45), 1e-5);
   }
+}
+
+// Across the picture, with the feet up to a step apart: none of both falls below the floor, and the
+// person's own camera sees the same.
+TEST(PlaceBillboard, CutsNoFootOffHoweverItTurns) {
+  const MadeView view = made_view(pinhole_lens());
+  const MadeWalker walker{{-1.8, 4.5, 0}, {1, 0, 0}};
+  const Vec3 camera = view.camera();
+  for (const double t : {0.2, 0.36, 1.3, 2.4}) {
+    const Feet feet = find_feet(matte_of(view, walker, t));
+    ASSERT_EQ(feet.status, FeetStatus::seen) << t;
+    FeetTracker tracker(view.lens, view.cam_from_set, 0);
+    const Vec3 stands = tracker.update(t, feet)->p_set;
+    for (const double degrees : {-60.0, -30.0, 0.0, 15.0, 30.0}) {
+      const double angle = degrees * std::numbers::pi / 180;
+      const Vec3 viewer = stands + Vec3{4.5 * std::sin(angle), -4.5 * std::cos(angle), 1.5};
+      const auto place = place_billboard(view.lens, view.cam_from_set, stands, feet.box, viewer,
+                                         std::numbers::pi / 6, feet.lower);
+      ASSERT_TRUE(place);
+      const Vec3 n = front(*place), on_plane = at(*place, 0, 0);
+      for (const int side : {0, 1}) {
+        const MadeFoot foot = walker.foot(side, walker.speed_m_s * t);
+        for (const Vec3 centre : {foot.heel, foot.toe}) {
+          const Vec3 v = centre - Vec3{0, 0, foot_radius_m} - camera;
+          const double k = dot(on_plane - camera, n) / dot(v, n);
+          EXPECT_GT(camera.z + k * v.z, -0.01) << t << ' ' << degrees;
+        }
+      }
+      // No further forward than the other foot asks for.
+      EXPECT_LT(dot(on_plane - stands, n), walker.step_m) << t << ' ' << degrees;
+      EXPECT_GT(dot(on_plane - stands, n), -1e-5) << t << ' ' << degrees;
+    }
+  }
+}
+
+TEST(PlaceBillboard, ComesNoMoreThanAMetreNearerForWhatHangsLow) {
+  const MadeView view = made_view(pinhole_lens());
+  const std::vector<Vec2> low{{600, 519}, {700, 710}};
+  const auto place =
+      place_billboard(view.lens, view.cam_from_set, standing, box, view.camera(), 0.5, low);
+  ASSERT_TRUE(place);
+  EXPECT_NEAR(dot(at(*place, 0, 0) - standing, front(*place)), 1, 1e-5);
 }
 
 TEST(PlaceBillboard, GivesNothingForWhatHasNoPlaceAndNeverNaN) {

@@ -112,7 +112,15 @@ TEST(Feet, StayOnTheFloorWalkingAcrossThePicture) {
   }
 }
 
-// The walker's matte, with an axe hanging from his hand to below his feet.
+// From the hand of a walker whose body is there, to below his feet in the picture.
+void hang_axe(capture::Image& matte, const MadeView& view, Vec3 body) {
+  const Vec3 head = body + Vec3{0.55, -0.75, 0.3};
+  draw(matte, view,
+       {{body + Vec3{-0.1, -0.2, 0.85}, head, 0.03},
+        {head, head + Vec3{0.05, 0, -0.2}, 0.08},
+        {head + Vec3{0.05, 0, -0.2}, head + Vec3{0.06, 0, -0.28}, 0.05}});
+}
+
 TEST(Feet, AreNotTheAxeThatHangsLower) {
   const MadeView view = made_view(pinhole_lens());
   const MadeWalker walker{{0, 5, 0}};
@@ -120,12 +128,7 @@ TEST(Feet, AreNotTheAxeThatHangsLower) {
   for (double t = 0; t < 1.2; t += 0.12) {
     capture::Image matte = matte_of(view, walker, t);
     const Feet without = find_feet(matte);
-    const Vec3 body = walker.start + 1.2 * t * walker.way;
-    const Vec3 head = body + Vec3{0.55, -0.75, 0.3};
-    draw(matte, view,
-         {{body + Vec3{-0.1, -0.2, 0.85}, head, 0.03},
-          {head, head + Vec3{0.05, 0, -0.2}, 0.08},
-          {head + Vec3{0.05, 0, -0.2}, head + Vec3{0.06, 0, -0.28}, 0.05}});
+    hang_axe(matte, view, walker.start + 1.2 * t * walker.way);
     const Feet with = find_feet(matte);
     ASSERT_GT(with.box[3], without.box[3] + 20) << t;  // it does hang lower
     if (with.status != FeetStatus::seen) continue;
@@ -196,6 +199,37 @@ TEST(Feet, OfTwoPersonsAreUncertainAndStayBetweenThem) {
   EXPECT_GT(uncertain, 8);
 }
 
+// Both feet end on the lower edge or above it, but for a pixel; the axe hangs below it.
+TEST(Feet, HaveALowerEdgeThatHoldsBothAndNotTheAxe) {
+  const MadeView view = made_view(pinhole_lens());
+  for (const Vec3 way : {Vec3{1, 0, 0}, Vec3{0, -1, 0}, Vec3{-0.6, -0.8, 0}}) {
+    const MadeWalker walker{{0, 5, 0}, way};
+    for (double t = 0; t < 1.1; t += 0.12) {
+      capture::Image matte = matte_of(view, walker, t);
+      if (way.x == 0) hang_axe(matte, view, walker.start + 1.2 * t * walker.way);
+      const Feet feet = find_feet(matte);
+      if (feet.status != FeetStatus::seen) continue;
+      ASSERT_GE(feet.lower.size(), 2U);
+      const auto edge_at = [&](double x) {
+        for (std::size_t i = 1; i < feet.lower.size(); ++i) {
+          const Vec2 a = feet.lower[i - 1], b = feet.lower[i];
+          if (x <= b.x) return a.y + (b.y - a.y) * (x - a.x) / (b.x - a.x);
+        }
+        return feet.lower.back().y;
+      };
+      for (const int side : {0, 1}) {
+        const MadeFoot foot = walker.foot(side, 1.2 * t);
+        for (const Vec3 centre : {foot.heel, foot.toe}) {
+          const auto q =
+              project(view.lens, view.cam_from_set * (centre - Vec3{0, 0, foot_radius_m}));
+          EXPECT_GT(edge_at(q->x), q->y - 1.5) << way.x << ' ' << t;
+        }
+      }
+      for (const Vec2 q : feet.lower) EXPECT_LT(q.y, feet.q.y + 1) << way.x << ' ' << t;
+    }
+  }
+}
+
 TEST(Feet, AreFiniteWhateverTheMatteHolds) {
   std::mt19937 random(3);
   const std::array<float, 8> values{0, 1, 0.5F, -7, 1e30F, std::nanf(""), INFINITY, -INFINITY};
@@ -208,6 +242,7 @@ TEST(Feet, AreFiniteWhateverTheMatteHolds) {
     ASSERT_TRUE(std::isfinite(feet.q.x) && std::isfinite(feet.q.y));
     ASSERT_TRUE(std::isfinite(feet.sigma_px));
     for (const float edge : feet.box) ASSERT_TRUE(std::isfinite(edge));
+    for (const Vec2 q : feet.lower) ASSERT_TRUE(std::isfinite(q.x) && std::isfinite(q.y));
   }
 }
 

@@ -244,6 +244,27 @@ TEST_F(PersonSetTest, StandsWhereItsFeetAreAndIsSeenThere) {
   EXPECT_TRUE(show.status()->notes.empty()) << show.status()->notes.front();
 }
 
+// From the side the board's two feet are .36 m apart: the plane is before both.
+TEST_F(PersonSetTest, StandsBeforeBothFeetHoweverItTurns) {
+  for (const double side : {-3.0, 3.0}) {
+    Set set = made_set("grey:4,25,0", walker);
+    set.camera.pose.cam_from_set = calibrate::look_at({side, -6.5, 1.5}, feet_at(0), 0);
+    Show show(set);
+    int frame = 0;
+    show.run([&](const ShownFrame& shown) {
+      const auto& m = shown.prepared.scene->description().instances.back().set_from_object;
+      const calibrate::Vec3 front{-m[1], -m[5], 0}, on_plane{m[3], m[7], 0};
+      const calibrate::Vec3 feet = feet_at(frame++);
+      for (const double aside : {-0.18, 0.18}) {
+        const calibrate::Vec3 foot = feet + calibrate::Vec3{aside, 0, 0};
+        EXPECT_LT(dot(foot - on_plane, front), 0.02) << side;
+        EXPECT_GT(dot(foot - on_plane, front), -0.3) << side;
+      }
+    });
+    EXPECT_EQ(frame, 4);
+  }
+}
+
 // From one frame to the next it is .8 m away.
 TEST_F(PersonSetTest, StandsAtOnceWhereItsFeetAreWhenItsClipBeginsAgain) {
   std::string looped = walker;
