@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 namespace compositing {
@@ -309,6 +311,15 @@ std::vector<calibrate::Vec2> lower_hull(const Field& alpha, const Field& body, d
   return hull;
 }
 
+// Whether a mask begins just below a run of pixels; an empty mask does not.
+bool ends_at(const Field& mask, int y, int left, int right) {
+  constexpr int rows = 3;
+  for (int v = y; v <= std::min(mask.height - 1, y + rows); ++v)
+    for (int x = std::max(0, left - 1); x <= std::min(mask.width - 1, right + 1); ++x)
+      if (mask.at(v, x) >= faint) return true;
+  return false;
+}
+
 std::array<float, 4> box_of(const Field& alpha, std::size_t person) {
   std::array<float, 4> box{1e9F, 1e9F, -1, -1};
   for (const Part& part : parts_of(alpha, faint)) {
@@ -374,15 +385,9 @@ std::string_view name_of(FeetStatus status) {
   return "absent";
 }
 
-Feet find_feet(const capture::Image& image) {
-  if (image.empty()) return {};
-  if (image.channels != 1 || image.height < 0 || image.width < 0 ||
-      image.pixels.size() !=
-          static_cast<std::size_t>(image.height) * static_cast<std::size_t>(image.width)) {
-    throw std::invalid_argument("find_feet: the matte must be (height, width, 1)");
-  }
-  Field whole{image.height, image.width, image.pixels};
-  for (float& a : whole.of) a = std::isfinite(a) ? std::clamp(a, 0.0F, 1.0F) : 0.0F;
+namespace {
+
+Feet find_upright(const Field& whole, const Field& mask) {
   const auto parts = parts_of(whole, solid);
   const Part* found = largest(parts);
   Feet feet;
@@ -429,6 +434,8 @@ Feet find_feet(const capture::Image& image) {
   if (end.y + from_y >= whole.height - 1) {
     feet.status = FeetStatus::cut_off;
     feet.q.y = whole.height - 0.5;
+  } else if (ends_at(mask, end.y + from_y, end.left + from_x, end.right + from_x)) {
+    feet.status = FeetStatus::cut_off;
   } else if (sure && persons == 1) {
     feet.status = FeetStatus::seen;
   }
@@ -438,6 +445,63 @@ Feet find_feet(const capture::Image& image) {
   feet.lower = lower_hull(alpha, body.mask, tall);
   for (auto& q : feet.lower) q = {q.x + from_x, q.y + from_y - feet.sigma_px};
   return feet;
+}
+
+Field field_of(const capture::Image& image, const char* what) {
+  if (image.channels != 1 || image.height < 0 || image.width < 0 ||
+      image.pixels.size() !=
+          static_cast<std::size_t>(image.height) * static_cast<std::size_t>(image.width)) {
+    throw std::invalid_argument(std::string("find_feet: the ") + what +
+                                " must be (height, width, 1)");
+  }
+  Field field{image.height, image.width, image.pixels};
+  for (float& a : field.of) a = std::isfinite(a) ? std::clamp(a, 0.0F, 1.0F) : 0.0F;
+  return field;
+}
+
+// A quarter turn to the right.
+Field turned(const Field& field) {
+  Field to{field.width, field.height, std::vector<float>(field.of.size())};
+  for (int y = 0; y < field.height; ++y)
+    for (int x = 0; x < field.width; ++x) to.at(x, field.height - 1 - y) = field.at(y, x);
+  return to;
+}
+
+// And back: what was found in a picture that was turned from one of that height.
+Feet turned_back(Feet feet, int height) {
+  const auto back = [&](calibrate::Vec2& q) { q = {q.y, height - 1 - q.x}; };
+  back(feet.q);
+  std::ranges::for_each(feet.lower, back);
+  const auto below = static_cast<float>(height - 1);
+  const auto [left, top, right, bottom] = feet.box;
+  feet.box = {top, below - right, bottom, below - left};
+  return feet;
+}
+
+}  // namespace
+
+Feet find_feet(const capture::Image& image, int turns, const capture::Image& mask) {
+  if (image.empty()) return {};
+  Field alpha = field_of(image, "matte"), masked;
+  if (!mask.empty()) masked = field_of(mask, "mask");
+  if (!mask.empty() && (mask.height != image.height || mask.width != image.width))
+    throw std::invalid_argument("find_feet: the mask must be of the matte's size");
+  std::vector<int> heights;  // before each turn
+  for (int i = 0; i < (turns % 4 + 4) % 4; ++i) {
+    heights.push_back(alpha.height);
+    alpha = turned(alpha);
+    masked = turned(masked);
+  }
+  Feet feet = find_upright(alpha, masked);
+  if (feet.status == FeetStatus::absent) return feet;
+  for (; !heights.empty(); heights.pop_back()) feet = turned_back(std::move(feet), heights.back());
+  return feet;
+}
+
+int turns_to_upright(const calibrate::Pose& cam_from_set) {
+  const calibrate::Vec3 down = cam_from_set.R * calibrate::Vec3{0, 0, -1};
+  const double quarters = std::atan2(down.x, down.y) / (std::numbers::pi / 2);
+  return std::isfinite(quarters) ? (static_cast<int>(std::lround(quarters)) + 4) % 4 : 0;
 }
 
 }  // namespace compositing

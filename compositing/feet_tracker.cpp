@@ -3,6 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calibrate/angles.h"
 #include "compositing/feet.h"
 
 namespace compositing {
@@ -14,7 +15,7 @@ namespace {
 
 constexpr double acceleration_m_s2 = 30;  // of feet that land
 constexpr double stride_m = 1.2;          // between two feet, sideways in the picture
-constexpr double step_m = 0.55;           // and along the view: of a foot that overtakes the other
+constexpr double step_m = 0.55;            // and along the view: of a foot that overtakes the other
 constexpr double picture_s = 0.04;        // both within that time,
 constexpr double reach_m_s = 6;           // and so much further beyond it: some run
 constexpr double gate = 4;                // standard deviations
@@ -25,6 +26,10 @@ constexpr double worst_m = 0.5;           // standard deviation of places worth 
 constexpr double away_m_s = 1;            // how fast what is held becomes uncertain
 constexpr double largest_sigma_m = 100;
 constexpr double furthest_m = 1e4;
+// What is lowest in the picture is a foot: one that is seen from further above in 8 % of places is
+// off by more than 0.2 m (billboards.md).
+constexpr double steepest_rad = 45 * calibrate::degree;
+constexpr double most_lean_rad = 25 * calibrate::degree;
 
 // Where the pixel's ray meets the floor before the camera.
 std::optional<Vec2> on_floor(const calibrate::Lens& lens,
@@ -52,6 +57,19 @@ FeetTracker::FeetTracker(const calibrate::Lens& lens,
       std::ranges::all_of(set_from_cam_.R.m, [](double v) { return std::isfinite(v); });
   if (!turns || !is_finite(set_from_cam_.t) || !std::isfinite(floor_z))
     throw std::invalid_argument("FeetTracker: pose or floor is not finite");
+  constexpr std::array<Vec2, 4> down{{{0, 1}, {1, 0}, {0, -1}, {-1, 0}}};
+  down_ = down[static_cast<std::size_t>(turns_to_upright(cam_from_set))];
+}
+
+bool FeetTracker::is_doubted(Vec2 q, Vec3 v_cam) const {
+  const Vec3 v = set_from_cam_.R * v_cam;
+  if (-v.z > std::sin(steepest_rad) * length(v)) return true;
+  const Vec3 lower_cam = v_cam + set_from_cam_.R.transposed() * Vec3{0, 0, -1e-3};
+  const auto lower = calibrate::project(lens_, lower_cam);
+  if (!lower) return true;
+  const Vec2 step{lower->x - q.x, lower->y - q.y};
+  const double along = step.x * down_.x + step.y * down_.y;
+  return !(along > std::cos(most_lean_rad) * calibrate::hypotenuse(step.x, step.y));
 }
 
 std::optional<FeetTracker::Seen> FeetTracker::see(const Feet& feet) const {
@@ -59,10 +77,11 @@ std::optional<FeetTracker::Seen> FeetTracker::see(const Feet& feet) const {
   if (!std::isfinite(feet.q.x) || !std::isfinite(feet.q.y)) return std::nullopt;
   const double sigma_px = std::isfinite(feet.sigma_px) ? std::max(feet.sigma_px, 0.05) : 1;
   const auto at = on_floor(lens_, set_from_cam_, floor_z_, feet.q);
-  const auto below =
-      on_floor(lens_, set_from_cam_, floor_z_, {feet.q.x, feet.q.y + 0.5 * sigma_px});
-  const auto beside =
-      on_floor(lens_, set_from_cam_, floor_z_, {feet.q.x + 0.5 * sigma_px, feet.q.y});
+  const double half = 0.5 * sigma_px;
+  const auto below = on_floor(lens_, set_from_cam_, floor_z_,
+                              {feet.q.x + half * down_.x, feet.q.y + half * down_.y});
+  const auto beside = on_floor(lens_, set_from_cam_, floor_z_,
+                               {feet.q.x + half * down_.y, feet.q.y - half * down_.x});
   if (!at || !below || !beside) return std::nullopt;
   Seen seen{*at, {at->x - set_from_cam_.t.x, at->y - set_from_cam_.t.y}};
   const double ground = calibrate::hypotenuse(seen.away.x, seen.away.y);
@@ -72,6 +91,7 @@ std::optional<FeetTracker::Seen> FeetTracker::see(const Feet& feet) const {
   seen.sigma_along = std::max(2 * apart(*at, *below), least_m);
   seen.sigma_across = std::max(2 * apart(*at, *beside), least_m);
   if (!(seen.sigma_along < worst_m && seen.sigma_across < worst_m)) return std::nullopt;
+  seen.doubted = is_doubted(feet.q, *calibrate::unproject(lens_, feet.q));
   return seen;
 }
 
@@ -157,8 +177,8 @@ std::optional<Standing> FeetTracker::update(double time_s, const Feet& feet) {
   const bool timed = std::isfinite(time_s);
   const auto seen = timed ? see(feet) : std::nullopt;
   // Feet that were seen, but of which this camera cannot tell where on the floor they are.
-  FeetStatus status =
-      feet.status == FeetStatus::seen && !seen ? FeetStatus::uncertain : feet.status;
+  const bool unsure = feet.status == FeetStatus::seen && (!seen || seen->doubted);
+  FeetStatus status = unsure ? FeetStatus::uncertain : feet.status;
   if (timed && started_ && time_s < time_s_) time_s_ = time_s, restart();
   if (!started_) {
     if (!seen) return std::nullopt;
@@ -191,7 +211,7 @@ std::optional<Standing> FeetTracker::update(double time_s, const Feet& feet) {
     if (time_s - strange_since_s_ >= strange_s) {
       start(*seen);
       seen_s_ = time_s;
-      return standing(FeetStatus::seen);
+      return standing(seen->doubted ? FeetStatus::uncertain : FeetStatus::seen);
     }
   }
   Standing held = standing(status);

@@ -46,6 +46,10 @@ capture::Image matte_of(const compositing::KeyedFrame& keyed, int shrink) {
   return matte;
 }
 
+int shrink_of(int height, int width) {
+  return std::max(1, (std::max(height, width) + matte_side - 1) / matte_side);
+}
+
 // From pixels of the matte to those of the picture.
 void enlarge(std::array<float, 4>& box, int shrink) {
   for (float& edge : box) edge = (edge + 0.5F) * static_cast<float>(shrink) - 0.5F;
@@ -182,6 +186,23 @@ void PersonCameraFeed::check_length() const {
                   shots_of_plate, settings_.source, std::max<std::int64_t>(left, 0)));
 }
 
+// As matte_of() has the matte.
+void PersonCameraFeed::keep_garbage(const compositing::KeyMasks& masks) {
+  if (masks.garbage.empty() || !settings_.lens) return;
+  const capture::CameraInfo& info = source_->info();
+  const int shrink = shrink_of(info.height, info.width);
+  garbage_ =
+      capture::make_image(std::max(1, info.height / shrink), std::max(1, info.width / shrink), 1);
+  const float part = 1 / (255 * static_cast<float>(shrink * shrink));
+  const auto row = static_cast<std::size_t>(info.width);
+  for (int y = 0; y < std::min(garbage_.height * shrink, info.height); ++y) {
+    for (int x = 0; x < std::min(garbage_.width * shrink, info.width); ++x) {
+      const std::size_t i = static_cast<std::size_t>(y) * row + static_cast<std::size_t>(x);
+      garbage_.at(y / shrink, x / shrink) += part * static_cast<float>(masks.garbage[i]);
+    }
+  }
+}
+
 void PersonCameraFeed::make_keyer(const compositing::CleanPlate& plate,
                                   compositing::KeyMasks masks) {
   keyer_ = std::make_unique<compositing::Keyer>(plate, settings_.key->settings, std::move(masks));
@@ -194,10 +215,13 @@ void PersonCameraFeed::begin_key(const VideoSource& source, const PersonCameraFe
   by_texel_ = key.by_texel && !options_.needs_matte;
   if (!key.takes_plate) {
     const auto plate = read_plate(source, shown);
-    make_keyer(plate, read_key_masks(key.masks, info.width, info.height, shown));
+    auto masks = read_key_masks(key.masks, info.width, info.height, shown);
+    keep_garbage(masks);
+    make_keyer(plate, std::move(masks));
     return;
   }
   masks_ = read_key_masks(key.masks, info.width, info.height, shown);
+  keep_garbage(masks_);
   const KeyChoice* const was = before && before->settings_.key ? &*before->settings_.key : nullptr;
   if (was && was->takes_plate && was->take == key.take) {
     taking_ = before->taking_;
@@ -351,12 +375,12 @@ void PersonCameraFeed::show_keyed(std::shared_ptr<const compositing::KeyedTextur
 }
 
 void PersonCameraFeed::look_for_person(const compositing::KeyedFrame& keyed) {
-  const int longer = std::max(keyed.image().height, keyed.image().width);
-  const int shrink = std::max(1, (longer + matte_side - 1) / matte_side);
+  const int shrink = shrink_of(keyed.image().height, keyed.image().width);
   const capture::Image matte = matte_of(keyed, shrink);
   if (settings_.lens) {
     has_matte_ = true;
-    feet_ = enlarged(compositing::find_feet(matte), shrink);
+    const int turns = compositing::turns_to_upright(settings_.cam_from_set);
+    feet_ = enlarged(compositing::find_feet(matte, turns, garbage_), shrink);
     if (!options_.bounded) return;
   }
   outline_ = compositing::outline_box(matte);

@@ -97,6 +97,7 @@ class PersonCameraFeed {
   compositing::CleanPlate read_plate(const VideoSource& source, const ShownPart& shown) const;
   void begin_key(const VideoSource& source, const PersonCameraFeed* before);
   void check_length() const;
+  void keep_garbage(const compositing::KeyMasks& masks);
   void make_keyer(const compositing::CleanPlate& plate, compositing::KeyMasks masks);
   void go_on_with_plate(bool good);
   void take_plate(bool good);
@@ -118,6 +119,7 @@ class PersonCameraFeed {
   std::size_t same_picture_for_ = 0;  // frames of the show, while a file's plate is taken
   std::shared_ptr<const compositing::CleanPlate> plate_before_;  // if one is taken anew
   compositing::KeyMasks masks_;  // for the key, once the plate is there
+  capture::Image garbage_;       // of the matte's size, where feet are looked for
   std::future<std::unique_ptr<compositing::Keyer>> coming_keyer_;
   std::vector<std::string> notes_;
   float aspect_ = 1;

@@ -78,6 +78,7 @@ struct PersonFeed::Person {
   std::vector<bool> hidden;   // of its instances
   bool told = false;          // what it is shown as
   bool unplaced = false;      // told that it cannot be placed yet
+  bool doubted = false;       // told that its camera looks on steeply or leans
   bool out_of_reach = false;  // told that its picture cannot be laid where it stands
   std::vector<std::string> notes;
   PersonFrame frame;
@@ -220,6 +221,7 @@ void PersonFeed::take_over() {
       person.tracked_pass = before->tracked_pass;
       person.standing = before->standing;
       person.unplaced = before->unplaced;
+      person.doubted = before->doubted;
       person.frame.status.feet = before->frame.status.feet;
     }
     person.settings = std::move(coming_[i]->settings);
@@ -282,7 +284,14 @@ void PersonFeed::stand(Person& person) {
   const bool was_seen = status.feet == compositing::name_of(FeetStatus::seen);
   // Nobody yet is no news; somebody who cannot be placed is, once.
   const bool unplaced = !person.standing && seen != FeetStatus::absent;
-  if (person.standing && was_seen && seen != FeetStatus::seen) {
+  if (person.standing && !person.standing->held && seen == FeetStatus::uncertain) {
+    if (!std::exchange(person.doubted, true)) {
+      person.notes.push_back(
+          fmt::format("{}: its feet are uncertain: its camera sees them from too far above, or "
+                      "leaning. Film from less than 45 degrees above, level or turned by 90",
+                      status.name));
+    }
+  } else if (person.standing && was_seen && seen != FeetStatus::seen) {
     person.notes.push_back(fmt::format("{}: its feet are {}; it stays where it is", status.name,
                                        compositing::name_of(seen)));
   } else if (unplaced && !person.unplaced) {

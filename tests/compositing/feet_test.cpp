@@ -167,6 +167,55 @@ TEST(Feet, AreCutOffByTheLowerEdgeAndHeld) {
   EXPECT_EQ(gone->p_set, last);
 }
 
+TEST(Feet, AreCutOffWhereAMaskEndsTheLegs) {
+  const MadeView view = made_view(pinhole_lens());
+  const capture::Image whole = matte_of(view, {{0, 5, 0}}, 0.3);
+  const Feet seen = find_feet(whole);
+  ASSERT_EQ(seen.status, FeetStatus::seen);
+  const auto status_with = [&](int first_row) {
+    capture::Image matte = whole, mask = capture::make_image(matte.height, matte.width, 1);
+    for (int y = first_row; y < matte.height; ++y) {
+      for (int x = 0; x < matte.width; ++x) {
+        mask.at(y, x) = y == first_row ? 0.5F : 1;
+        matte.at(y, x) *= 1 - mask.at(y, x);
+      }
+    }
+    return find_feet(matte, 0, mask).status;
+  };
+  const int lowest = static_cast<int>(seen.q.y);
+  EXPECT_EQ(status_with(lowest - 80), FeetStatus::cut_off);
+  EXPECT_EQ(status_with(lowest - 10), FeetStatus::cut_off);
+  EXPECT_EQ(status_with(lowest + 8), FeetStatus::seen);
+  EXPECT_EQ(find_feet(whole, 0, capture::make_image(whole.height, whole.width, 1)).q, seen.q);
+  EXPECT_THROW(find_feet(whole, 0, capture::make_image(9, 9, 1)), std::invalid_argument);
+}
+
+// Where a picture is turned, all that is found turns with it.
+TEST(Feet, AreTheSameInTurnedPictures) {
+  const MadeView view = made_view(pinhole_lens());
+  capture::Image matte = matte_of(view, {{0.4, 5, 0}}, 0.3);
+  const Feet upright = find_feet(matte);
+  std::vector<Vec2> places = upright.lower;
+  places.push_back(upright.q);
+  std::array<float, 4> box = upright.box;
+  for (const int turns : {3, 2, 1}) {  // what it takes after one turn more to the right each
+    const int height = matte.height;
+    capture::Image to = capture::make_image(matte.width, height, 1);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < matte.width; ++x) to.at(x, height - 1 - y) = matte.at(y, x);
+    matte = std::move(to);
+    for (Vec2& q : places) q = {height - 1 - q.y, q.x};
+    const auto below = static_cast<float>(height - 1);
+    box = {below - box[3], box[0], below - box[1], box[2]};
+    const Feet feet = find_feet(matte, turns);
+    EXPECT_EQ(feet.status, FeetStatus::seen);
+    EXPECT_EQ(feet.q, places.back()) << turns;
+    ASSERT_EQ(feet.lower.size() + 1, places.size());
+    for (std::size_t i = 0; i < feet.lower.size(); ++i) EXPECT_EQ(feet.lower[i], places[i]);
+    EXPECT_EQ(feet.box, box) << turns;
+  }
+}
+
 TEST(Feet, AreAbsentFromEmptyMattesAndSpecks) {
   capture::Image matte = capture::make_image(90, 160, 1);
   EXPECT_EQ(find_feet(matte).status, FeetStatus::absent);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -121,6 +122,52 @@ TEST(FeetTracker, IsNotDrawnToAnAxeThatIsTakenForAFootNowAndThen) {
     ASSERT_TRUE(standing);
     EXPECT_NEAR(standing->p_set.y, 4, 0.02) << i;
     EXPECT_EQ(standing->held, axe) << i;
+  }
+}
+
+// A camera that is turned to portrait, or hangs upside down.
+TEST(FeetTracker, StandsOnTheFloorWhicheverWayTheCameraIsTurned) {
+  const calibrate::Lens lens{"pinhole", 640, 360, {450, 450, 319.5, 179.5}};
+  const MadeWalker walker{{0, 6, 0}};
+  for (const double roll_deg : {-180.0, -97.0, -90.0, 0.0, 12.0, 90.0}) {
+    const double roll = roll_deg * std::numbers::pi / 180;
+    const MadeView view{lens, calibrate::look_at({0, 0, 1.5}, {0, 5, 0.9}, roll)};
+    const int turns = turns_to_upright(view.cam_from_set);
+    FeetTracker tracker(lens, view.cam_from_set, 0);
+    for (double t = 0; t < 1; t += 0.2) {
+      const auto standing = tracker.update(t, find_feet(matte_of(view, walker, t), turns));
+      ASSERT_TRUE(standing) << roll_deg;
+      EXPECT_EQ(standing->status, FeetStatus::seen) << roll_deg;
+      double off = 1e9;
+      for (const int side : {0, 1}) {
+        off = std::min(off, distance_to(walker.foot(side, walker.speed_m_s * t), *standing));
+      }
+      EXPECT_LT(off, 0.05) << roll_deg;
+    }
+  }
+}
+
+// What is lowest in such pictures need be no foot: it is followed, but not trusted.
+TEST(FeetTracker, IsUncertainWhereTheCameraLooksDownSteeplyOrLeans) {
+  const auto status = [](Vec3 camera, double roll_deg) {
+    const Vec3 feet{0, 5, 0};
+    const calibrate::Pose pose =
+        calibrate::look_at(camera, {0, 5, 0.5}, roll_deg * std::numbers::pi / 180);
+    FeetTracker tracker(pinhole_lens(), pose, 0);
+    const auto q = project(pinhole_lens(), pose * feet);
+    const auto standing = tracker.update(0, {*q, 0.3, FeetStatus::seen, {}});
+    EXPECT_NEAR(standing->p_set.y, 5, 1e-6);
+    EXPECT_FALSE(standing->held);
+    return standing->status;
+  };
+  EXPECT_EQ(status({0, 0, 1.5}, 0), FeetStatus::seen);
+  EXPECT_EQ(status({0, 0, 4.5}, 0), FeetStatus::seen);
+  EXPECT_EQ(status({0, 0, 5.5}, 0), FeetStatus::uncertain);
+  EXPECT_EQ(status({0, 4.9, 5}, 0), FeetStatus::uncertain);
+  for (const double quarter : {-90.0, 0.0, 90.0, 180.0}) {
+    EXPECT_EQ(status({0, 0, 1.5}, quarter + 20), FeetStatus::seen);
+    EXPECT_EQ(status({0, 0, 1.5}, quarter - 30), FeetStatus::uncertain);
+    EXPECT_EQ(status({0, 0, 1.5}, quarter + 44), FeetStatus::uncertain);
   }
 }
 
