@@ -7,6 +7,8 @@
 #include <numbers>
 #include <vector>
 
+#include "calibrate/angles.h"
+
 namespace compositing {
 
 using calibrate::Vec2;
@@ -15,7 +17,8 @@ using calibrate::Vec3;
 namespace {
 
 constexpr double widest_turn_rad = 1.3;
-constexpr double furthest = 20;      // times the camera's distance
+constexpr double shallow_slack_rad = 0.5 * calibrate::degree;  // what nobody sees is not told
+constexpr double furthest = 20;                                // times the camera's distance
 constexpr double most_nearer_m = 1;  // for the lower edges: two feet stand no further apart
 constexpr double least_away = 0.2;   // of what it was
 constexpr double straight_m = 1e-3;  // what is nearer than this to the vertical has no azimuth
@@ -120,7 +123,8 @@ std::optional<BillboardPlace> place_billboard(const calibrate::Lens& lens,
 Facing face(double own_rad, double viewer_rad, double turn_rad) {
   const double off = std::remainder(viewer_rad - own_rad, 2 * std::numbers::pi);
   const double most = std::clamp(turn_rad, 0.0, widest_turn_rad);
-  return {own_rad + std::clamp(off, -most, most), std::abs(off), std::abs(off) > most};
+  return {own_rad + std::clamp(off, -most, most), std::abs(off),
+          std::abs(off) > most + shallow_slack_rad};
 }
 
 double parallax_m(double depth_m, double view_angle_rad) {

@@ -14,7 +14,7 @@ struct BillboardPlace {
   // 3 x 4, row by row, of make_billboard_mesh(): unit square x -0.5..0.5, z 0..1, y = 0, front to
   // -y. Vertical.
   std::array<float, 12> set_from_object{};
-  bool shallow = false;       // the view is further round than asked for
+  bool shallow = false;       // the view is further round than asked for, by half a degree or more
   double view_angle_rad = 0;  // between both views, about the vertical, 0..pi
 };
 

@@ -74,6 +74,7 @@ struct PersonFeed::Person {
   std::optional<compositing::Standing> standing;
   std::optional<compositing::ShapeChoice> choice;
   std::optional<compositing::PersonBox> box;  // of the hull that is chosen
+  std::string_view no_hull;                   // why there is none, where it was to be one
   std::shared_ptr<const render::LivePicture> clear = clear_picture();
   std::vector<bool> hidden;   // of its instances
   bool told = false;          // what it is shown as
@@ -88,6 +89,8 @@ struct PersonFeed::Person {
     const std::string& name = frame.status.name;
     return has_several() ? fmt::format("{}, camera {}", name, camera + 1) : name;
   }
+  // Where it is; before, angles and errors mean nothing.
+  bool is_placed() const { return !settings.by_feet || standing; }
   Vec3 position() const { return standing ? standing->p_set : settings.position; }
   void hide(std::size_t instance) {
     if (!hidden[instance]) frame.places[instance] = hidden_at(position());
@@ -367,6 +370,7 @@ void PersonFeed::choose(Person& person, capture::Time time, Vec3 viewer) {
   question.off_plane_m = s.by_feet ? compositing::off_foot_m : compositing::off_body_m;
   question.error_m = s.error_m;
   const auto before = std::exchange(person.choice, std::nullopt);
+  person.no_hull = "";
   for (bool settled = false; !settled;) {
     person.choice = choose_shape(question, before);
     settled = true;
@@ -381,8 +385,13 @@ void PersonFeed::choose(Person& person, capture::Time time, Vec3 viewer) {
     }
     if (!person.choice->hull || !settled) continue;
     person.box = compositing::person_box(views, at);
-    // Nothing of the hull is seen from within its box.
-    if (!person.box || person.box->has(viewer)) question.hull_is_there = settled = false;
+    if (!person.box) {
+      person.no_hull =
+          "there is no hull, for the outlines of its cameras do not meet: is a pose wrong?";
+    } else if (person.box->has(viewer)) {
+      person.no_hull = "the view is from within the hull's box";
+    }
+    if (!person.no_hull.empty()) question.hull_is_there = settled = false;
   }
   // With nobody good, the nearest one's last picture.
   show(person, person.choice->camera);
@@ -393,7 +402,7 @@ void PersonFeed::tell(Person& person) {
   PersonStatus& status = person.frame.status;
   const compositing::ShapeChoice& now = *person.choice;
   const PersonSettings& s = person.settings;
-  const bool first = !std::exchange(person.told, true);
+  const bool first = !std::exchange(person.told, person.is_placed());
   const bool changed = now.hull != status.hull || static_cast<int>(now.camera) + 1 != status.camera;
   if (!first && (now.hull != status.hull || (changed && !now.hull))) {
     person.notes.push_back(
@@ -403,17 +412,18 @@ void PersonFeed::tell(Person& person) {
   }
   const bool takes_plates = std::ranges::any_of(
       person.cameras, [](const Person::Camera& camera) { return camera.feed.takes_plate(); });
-  if (!now.holds && status.holds && !takes_plates) {
+  if (person.is_placed() && !now.holds && status.holds && !takes_plates) {
     person.notes.push_back(fmt::format(
         "{}: seen {:.0f} degrees off camera {}, nothing holds the error of {:g} m: {} has {:.3f} "
-        "m, the hull would have {:.3f} m",
+        "m, {}",
         status.name, now.view_rad / degree, now.camera + 1, s.error_m, words_for(now), now.error_m,
-        now.hull_error_m));
+        person.no_hull.empty() ? fmt::format("the hull would have {:.3f} m", now.hull_error_m)
+                               : std::string(person.no_hull)));
   }
   status.hull = now.hull;
   status.camera = static_cast<int>(now.camera) + 1;
   status.error_m = now.error_m;
-  status.holds = now.holds;
+  status.holds = now.holds || !person.is_placed();
   status.view_angle_deg = now.view_rad / degree;
   status.left_out.clear();
   for (std::size_t i = 0; i < person.cameras.size(); ++i) {
@@ -485,7 +495,6 @@ void PersonFeed::place_billboard(Person& person, Vec3 viewer) {
 }
 
 void PersonFeed::place(Person& person, Vec3 viewer) {
-  const PersonSettings& s = person.settings;
   PersonStatus& status = person.frame.status;
   PersonFrame& frame = person.frame;
   status.position = person.position();
@@ -493,7 +502,7 @@ void PersonFeed::place(Person& person, Vec3 viewer) {
   status.held = person.standing && person.standing->held;
   frame.hull_cameras.clear();
   std::ranges::fill(frame.pictures, person.clear);
-  const bool known = !s.by_feet || person.standing;  // where it is
+  const bool known = person.is_placed();
   status.stands = known;
   const std::size_t cameras = person.cameras.size();
   const bool hull = person.choice && person.choice->hull;

@@ -122,6 +122,10 @@ void read_standing(Section& section, PersonSettings& person) {
                   "to the side for its lens");
   }
   section.of_use_only(person.by_feet, "floor", "feet = \"auto\"");
+  if (person.by_feet && first.lens && has_pose(section) &&
+      calibrate::position_of(first.cam_from_set).z <= person.floor_z) {
+    section.fault("floor", "is not below the person's own camera, which so sees no feet on it");
+  }
   section.number("height", person.height_m, {1e-3, 1e4});
   double yaw_deg = 0, turn_deg = 30;
   if (section.number("yaw", yaw_deg, {-3600, 3600}) && calibrated) {

@@ -84,6 +84,13 @@ TEST(PlaceBillboard, TurnsToTheViewerAsFarAsAskedAndSaysWhenThatIsTooLittle) {
   }
 }
 
+TEST(Face, IsNotShallowForWhatNobodySees) {
+  EXPECT_FALSE(face(1, 1 + 1e-3, 0).shallow);
+  EXPECT_TRUE(face(1, 1 + 0.01, 0).shallow);
+  EXPECT_FALSE(face(1, 1 - 0.505, 0.5).shallow);
+  EXPECT_TRUE(face(1, 1 - 0.51, 0.5).shallow);
+}
+
 // Across the picture, with the feet up to a step apart: none of both falls below the floor, and the
 // person's own camera sees the same.
 TEST(PlaceBillboard, CutsNoFootOffHoweverItTurns) {

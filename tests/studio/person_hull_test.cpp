@@ -27,6 +27,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 using calibrate::degree;
 constexpr int video_width = 160, video_height = 200;
@@ -160,6 +161,24 @@ TEST_F(PersonHullTest, SaysWhereNothingHoldsTheError) {
   EXPECT_EQ(told.persons[0].camera, 2);
   EXPECT_FALSE(told.persons[0].holds);
   EXPECT_THAT(told.notes, Contains(HasSubstr("nothing holds the error of 0.05 m")));
+}
+
+// The second camera is said to look the other way: no place is within both outlines.
+TEST_F(PersonHullTest, SaysThatThereIsNoHullWhereOutlinesDoNotMeet) {
+  std::string wrong = filmed_from(60);
+  const std::string look_at = "look_at = [0, 0, 0.9]";
+  wrong.replace(wrong.find(look_at), look_at.size(), "look_at = [2, -8, 0.9]");
+  const Told told = run(walker_set(30, walker_from({filmed_from(0), wrong}), 2));
+  EXPECT_FALSE(told.persons.at(0).hull);
+  EXPECT_FALSE(told.persons[0].holds);
+  EXPECT_THAT(told.notes, Contains(HasSubstr("the outlines of its cameras do not meet")));
+}
+
+// Frames of nobody: there is no place yet to measure angles from.
+TEST_F(PersonHullTest, SaysNothingOfAnglesWhileNobodyStandsThere) {
+  const Told told = run(walker_set(100, walker_from({filmed_from(0, 0), filmed_from(60, 0)}), 4));
+  EXPECT_FALSE(told.persons.at(0).stands);
+  EXPECT_THAT(told.notes, Not(Contains(HasSubstr("degrees"))));
 }
 
 // Show frames against photographs of the walker, from between the cameras.

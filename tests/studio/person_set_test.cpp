@@ -232,6 +232,20 @@ TEST_F(PersonSetTest, IsCutOffByAGarbageMaskThatEndsTheLegs) {
   EXPECT_THAT(told[0], HasSubstr("walker: its feet are cut off; it is not shown"));
 }
 
+// The show's camera is the person's own, but for what a float loses.
+TEST_F(PersonSetTest, SaysNothingOfTheSideWhereItNeverTurnsAndIsSeenFromItsCamera) {
+  std::string still = walker;
+  still.replace(still.find("feet = "), 7, "turn = 0\nfeet = ");
+  Set set = made_set("grey:4,25,0", still);
+  set.camera.pose.cam_from_set =
+      calibrate::look_at(video_position + calibrate::Vec3{0.001, 0, 0}, {0, 0, 1}, 0);
+  Show show(set);
+  show.run([&](const ShownFrame& shown) {
+    EXPECT_THAT(shown.prepared.notes, testing::IsEmpty());
+    EXPECT_FALSE(shown.prepared.persons.at(0).shallow);
+  });
+}
+
 // From one frame to the next it is .8 m away.
 TEST_F(PersonSetTest, StandsAtOnceWhereItsFeetAreWhenItsClipBeginsAgain) {
   std::string looped = walker;
