@@ -24,6 +24,7 @@ struct CameraInfo {
   Time jitter{};                // by how much frames may come later than the rate says
   std::int64_t frames = 0;  // about, where only length and rate are told; 0 = unknown or endless
   std::string description;  // for people: codec, format, colour tags and how they were read
+  std::string doubt;        // why its frames may not be what they should; "" = no reason
   int sound_channels = 0;   // 0 = silent
   int sound_rate = 0;       // samples per second
   bool live = false;        // frames come as time goes by, on the monotonic clock

@@ -223,6 +223,9 @@ void VideoFile::describe(const AVFrame& first) {
       std::string(avcodec_get_name(codec_of(*file_))) + ", " + lineariser_.description();
   if (first.interlaced_frame != 0) {
     info_.description += ", interlaced (taken as it is)";
+    info_.doubt =
+        "it is interlaced, and each frame taken for a whole picture: its rows are of two moments, "
+        "and colours run from one into the other; deinterlace it first, as by ffmpeg -vf bwdif";
   }
   if (turn.any()) {
     info_.description += ", " + capture::describe(turn);

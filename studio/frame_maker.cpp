@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "calibrate/track_check.h"
 #include "studio/set_scene.h"
 #include "studio/show_inputs.h"
 
@@ -88,6 +89,8 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live
   });
   collecting([&] { light_ = light.get(); });
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
+  doubt_track();
+  if (!plate_->info().doubt.empty()) notes_.push_back("the plate: " + plate_->info().doubt);
 
   const capture::Rational plate_rate = plate_->info().rate;
   const capture::Rational own = plate_rate.num > 0 ? plate_rate : rate_of_stills;
@@ -290,6 +293,18 @@ void FrameMaker::note_plate(const capture::Frame& frame) {
   const std::string how = plate_->statistics().cut_short;
   plate_is_cut_short_ = !how.empty();
   if (plate_is_cut_short_) notes_.push_back("the plate: " + how);
+}
+
+// Notes what is to be doubted of the camera's track, unless it was noted before.
+void FrameMaker::doubt_track() {
+  std::vector<std::string> doubts;
+  if (track_) doubts = calibrate::doubts_of(*track_);
+  if (doubts == track_doubts_) return;
+  for (const std::string& doubt : doubts) {
+    notes_.push_back(
+        fmt::format("the camera's track is doubtful: {} ({})", doubt, set_.camera.pose.track));
+  }
+  track_doubts_ = std::move(doubts);
 }
 
 calibrate::Pose FrameMaker::pose_at(capture::Time time) {

@@ -208,6 +208,7 @@ class FrameMaker {
   void open_once_left(const Open& open) const;
   void finish_change();
   void note_plate(const capture::Frame& frame);
+  void doubt_track();
   calibrate::Pose pose_at(capture::Time time);
   double place_of(capture::Time time) const;
   std::int64_t number_of(const capture::Frame& picture);
@@ -245,6 +246,7 @@ class FrameMaker {
   std::int64_t plate_frames_lost_ = 0;                       // in a row
   bool plate_is_told_gone_ = false, plate_is_told_damaged_ = false, plate_is_cut_short_ = false;
   bool is_off_track_ = false;
+  std::vector<std::string> track_doubts_;           // as noted
   std::optional<capture::Time> live_track_begins_;  // beside a live plate
   std::optional<capture::Frame> first_due_;         // of a live plate
   Due last_due_;

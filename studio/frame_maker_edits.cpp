@@ -283,6 +283,7 @@ void FrameMaker::take_over(Change change) {
   scene_ = std::move(change.scene);
   lamps_ = describe_lamps(set_);
   track_ = std::move(change.track);
+  doubt_track();
   directions_ = std::move(change.directions);
   lens_ = std::move(change.lens);
   repeat_commands(*change.videos);

@@ -23,6 +23,8 @@ constexpr std::size_t longest_cycle = 16;  // exposures of a bracket
 constexpr std::size_t at_once = 16;        // frames that are held together
 constexpr std::size_t most_untold = 4;     // pictures without an exposure, for one to be waited for
 constexpr double same_exposure = 0.02;     // relative
+// A recording that has light so much later has its clock wrong, or began so late.
+constexpr capture::Time soonest_told = std::chrono::milliseconds(500);
 constexpr capture::Time bracket_patience = std::chrono::seconds(5);  // for a live camera's first
 constexpr capture::Time next_patience = std::chrono::seconds(2);  // for a live camera's next frame
 // From these shares of pixels on, of those that the lens sees, the shots tell nothing.
@@ -444,6 +446,14 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time, bool on_clock) {
     if (ahead_.empty() && camera_->has_ended(on_its_clock))
       status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;
+    if (!camera_->is_live() && -status_.age > soonest_told && !is_told_ahead_) {
+      is_told_ahead_ = true;
+      notes_.push_back(
+          fmt::format("the probe's recording has no light until {:.2f} s later: its first stands "
+                      "until then; is "
+                      "probe.offset_s right?",
+                      std::chrono::duration<double>(-status_.age).count()));
+    }
   }
   return {newest_.image, newest_.time + passed_ + begun_.value_or(capture::Time{})};
 }

@@ -112,6 +112,7 @@ class ProbeSource {
   Radiance newest_;
   ProbeStatus status_;
   std::vector<std::string> notes_;
+  bool is_told_ahead_ = false;
 };
 
 }  // namespace studio

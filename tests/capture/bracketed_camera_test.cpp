@@ -43,7 +43,8 @@ class MadeCamera final : public Camera {
              .height = ExposureStream::rows,
              .rate = {60, 1},
              .frames = 0,
-             .description = {}};
+             .description = {},
+             .doubt = {}};
   }
   const CameraInfo& info() const override { return info_; }
   CameraStatistics statistics() const override { return {}; }

@@ -148,6 +148,29 @@ TEST(ProbeSource, ShowsWhatWasTakenByThenWhateverItsClock) {
   }
 }
 
+// An offset of the wrong sign, or of another take.
+TEST(ProbeSource, SaysThatARecordingHasNoLightYet) {
+  capture::register_camera("scripted", [&](std::string_view, const capture::CameraOptions&) {
+    return std::make_unique<ScriptedCamera>([](std::int64_t) { return Moment{.radiance = 100}; });
+  });
+  Set set;
+  set.probe.emplace();
+  set.probe->kind = ProbeSettings::Kind::camera;
+  set.probe->source = "scripted:";
+  for (const double offset_s : {-3.0, -0.2}) {
+    set.probe->offset_s = offset_s;
+    ProbeSource source(set);
+    for (std::int64_t n = 0; n < 4; ++n) source.at(capture::time_of_frame(n, rate), false);
+    const std::vector<std::string> notes = source.take_notes();
+    EXPECT_EQ(std::ranges::count_if(notes,
+                                    [](const std::string& note) {
+                                      return note.find("has no light until 3.0") !=
+                                             std::string::npos;
+                                    }),
+              offset_s < -1 ? 1 : 0);
+  }
+}
+
 TEST_F(ProbeSourceTest, FollowsLightWithinOneBracket) {
   constexpr std::int64_t change = 15;
   const auto light = light_over(

@@ -1,0 +1,121 @@
+// What of a track is to be doubted.
+#include "calibrate/track_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <iterator>
+#include <numbers>
+#include <span>
+
+#include "capture/median.h"
+
+namespace calibrate {
+namespace {
+
+constexpr std::size_t fewest_even = 10;
+// Between keys: longer than this many of the usual, and at least so long.
+constexpr double longest = 6, shortest_gap_s = 0.15;
+constexpr double slowest_s = 0.5;  // trackers have keys more often
+constexpr double far_m = 500;      // as far as a camera may be from the set
+// How much faster a step is than others about it, and how long at least.
+constexpr double jump = 8, least_jump_m = 0.02, least_jump_rad = 0.02;
+
+template <class... T>
+std::string text(const char* format, T... values) {
+  char buffer[200];
+  std::snprintf(buffer, sizeof buffer, format, values...);
+  return buffer;
+}
+
+double angle_between(const Quaternion& a, const Quaternion& b) {
+  const double cosine = std::abs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z);
+  return 2 * std::acos(std::min(cosine, 1.0));
+}
+
+// How fast the camera is from each key to the next, per second.
+struct Speeds {
+  std::vector<double> metres, radians;
+};
+Speeds speeds_of(std::span<const TrackKey> keys) {
+  Speeds speeds;
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    const double s = keys[i].time_s - keys[i - 1].time_s;
+    speeds.metres.push_back(length(keys[i].position - keys[i - 1].position) / s);
+    speeds.radians.push_back(angle_between(keys[i - 1].set_from_cam, keys[i].set_from_cam) / s);
+  }
+  return speeds;
+}
+
+// Steps that are far longer than those two before and after: of one key that is off, both; where a
+// camera sets out, none.
+std::vector<std::size_t> jumps_in(std::span<const double> speeds,
+                                  std::span<const double> intervals,
+                                  double least) {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < speeds.size(); ++i) {
+    const double before = i < 2 ? 0 : speeds[i - 2];
+    const double after = i + 2 < speeds.size() ? speeds[i + 2] : 0;
+    const bool far = speeds[i] > jump * std::max(before, after);
+    if (far && speeds[i] * intervals[i] > least) found.push_back(i);
+  }
+  return found;
+}
+
+}  // namespace
+
+std::vector<std::string> doubts_of(const Track& track) {
+  const std::span<const TrackKey> keys = track.keys;
+  std::vector<std::string> doubts;
+  if (std::ranges::all_of(keys, [](const TrackKey& key) { return length(key.position) > far_m; })) {
+    doubts.push_back(text("no key is nearer than %.0f m: are its places in millimetres?", far_m));
+  }
+  // How far the picture's way down goes up in the set.
+  constexpr double downwards = 0.1;
+  if (std::ranges::all_of(keys, [](const TrackKey& key) {
+        return rotation_of(key.set_from_cam).m[7] > downwards;
+      })) {
+    doubts.emplace_back(
+        "the camera hangs upside down throughout: are the quaternions set_from_cam, of a set with "
+        "z up and a camera with y down?");
+  }
+  if (keys.size() < fewest_even) return doubts;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    intervals.push_back(keys[i].time_s - keys[i - 1].time_s);
+  }
+  const double usual = capture::median(intervals);
+  if (usual > slowest_s) {
+    doubts.push_back(text(
+        "its keys are %.4g s apart: are its times seconds, not milliseconds or frames?", usual));
+    return doubts;
+  }
+  const double gap = std::max(longest * usual, shortest_gap_s);
+  const auto gaps = std::ranges::count_if(intervals, [&](double s) { return s > gap; });
+  if (gaps > 0) {
+    const auto widest =
+        static_cast<std::size_t>(std::ranges::max_element(intervals) - intervals.begin());
+    doubts.push_back(text("it has no key from %.3f to %.3f s, and is interpolated there",
+                          keys[widest].time_s, keys[widest + 1].time_s) +
+                     (gaps > 1 ? text(", as in %d other places", static_cast<int>(gaps - 1)) : ""));
+  }
+  const Speeds speeds = speeds_of(keys);
+  std::vector<std::size_t> jumps = jumps_in(speeds.metres, intervals, least_jump_m);
+  std::ranges::copy(jumps_in(speeds.radians, intervals, least_jump_rad), std::back_inserter(jumps));
+  std::ranges::sort(jumps);
+  const auto [end, last] = std::ranges::unique(jumps);
+  jumps.erase(end, last);
+  if (!jumps.empty()) {
+    const std::size_t i = jumps.front();
+    doubts.push_back((jumps.size() > 1
+                          ? text("it jumps in %d steps, first", static_cast<int>(jumps.size()))
+                          : "it jumps") +
+                     text(" from %.3f to %.3f s, by %.3g m and %.3g degrees", keys[i].time_s,
+                          keys[i + 1].time_s, speeds.metres[i] * intervals[i],
+                          speeds.radians[i] * intervals[i] * 180 / std::numbers::pi));
+  }
+  return doubts;
+}
+
+}  // namespace calibrate
