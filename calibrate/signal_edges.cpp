@@ -108,7 +108,9 @@ std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal) {
     const double hidden = most_unrest * noise_share;
     SignalEdge edge{last.time_s + (0.5 - hidden) * last.exposure_s,
                     first.time_s - (0.5 - hidden) * first.exposure_s,
-                    std::max(least_sigma_s, noise_share * last.exposure_s), jump > 0};
+                    std::max(least_sigma_s, noise_share * last.exposure_s),
+                    jump > 0,
+                    {}};
     if (!straight) {
       const SignalSample& between = signal[i + 2];
       const double share = (between.value - before) / jump;
@@ -116,6 +118,7 @@ std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal) {
       if (std::abs(between.value - before) < most_unrest * noise || share < 0 || share > 1)
         continue;
       if (between.exposure_s > 0) {
+        edge.share = share;
         edge.low_s = edge.high_s = between.time_s + (0.5 - share) * between.exposure_s;
         edge.sigma_s = std::max(least_sigma_s, 1.3 * noise_share * between.exposure_s);
       }
@@ -123,6 +126,19 @@ std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal) {
     if (edge.high_s >= edge.low_s) edges.push_back(edge);
   }
   return edges;
+}
+
+bool are_in_step(std::span<const SignalEdge> edges) {
+  constexpr std::size_t fewest = 6;
+  constexpr double most_apart = 0.1;  // standard deviation; at random it is .29
+  double count = 0, sum = 0, squares = 0;
+  for (const SignalEdge& edge : edges) {
+    if (!edge.share) continue;
+    count += 1, sum += *edge.share, squares += *edge.share * *edge.share;
+  }
+  if (count < static_cast<double>(fewest)) return false;
+  const double mean = sum / count;
+  return squares / count - mean * mean < most_apart * most_apart;
 }
 
 std::optional<EdgeOffset> offset_of_edges(std::span<const SignalEdge> a,

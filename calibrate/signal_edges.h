@@ -15,12 +15,19 @@ struct SignalEdge {
   double high_s = 0;
   double sigma_s = 0;  // of both limits
   bool rising = false;
+  // Of the exposure during which it was, after it; nothing if it was between two.
+  std::optional<double> share;
 };
 
 // Jumps by over eight times the noise, between levels that two frames hold before and after, with
 // at most one frame in between. If that one's exposure is known, the share of the new level in it
 // tells the moment; else the jump was in the gap.
 std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal);
+
+// Whether jumps are all at one place in their exposures, as of a lamp that is switched by the
+// camera's own clock: then a wrong exposure does not show, and moves all of them alike. Six of them
+// or more tell.
+bool are_in_step(std::span<const SignalEdge> edges);
 
 struct EdgeOffset {
   double offset_s = 0;

@@ -226,13 +226,15 @@ void refine_by_edges(std::span<const SignalSample> a,
   // limits then all lie in step, and promise more than they hold.
   if (!tells_exposures(a) || !tells_exposures(b)) return;
   const double reach_s = 0.75 * interval_s;
-  const auto found = offset_of_edges(find_edges(a), find_edges(b), result.offset_s, reach_s);
+  const std::vector<SignalEdge> of_a = find_edges(a), of_b = find_edges(b);
+  const auto found = offset_of_edges(of_a, of_b, result.offset_s, reach_s);
   // Exposures other than told, or other changes, would show.
   constexpr double enough_agree = 0.85;
   if (!found || found->agreeing < enough_agree || found->pairs < enough_jumps) return;
   result.offset_s = found->offset_s;
   result.sigma_s = found->sigma_s;
   result.edges = found->pairs;
+  result.in_step = are_in_step(of_a) || are_in_step(of_b);
 }
 
 double overlap_s(const auto& a, const auto& b, double offset_s) {

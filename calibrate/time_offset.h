@@ -32,6 +32,7 @@ struct TimeOffset {
   double correlation = 0;  // of both signals there, up to 1
   double next_best = 0;    // the highest correlation at an offset apart from it
   std::size_t edges = 0;   // jumps seen by both that it rests on; 0 = on the whole course
+  bool in_step = false;    // these are in step with a camera's exposures: a wrong one does not show
   double overlap_s = 0;    // of the time that both saw
 };
 

@@ -79,6 +79,7 @@ Json figures_of(const calibrate::TimeOffset& found) {
           {"correlation", found.correlation},
           {"next_best", found.next_best},
           {"edges", found.edges},
+          {"in_step", found.in_step},
           {"overlap_s", found.overlap_s}};
 }
 
@@ -119,6 +120,12 @@ calibrate::TimeOffset offset_by_lamp(const OffsetOptions& options, Console& cons
   if (found.sigma_s > aimed_at_s) {
     console.warn("the offset is uncertain by more than a millisecond: " +
                  advice(options, watched, found) + "; or move a board (--board)");
+  }
+  if (found.in_step) {
+    console.warn(
+        "the lamp is switched in step with a camera's frames: an exposure that is told wrong does "
+        "not show, and moves the offset by up to half of its error; switch it by hand, or at "
+        "random");
   }
   return found;
 }

@@ -43,11 +43,14 @@ std::vector<SignalSample> record(const std::function<double(double)>& integral,
   return signal;
 }
 
-// A lamp switched at random, on average every `dwell_s`.
-std::function<double(double)> random_lamp(double dwell_s, made::Random& random) {
+// A lamp switched at random, on average every `dwell_s`; not at once, but when a clock next beats
+// that does so every `beat_s`, if that is above 0.
+std::function<double(double)> random_lamp(double dwell_s, made::Random& random, double beat_s = 0) {
   std::vector<double> switched{-10};
   while (switched.back() < 60) {
-    switched.push_back(switched.back() - dwell_s * std::log(random.uniform(0, 1)));
+    double next = switched.back() - dwell_s * std::log(random.uniform(0, 1));
+    if (beat_s > 0) next = std::ceil(next / beat_s) * beat_s;
+    switched.push_back(next);
   }
   return [switched](double t) {
     double on_s = 0;
@@ -290,6 +293,20 @@ TEST(FindEdges, TellsTheMomentFromTheShareOfAFrame) {
   EXPECT_FALSE(edges[1].rising);
   EXPECT_NEAR(edges[1].low_s, 0.21, 1e-4);
   EXPECT_NEAR(edges[1].high_s, 0.23, 1e-4);
+}
+
+// An LED wall on the cameras' genlock.
+TEST(FindTimeOffset, TellsOfALampInStepWithTheFrames) {
+  for (const bool in_step : {false, true}) {
+    made::Random random(9);
+    const auto lamp = random_lamp(0.3, random, in_step ? frame_s : 0);
+    const Clocks a{0.003, 0, frame_s, 0.02}, b{0.016, 0.5, frame_s, 0.036};
+    const TimeOffset found =
+        find_time_offset(record(lamp, a, 20, 0.005, random), record(lamp, b, 20, 0.005, random));
+    EXPECT_EQ(found.in_step, in_step);
+    EXPECT_GT(found.edges, 10U);
+    EXPECT_NEAR(found.offset_s, 0.5, 1e-3);
+  }
 }
 
 template <class Seen>
