@@ -44,6 +44,7 @@ libav::PacketHandle encode(const std::filesystem::path& path,
   context->height = height;
   context->pix_fmt = format_of_channels[static_cast<std::size_t>(channels - 1)];
   context->time_base = {1, 1};
+  context->sample_aspect_ratio = {1, 1};  // else a chunk says 0:1
   context->thread_count = 1;
   if (const int error = avcodec_open2(context.get(), codec, nullptr); error < 0) {
     fail(path, libav::reason(error));

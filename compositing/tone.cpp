@@ -36,10 +36,15 @@ class Histogram {
   void add(float luminance) {
     if (!(luminance > darkest_measured)) return;  // also not NaN
     const float value = std::min(luminance, capture::half_max);
-    ++counts_[static_cast<std::size_t>(capture::half_from_float(value) >> shift)];
+    const auto bin = static_cast<std::size_t>(capture::half_from_float(value) >> shift);
+    ++counts_[bin];
+    most_[bin] = std::max(most_[bin], value);
   }
   void add(const Histogram& other) {
-    for (std::size_t i = 0; i < bins; ++i) counts_[i] += other.counts_[i];
+    for (std::size_t i = 0; i < bins; ++i) {
+      counts_[i] += other.counts_[i];
+      most_[i] = std::max(most_[i], other.most_[i]);
+    }
   }
   std::uint64_t total() const {
     std::uint64_t sum = 0;
@@ -51,7 +56,10 @@ class Histogram {
     double left = share * static_cast<double>(total());
     for (std::size_t i = 0; i < bins; ++i) {
       const double count = counts_[i];
-      if (count > 0 && left <= count) return begin(i) + (begin(i + 1) - begin(i)) * left / count;
+      if (count > 0 && left <= count) {
+        // White, and what is clipped, begins a bin.
+        return std::min<double>(begin(i) + (begin(i + 1) - begin(i)) * left / count, most_[i]);
+      }
       left -= count;
     }
     return capture::half_max;
@@ -72,6 +80,7 @@ class Histogram {
     return capture::float_from_half(static_cast<capture::Half>(bin << shift));
   }
   std::array<std::uint32_t, bins> counts_{};
+  std::array<float, bins> most_{};
 };
 
 }  // namespace

@@ -167,6 +167,17 @@ TEST(MeasureLevels, PassesOverBlackAndWhatIsNoNumber) {
   EXPECT_TRUE(std::isfinite(measure_levels(image)->brightest));
 }
 
+// As skies are that a camera has clipped.
+TEST(CurveFor, LeavesAPictureOfWhichMuchIsJustWhite) {
+  capture::HalfImage picture = half_image(10, 100);
+  for (std::size_t i = 0; i < 1000; ++i) {
+    set_grey(picture, i, i < 250 ? 1.0F : 0.1F + 0.0008F * static_cast<float>(i));
+  }
+  const ToneCurve curve = curve_for(*measure_levels(picture));
+  EXPECT_FLOAT_EQ(curve.brightest, 1);
+  EXPECT_FLOAT_EQ(curve.p, 1);
+}
+
 TEST(CurveFor, LeavesAPictureWithoutAnythingBrighterThanWhite) {
   EXPECT_EQ(curve_for({0.01F, 0.2F, 0.9F}), (ToneCurve{1, 1}));
   EXPECT_EQ(curve_for({0.01F, 0.2F, 1.0F}), (ToneCurve{1, 1}));
