@@ -71,9 +71,14 @@ LensGrid make_lens_grid(const BillboardCamera& camera, int steps) {
                                            static_cast<float>((q->y + 0.5) / lens.height)});
     }
   }
-  // As many pixels as the whole picture has, over the solid angle of its window.
+  const auto middle = static_cast<float>(steps) / 2;
+  const auto cell = cell_in_grid(c, std::as_bytes(std::span(grid.places)), middle, middle);
+  const float area = cell->area() * c.steps_a_unit[0] * c.steps_a_unit[1];
+  // Where the lens does not see there, as the whole picture has over its window.
   c.uv_per_tangent =
-      static_cast<float>(1 / std::sqrt((window.x1 - window.x0) * (window.y1 - window.y0)));
+      std::isfinite(area) && area > 0
+          ? std::sqrt(area)
+          : static_cast<float>(1 / std::sqrt((window.x1 - window.x0) * (window.y1 - window.y0)));
   return grid;
 }
 
@@ -110,10 +115,13 @@ std::optional<LookUp> seen_by_camera(const CameraGrid& c,
   if (!(z > 1e-4F)) return std::nullopt;
   const float gx = (p_cam.x / z - c.first[0]) * c.steps_a_unit[0];
   const float gy = (p_cam.y / z - c.first[1]) * c.steps_a_unit[1];
-  const auto place = place_in_grid(c, places, gx, gy);
+  const auto cell = cell_in_grid(c, places, gx, gy);
+  if (!cell) return std::nullopt;
+  const GridPlace place = cell->place();
   // Where the lens does not see, the grid holds no numbers.
-  if (!place || !std::isfinite(place->u) || !std::isfinite(place->v)) return std::nullopt;
-  return LookUp{*place, c.uv_per_tangent / z};
+  if (!std::isfinite(place.u) || !std::isfinite(place.v)) return std::nullopt;
+  const float area = cell->area() * c.steps_a_unit[0] * c.steps_a_unit[1];
+  return LookUp{place, std::sqrt(area) / z};
 }
 
 }  // namespace compositing

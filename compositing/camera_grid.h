@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -34,7 +35,7 @@ struct CameraGrid {
   std::uint32_t columns, rows;  // 0 = no camera
   std::array<float, 12> cam_from_set;
   std::array<float, 2> first, steps_a_unit;  // of x/z and y/z: where the grid begins
-  float uv_per_tangent;                      // at the picture's middle
+  float uv_per_tangent;                      // in the grid's middle, root of the area's
 };
 inline constexpr std::uint32_t most_grid_steps = 1024;
 
@@ -60,26 +61,59 @@ struct LookUp {
 calibrate::Vec3f in_camera(const CameraGrid& camera, calibrate::Vec3f p_set);
 calibrate::Vec3f turned_to_camera(const CameraGrid& camera, calibrate::Vec3f v_set);
 
-// The place at `gx`, `gy` steps from the grid's first; nothing beyond it, and no numbers where the
+// Four places of the grid, and how far between them.
+struct GridCell {
+  std::array<GridPlace, 2> upper, lower;
+  float fx, fy;
+
+  GridPlace place() const {
+    const auto mixed = [&](float a, float b, float d, float e) {
+      return (a * (1 - fx) + b * fx) * (1 - fy) + (d * (1 - fx) + e * fx) * fy;
+    };
+    return {mixed(upper[0].u, upper[1].u, lower[0].u, lower[1].u),
+            mixed(upper[0].v, upper[1].v, lower[0].v, lower[1].v)};
+  }
+  // By how much the place changes over one step to the right, and down: the area's share.
+  float area() const {
+    const auto along = [&](float a, float b, float d, float e) {
+      return (b - a) * (1 - fy) + (e - d) * fy;
+    };
+    const auto down = [&](float a, float b, float d, float e) {
+      return (d - a) * (1 - fx) + (e - b) * fx;
+    };
+    const float ux = along(upper[0].u, upper[1].u, lower[0].u, lower[1].u);
+    const float vx = along(upper[0].v, upper[1].v, lower[0].v, lower[1].v);
+    const float uy = down(upper[0].u, upper[1].u, lower[0].u, lower[1].u);
+    const float vy = down(upper[0].v, upper[1].v, lower[0].v, lower[1].v);
+    return std::abs(ux * vy - uy * vx);
+  }
+};
+
+// The cell at `gx`, `gy` steps from the grid's first; nothing beyond it, and no numbers where the
 // lens does not see.
-inline std::optional<GridPlace> place_in_grid(const CameraGrid& c,
-                                              std::span<const std::byte> places,
-                                              float gx,
-                                              float gy) {
+inline std::optional<GridCell> cell_in_grid(const CameraGrid& c,
+                                            std::span<const std::byte> places,
+                                            float gx,
+                                            float gy) {
   const auto last_x = static_cast<float>(c.columns - 1), last_y = static_cast<float>(c.rows - 1);
   if (!(gx >= 0 && gx <= last_x && gy >= 0 && gy <= last_y)) return std::nullopt;
   const std::uint32_t column = std::min(static_cast<std::uint32_t>(gx), c.columns - 2);
   const std::uint32_t row = std::min(static_cast<std::uint32_t>(gy), c.rows - 2);
-  const float fx = gx - static_cast<float>(column), fy = gy - static_cast<float>(row);
-  std::array<GridPlace, 2> upper, lower;
+  GridCell cell;
+  cell.fx = gx - static_cast<float>(column), cell.fy = gy - static_cast<float>(row);
   const std::size_t index = std::size_t{row} * c.columns + column;
-  std::memcpy(&upper, places.data() + index * sizeof(GridPlace), sizeof upper);
-  std::memcpy(&lower, places.data() + (index + c.columns) * sizeof(GridPlace), sizeof lower);
-  const auto mixed = [&](float a, float b, float d, float e) {
-    return (a * (1 - fx) + b * fx) * (1 - fy) + (d * (1 - fx) + e * fx) * fy;
-  };
-  return GridPlace{mixed(upper[0].u, upper[1].u, lower[0].u, lower[1].u),
-                   mixed(upper[0].v, upper[1].v, lower[0].v, lower[1].v)};
+  std::memcpy(&cell.upper, places.data() + index * sizeof(GridPlace), sizeof cell.upper);
+  std::memcpy(&cell.lower, places.data() + (index + c.columns) * sizeof(GridPlace),
+              sizeof cell.lower);
+  return cell;
+}
+
+inline std::optional<GridPlace> place_in_grid(const CameraGrid& c,
+                                              std::span<const std::byte> places,
+                                              float gx,
+                                              float gy) {
+  const auto cell = cell_in_grid(c, places, gx, gy);
+  return cell ? std::optional(cell->place()) : std::nullopt;
 }
 
 // Through the camera's lens; nothing where it does not see. `places` begins with the grid's.

@@ -26,9 +26,21 @@ struct HalfSpace {
   double limit = 0;
 };
 
-// The outline's cone: four planes through the camera, without those of the picture's edges.
-void add_cone(const OutlinedView& view, std::vector<HalfSpace>& spaces) {
+// At which edges of its picture an outline goes on beyond it.
+struct Cut {
+  bool left, top, right, bottom;
+};
+Cut cut_of(const OutlinedView& view) {
   const auto [left, top, right, bottom] = view.box;
+  return {left <= at_edge_px, top <= at_edge_px, right >= view.lens.width - 1 - at_edge_px,
+          bottom >= view.lens.height - 1 - at_edge_px};
+}
+
+// The outline's cone: four planes through the camera, without those of the picture's edges.
+// `sides_go_on`: what is below or above the picture may be wider than what it shows.
+void add_cone(const OutlinedView& view, bool sides_go_on, std::vector<HalfSpace>& spaces) {
+  const auto [left, top, right, bottom] = view.box;
+  const Cut cut = cut_of(view);
   double x0 = infinity, x1 = -infinity, y0 = infinity, y1 = -infinity;
   constexpr int steps = 16;
   for (int i = 0; i <= steps; ++i) {
@@ -48,10 +60,10 @@ void add_cone(const OutlinedView& view, std::vector<HalfSpace>& spaces) {
     const Vec3 normal = set_from_cam.R * normalize(v_cam);
     spaces.push_back({normal, dot(normal, camera)});
   };
-  add(left <= at_edge_px, {-1, 0, x0});
-  add(right >= view.lens.width - 1 - at_edge_px, {1, 0, -x1});
-  add(top <= at_edge_px, {0, -1, y0});
-  add(bottom >= view.lens.height - 1 - at_edge_px, {0, 1, -y1});
+  add(cut.left || sides_go_on, {-1, 0, x0});
+  add(cut.right || sides_go_on, {1, 0, -x1});
+  add(cut.top, {0, -1, y0});
+  add(cut.bottom, {0, 1, -y1});
 }
 
 // Where three planes meet.
@@ -87,7 +99,12 @@ std::optional<PersonBox> person_box(std::span<const OutlinedView> views, Vec3 st
       {{-1, 0, 0}, reach_m - standing.x},        {{1, 0, 0}, reach_m + standing.x},
       {{0, -1, 0}, reach_m - standing.y},        {{0, 1, 0}, reach_m + standing.y},
       {{0, 0, -1}, -above_floor_m - standing.z}, {{0, 0, 1}, reach_m + standing.z}};
-  for (const OutlinedView& view : views) add_cone(view, spaces);
+  // Where no view shows the person from head to foot, what each shows has to stand for the rest.
+  const auto is_cut = [](const OutlinedView& view) {
+    return cut_of(view).top || cut_of(view).bottom;
+  };
+  const bool some_whole = !std::ranges::all_of(views, is_cut);
+  for (const OutlinedView& view : views) add_cone(view, some_whole && is_cut(view), spaces);
   // Few planes: all their corners are tried.
   PersonBox box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
   constexpr double rounding = 1e-6;

@@ -101,6 +101,22 @@ TEST(PersonBox, GoesOnBeyondAPicturesEdge) {
   expect_inside(*box, shape, "narrow");
 }
 
+// Head and shoulders say nothing of how wide somebody is below the picture.
+TEST(PersonBox, HoldsFeetThatACloseCameraDoesNotSee) {
+  const Vec3 at{0, 0, 0};
+  const std::vector<Capsule> shape{{{0, 0, 0.9}, {0, 0, 1.38}, 0.17},
+                                   {{0, 0, 1.6}, {0, 0, 1.63}, 0.1},
+                                   {{0, 0, 0.9}, {0, 0.6, 0.045}, 0.045},
+                                   {{0, 0, 0.9}, {0, -0.5, 0.045}, 0.045}};
+  auto views = views_of(shape, {90}, {"pinhole", 1280, 300, {1500, 1500, 639.5, 299.5}}, 5);
+  ASSERT_EQ(views.size(), 1U);
+  EXPECT_GT(views[0].box[3], 296);
+  views.push_back(views_of(shape, {0}, pinhole_lens(), 5).at(0));
+  const auto box = person_box(views, at);
+  ASSERT_TRUE(box);
+  expect_inside(*box, shape, "close");
+}
+
 TEST(PersonBox, IsNoneWhereOutlinesDoNotMeetOrNumbersAreNone) {
   const auto left = views_of(with_arms_out({-1.5, 0, 0}), {0}, pinhole_lens(), 6);
   const auto right = views_of(with_arms_out({1.5, 0, 0}), {10}, pinhole_lens(), 6);
