@@ -14,9 +14,10 @@
 namespace studio {
 namespace {
 
-// Averaged over about this many frames, anew on a change beyond noise: this many standard
-// deviations of the mean of all directions, which is not known better than `least_change`. So an
-// exposure that creeps does not run ahead of its average.
+// Averaged over about this many frames; the farther a frame is off the average, the more of it is
+// taken, and all from a change on that is no noise: this many standard deviations of the mean of
+// all directions, which is not known better than `least_change`. So an exposure that creeps neither
+// runs ahead of its average nor is caught up with in steps.
 constexpr double average_frames = 12;
 constexpr double deviations = 4;
 constexpr double least_change = 0.01;
@@ -60,8 +61,9 @@ void ExposureFollower::follow(double exposure_s,
     spread_ = spread_of(pairs, over);
     const double sudden =
         std::max(least_change, deviations * spread_ / std::sqrt(static_cast<double>(pairs.size())));
-    const bool anew = !measured_ || std::abs(now / per_second_ - 1) > sudden;
-    per_second_ = anew ? now : per_second_ + (now - per_second_) / average_frames;
+    const double off = (now / per_second_ - 1) / sudden;
+    const double share = measured_ ? std::clamp(std::pow(off, 4), 1 / average_frames, 1.0) : 1;
+    per_second_ += share * (now - per_second_);
     measured_ = true;
   }
   level_ = per_second_ * unit;

@@ -63,6 +63,22 @@ TEST(ExposureFollower, KeepsUpWithAnExposureThatCreeps) {
   }
 }
 
+// No lag that is made up for at once, again and again.
+TEST(ExposureFollower, FollowsWhatCreepsWithoutSteps) {
+  made::Random random(12);
+  ExposureFollower follower;
+  constexpr double creep = 1.005;
+  constexpr int frames = 400;
+  double squares = 0;
+  for (int n = 0; n < frames; ++n) {
+    const double before = follower.level(), truth = std::pow(creep, n);
+    follower.follow(0, follower.level(), made_pairs(truth, follower.level(), random));
+    squares += std::pow(follower.level() / before - creep, 2) / frames;
+    EXPECT_NEAR(follower.level() / truth, 1, 0.012) << n;
+  }
+  EXPECT_LT(std::sqrt(squares), 0.005);
+}
+
 TEST(ExposureFollower, IsSteadierThanOneFrame) {
   made::Random random(3);
   ExposureFollower follower;
