@@ -9,10 +9,13 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
 #include <system_error>
+
+#include "compositing/matroska_mend.h"
 
 extern "C" {
 #include <libavformat/avio.h>
@@ -73,6 +76,9 @@ bool is_one_file(const std::string& a, const std::string& b) {
 }
 
 void require_writable(const std::string& path) {
+  struct stat found {};
+  // Opening a pipe would wait for its reader.
+  if (::stat(path.c_str(), &found) == 0 && S_ISFIFO(found.st_mode)) return;
   const Opened opened = open_to_write(path);
   if (opened.made) ::unlink(path.c_str());
   ::close(opened.descriptor);
@@ -113,8 +119,10 @@ OutputFile::OutputFile(const std::string& path) : path_(path) {
   made_ = opened.made;
   auto* const buffer = static_cast<unsigned char*>(av_malloc(buffer_size));
   if (buffer != nullptr) {
+    // A pipe's reader has what is written.
+    const bool seeks = ::lseek(descriptor_, 0, SEEK_CUR) >= 0;
     context_ = avio_alloc_context(buffer, buffer_size, 1, this, nullptr, &OutputFile::write,
-                                  &OutputFile::seek);
+                                  seeks ? &OutputFile::seek : nullptr);
   }
   if (context_ == nullptr) {
     av_free(buffer);
@@ -163,6 +171,11 @@ std::int64_t OutputFile::seek(void* file, std::int64_t offset, int whence) {
 
 std::int64_t OutputFile::place() const { return avio_tell(context_); }
 
+bool OutputFile::is_removed() const {
+  struct stat written {};
+  return ::fstat(descriptor_, &written) == 0 && S_ISREG(written.st_mode) && written.st_nlink == 0;
+}
+
 void OutputFile::require_there(bool by_name) const {
   struct stat written {
   }, named{};
@@ -174,6 +187,15 @@ void OutputFile::require_there(bool by_name) const {
                         named.st_dev == written.st_dev;
   if (!is_there)
     throw std::runtime_error(path_ + ": was moved while it was written: it is whole, elsewhere");
+}
+
+void OutputFile::shorten(std::int64_t place, double length_s) const noexcept {
+  std::array<char, 64> again{};
+  std::snprintf(again.data(), again.size(), "/proc/self/fd/%d", descriptor_);
+  const int descriptor = ::open(again.data(), O_RDWR | O_CLOEXEC);
+  if (descriptor < 0) return;
+  mend_cut_matroska(descriptor, place, length_s);
+  ::close(descriptor);
 }
 
 void OutputFile::mark(std::int64_t pictures) {

@@ -59,6 +59,11 @@ class OutputFile {
   // Throws std::runtime_error if the file was removed, and what is written is lost: with
   // `by_name`, also if it is no longer found by its path. Of pipes and devices it says nothing.
   void require_there(bool by_name) const;
+  // Of a regular file, whether it has no name any more.
+  bool is_removed() const;
+
+  // After it was cut back to `place` and ended anew: what it says of itself counts `length_s`.
+  void shorten(std::int64_t place, double length_s) const noexcept;
 
   // Clears a failed write. While discarding, writes seem to succeed and go nowhere.
   void discard(bool discarding) noexcept;

@@ -162,6 +162,7 @@ struct VideoWriter::State {
   void write_gathered();
   void give_gathered_up();
   std::int64_t room_for_index() const;
+  void end_shortened(std::int64_t place);
   [[noreturn]] void fail(const char* what, int error) const {
     throw std::runtime_error(settings.file + ": " + what + ": " + capture::libav::reason(error));
   }
@@ -179,6 +180,7 @@ struct VideoWriter::State {
   std::int64_t next_sample = 0;
   std::vector<Checkpoint> checkpoints;  // the last few
   std::int64_t pictures = 0;            // that the muxer has; after a failure, that the file has
+  std::vector<std::int64_t> ends;       // of so many pictures, the index after the last
   bool begun = false, drained = false, finished = false;
 };
 
@@ -240,6 +242,7 @@ void VideoWriter::State::open_streams() {
 void VideoWriter::State::write_packet(AVPacket* ready,
                                       const AVStream* stream,
                                       AVRational time_base) {
+  const std::int64_t end = ready->pts + 1;  // of a picture
   ready->stream_index = stream->index;
   av_packet_rescale_ts(ready, time_base, stream->time_base);
   // Not interleaved by libav: it would hold pictures back until sound comes, and sound may end.
@@ -248,7 +251,10 @@ void VideoWriter::State::write_packet(AVPacket* ready,
   if (error < 0) fail("writing failed", error);
   // The muxer gathers a cluster, and writes it at once when the next one starts: now, perhaps.
   file.mark(pictures);
-  if (stream == picture_stream) ++pictures;
+  if (stream == picture_stream) {
+    ++pictures;
+    ends.push_back(std::max(ends.empty() ? 0 : ends.back(), end));
+  }
   file.require_there(false);
 }
 
@@ -283,6 +289,13 @@ std::int64_t VideoWriter::State::room_for_index() const {
   constexpr std::int64_t fixed_room = 16 << 10;
   const double seconds = static_cast<double>(last_index + 1) / settings.rate.value();
   return fixed_room + static_cast<std::int64_t>(30 * seconds);
+}
+
+// Writes the index after what was cut back to `place`. The muxer counts what was cut off, too.
+void VideoWriter::State::end_shortened(std::int64_t place) {
+  if (av_write_trailer(muxer.get()) < 0) return;
+  const std::int64_t end = pictures > 0 ? ends[static_cast<std::size_t>(pictures - 1)] : 0;
+  file.shorten(place, static_cast<double>(end) / settings.rate.value());
 }
 
 VideoWriter::VideoWriter(const VideoSettings& settings) {
@@ -390,10 +403,12 @@ void VideoWriter::salvage() noexcept {
   state.give_gathered_up();
   const bool has_room = state.file.cut_back(state.room_for_index());
   state.pictures = state.file.whole_pictures();
-  if (has_room) av_write_trailer(state.muxer.get());
+  if (has_room) state.end_shortened(state.file.place());
 }
 
-std::int64_t VideoWriter::pictures() const { return state_->pictures; }
+std::int64_t VideoWriter::pictures() const {
+  return state_->file.is_removed() ? 0 : state_->pictures;
+}
 
 void VideoWriter::salvage_together(VideoWriter& a, VideoWriter& b) noexcept {
   State& one = *a.state_;
@@ -411,8 +426,8 @@ void VideoWriter::salvage_together(VideoWriter& a, VideoWriter& b) noexcept {
     one.pictures = last->pictures;
     other.pictures = same->pictures;
     if (!fits) continue;
-    av_write_trailer(one.muxer.get());
-    av_write_trailer(other.muxer.get());
+    one.end_shortened(last->place);
+    other.end_shortened(same->place);
     return;
   }
 }

@@ -85,7 +85,13 @@ void Recording::finish_oldest() {
   take.recorder->close();
   last_status_ = take.recorder->status();
   told_ = compositing::errors_of(last_status_).empty();
-  if (take_ || !ended_.empty()) note_last_errors();
+  if (!take_ && ended_.empty()) return;
+  note_last_errors();
+  if (last_status_.dropped == 0) return;
+  for (const compositing::RecordedOutput& output : last_status_.outputs) {
+    notes_.push_back(output.name + ": " + std::to_string(last_status_.dropped) +
+                     " frames are not in it");
+  }
 }
 
 void Recording::note_last_errors() {

@@ -101,6 +101,8 @@ void report_progress(const ShowStatus& status,
   if (planned) text += fmt::format(" of {}", *planned);
   text += fmt::format("  {:.1f} fps  delay {:.1f}", status.fps_now, status.delay_now_frames);
   if (status.dropped > 0) text += fmt::format("  dropped {}", status.dropped);
+  if (status.recorder.dropped > 0)
+    text += fmt::format("  not recorded {}", status.recorder.dropped);
   if (status.lost_plate_frames > 0) text += fmt::format("  lost {}", status.lost_plate_frames);
   console.progress(share, text);
 }

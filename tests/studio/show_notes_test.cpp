@@ -1,8 +1,12 @@
 // What a show tells, and its takes: started, stopped, refused.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -141,6 +145,55 @@ TEST_F(ShowNotes, NotesThatTheCamerasTrackHasEnded) {
   Show show(set);
   show.run();
   EXPECT_THAT(show.status()->notes, ElementsAre(HasSubstr("no pose at 0.120 s")));
+}
+
+TEST_F(ShowNotes, NotesWhatIsToBeDoubtedOfThePlateAndItsTrack) {
+  const std::string clip = (dir_ / "fields.mkv").string();
+  independent::ffmpeg(
+      "-f lavfi -i testsrc2=size=64x48:rate=50:duration=0.4 -vf tinterlace=interleave_top -c:v "
+      "mpeg2video -flags +ildct+ilme -top 1 '" +
+      clip + "'");
+  std::ofstream(dir_ / "track.csv") << "time_s,px,py,pz,qw,qx,qy,qz\n"
+                                       "0,0,-8,4,0.7,0.7,0,0\n9,0,-8,4,0.7,0.7,0,0\n";
+  Set set = made_set("file:" + clip);
+  set.camera.pose.track = (dir_ / "track.csv").string();
+  EXPECT_THAT(check_show(set),
+              AllOf(Contains(StartsWith("the plate: it is interlaced")),
+                    Contains(AllOf(StartsWith("the camera's track is doubtful: the camera hangs "
+                                              "upside down throughout"),
+                                   HasSubstr("track.csv")))));
+  EXPECT_THAT(check_show(made_set("grey:9,25,0")), testing::IsEmpty());
+}
+
+// What is written to is as slow as a disk that others write to.
+TEST_F(ShowNotes, NotesFramesThatAreMissingInARecording) {
+  Set set = made_set("grey:400,25,0");
+  set.record.file = (dir_ / "pipe.mkv").string();
+  set.record.codec = "lossless";
+  ASSERT_EQ(::mkfifo(set.record.file.c_str(), 0600), 0);
+  std::atomic<bool> told = false;
+  std::thread reader([&] {
+    const int pipe = ::open(set.record.file.c_str(), O_RDONLY | O_CLOEXEC);
+    ::fcntl(pipe, F_SETPIPE_SZ, 4096);
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!told && std::chrono::steady_clock::now() < give_up) std::this_thread::yield();
+    std::array<char, 4096> bytes;
+    while (::read(pipe, bytes.data(), bytes.size()) > 0) continue;
+    ::close(pipe);
+  });
+  ShowOptions options;
+  options.live = true;
+  Show show(set, options);
+  const auto missing = Contains(HasSubstr("frames are missing in the recording")).Times(1);
+  show.run([&](const ShownFrame&) {
+    if (show.status()->recorder.dropped == 0) return;
+    told = true;
+    show.post(Quit{});
+  });
+  told = true;
+  reader.join();
+  EXPECT_THAT(show.status()->notes, missing);
+  EXPECT_GT(show.status()->recorder.dropped, 0);
 }
 
 // A still stands for all times: the camera moves before it.
