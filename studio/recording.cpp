@@ -65,7 +65,9 @@ void Recording::start(const RecordSettings& settings) {
   stop();
   while (ended_.size() > most_ended) finish_oldest();
   note_last_errors();
-  take_ = {settings, std::make_unique<compositing::Recorder>(recorder)};
+  take_.emplace();
+  take_->settings = settings;
+  take_->recorder = std::make_unique<compositing::Recorder>(recorder);
 }
 
 void Recording::stop() {
@@ -111,6 +113,7 @@ void Recording::forget_finished() {
 void Recording::record(const ShownFrame& shown, bool wait) {
   if (!take_) return;
   const RecordSettings& settings = take_->settings;
+  take_->frame = shown.prepared.job.frame;
   if (wait) take_->recorder->wait_for_room();
   compositing::RecordedFrame frame;
   frame.number = shown.prepared.job.frame;
@@ -136,8 +139,26 @@ compositing::RecorderStatus Recording::status() {
   return last_status_;
 }
 
+// What is missing in the take that runs, each once.
+void Recording::note_missing() {
+  if (!take_) return;
+  const compositing::RecorderStatus status = take_->recorder->status();
+  const std::string by = "by frame " + std::to_string(take_->frame);
+  if (status.dropped > 0 && status.error.empty() && !std::exchange(take_->frames_told, true)) {
+    notes_.push_back(by +
+                     " frames are missing in the recording: the disk, or this machine, is too slow "
+                     "for it");
+  }
+  if (status.sounds_left_out > 0 && !std::exchange(take_->sound_told, true)) {
+    notes_.push_back(by +
+                     " sound is missing in the recording: it has another form than the plate told, "
+                     "a time far after its picture, or came while no frame could be written");
+  }
+}
+
 std::vector<std::string> Recording::take_notes() {
   forget_finished();
+  note_missing();
   return std::exchange(notes_, {});
 }
 

@@ -56,11 +56,14 @@ class Recording {
   struct Take {
     RecordSettings settings;
     std::unique_ptr<compositing::Recorder> recorder;
+    std::int64_t frame = 0;                        // the last one of the show
+    bool frames_told = false, sound_told = false;  // to be missing
   };
 
   compositing::RecorderSettings settings_of(const RecordSettings& settings) const;
   void forget_finished();
   void note_last_errors();
+  void note_missing();
   void finish_oldest();
   void finish_those_in_the_way(const RecordSettings& settings);
 

@@ -426,23 +426,6 @@ class Show::Stages {
     refused_exposures_ = refused;
   }
 
-  // Once a recording.
-  void note_recording(const ShowStatus& status) {
-    const std::int64_t missing = status.recorder.error.empty() ? status.recorder.dropped : 0;
-    if (missing > 0 && frames_not_recorded_ == 0) {
-      note("by frame " + std::to_string(status.frame) +
-           " frames are missing in the recording: the disk, or this machine, is too slow for it");
-    }
-    frames_not_recorded_ = missing;
-    const std::int64_t left_out = status.recorder.sounds_left_out;
-    if (left_out > 0 && sounds_left_out_ == 0) {
-      note("by frame " + std::to_string(status.frame) +
-           " sound is missing in the recording: it has another form than the plate told, a time "
-           "far after its picture, or came while no frame could be written");
-    }
-    sounds_left_out_ = left_out;
-  }
-
   template <class Act>
   static void timed(ShownFrame& shown, Stage stage, const Act& act) {
     const Clock::time_point start = Clock::now();
@@ -487,7 +470,6 @@ class Show::Stages {
     status.recording = recording_.running();
     status.recorder = recording_.status();
     for (std::string& what : recording_.take_notes()) note(std::move(what));
-    note_recording(status);
     publish(status);
   }
 
@@ -534,8 +516,6 @@ class Show::Stages {
   bool stays_coarse_ = false;
   std::string light_kept_because_;
   std::int64_t refused_exposures_ = 0;  // of the probe's camera, by the last frame
-  std::int64_t sounds_left_out_ = 0;    // of the recording, by then
-  std::int64_t frames_not_recorded_ = 0;
   capture::Pool<render::FrameResult> results_;
   capture::Pool<std::vector<std::uint8_t>> pictures_;
 

@@ -42,8 +42,10 @@ TEST(TrackDoubts, TellStretchesWithoutKeys) {
   Track track = walk(300);
   track.keys.erase(track.keys.begin() + 150, track.keys.begin() + 200);
   track.keys.erase(track.keys.begin() + 50, track.keys.begin() + 60);
-  EXPECT_THAT(doubts_of(track),
-              ElementsAre(HasSubstr("no key from 2.980 to 4.000 s, and is interpolated there, as in 1 other places")));
+  EXPECT_THAT(
+      doubts_of(track),
+      ElementsAre(HasSubstr(
+          "no key from 2.980 to 4.000 s, and is interpolated there, as in 1 other places")));
 }
 
 TEST(TrackDoubts, TellJumpsOfPlaceAndOfDirection) {
