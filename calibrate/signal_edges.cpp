@@ -14,6 +14,8 @@ constexpr double least_jump = 8;   // in standard deviations of the noise
 constexpr double most_unrest = 4;  // between frames of one level
 constexpr double least_sigma_s = 1e-5;
 constexpr std::size_t fewest_pairs = 4;
+// Where so little of an exposure's ends is hidden by noise, shares tell whether they are alike.
+constexpr double tells_share = 0.1;
 // Share of edges that are something else.
 constexpr double wrong_share = 0.02;
 
@@ -118,7 +120,7 @@ std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal) {
       if (std::abs(between.value - before) < most_unrest * noise || share < 0 || share > 1)
         continue;
       if (between.exposure_s > 0) {
-        edge.share = share;
+        if (hidden < tells_share) edge.share = share;
         edge.low_s = edge.high_s = between.time_s + (0.5 - share) * between.exposure_s;
         edge.sigma_s = std::max(least_sigma_s, 1.3 * noise_share * between.exposure_s);
       }

@@ -15,7 +15,8 @@ struct SignalEdge {
   double high_s = 0;
   double sigma_s = 0;  // of both limits
   bool rising = false;
-  // Of the exposure during which it was, after it; nothing if it was between two.
+  // Of the exposure during which it was, after it; nothing if it was between two, or noise hides
+  // what is near an exposure's ends.
   std::optional<double> share;
 };
 

@@ -17,10 +17,12 @@ namespace {
 constexpr std::size_t fewest_even = 10;
 // Between keys: longer than this many of the usual, and at least so long.
 constexpr double longest = 6, shortest_gap_s = 0.15;
-constexpr double slowest_s = 0.5;  // trackers have keys more often
-constexpr double far_m = 500;      // as far as a camera may be from the set
-// How much faster a step is than others about it, and how long at least.
+constexpr double slowest_s = 5;  // trackers have keys more often
+constexpr double far_m = 500;    // as far as a camera may be from the set
+// How much faster a step is than others about it; how long, and how fast, no operator is.
 constexpr double jump = 8, least_jump_m = 0.02, least_jump_rad = 0.02;
+constexpr double fastest_m_s = 4, fastest_rad_s = 12;
+constexpr double many_jumps = 0.1;  // of the steps: the poses change more rarely than lines come
 
 template <class... T>
 std::string text(const char* format, T... values) {
@@ -34,14 +36,15 @@ double angle_between(const Quaternion& a, const Quaternion& b) {
   return 2 * std::acos(std::min(cosine, 1.0));
 }
 
-// How fast the camera is from each key to the next, per second.
+// How fast the camera is from each key to the next, per second. Keys that are stamped too near to
+// each other came late.
 struct Speeds {
   std::vector<double> metres, radians;
 };
-Speeds speeds_of(std::span<const TrackKey> keys) {
+Speeds speeds_of(std::span<const TrackKey> keys, double usual_s) {
   Speeds speeds;
   for (std::size_t i = 1; i < keys.size(); ++i) {
-    const double s = keys[i].time_s - keys[i - 1].time_s;
+    const double s = std::max(keys[i].time_s - keys[i - 1].time_s, usual_s);
     speeds.metres.push_back(length(keys[i].position - keys[i - 1].position) / s);
     speeds.radians.push_back(angle_between(keys[i - 1].set_from_cam, keys[i].set_from_cam) / s);
   }
@@ -52,13 +55,12 @@ Speeds speeds_of(std::span<const TrackKey> keys) {
 // camera sets out, none.
 std::vector<std::size_t> jumps_in(std::span<const double> speeds,
                                   std::span<const double> intervals,
-                                  double least) {
+                                  double least,
+                                  double fastest) {
   std::vector<std::size_t> found;
-  for (std::size_t i = 0; i < speeds.size(); ++i) {
-    const double before = i < 2 ? 0 : speeds[i - 2];
-    const double after = i + 2 < speeds.size() ? speeds[i + 2] : 0;
-    const bool far = speeds[i] > jump * std::max(before, after);
-    if (far && speeds[i] * intervals[i] > least) found.push_back(i);
+  for (std::size_t i = 2; i + 2 < speeds.size(); ++i) {
+    const bool far = speeds[i] > jump * std::max(speeds[i - 2], speeds[i + 2]);
+    if (far && speeds[i] > fastest && speeds[i] * intervals[i] > least) found.push_back(i);
   }
   return found;
 }
@@ -91,29 +93,42 @@ std::vector<std::string> doubts_of(const Track& track) {
         "its keys are %.4g s apart: are its times seconds, not milliseconds or frames?", usual));
     return doubts;
   }
-  const double gap = std::max(longest * usual, shortest_gap_s);
-  const auto gaps = std::ranges::count_if(intervals, [&](double s) { return s > gap; });
-  if (gaps > 0) {
-    const auto widest =
-        static_cast<std::size_t>(std::ranges::max_element(intervals) - intervals.begin());
+  const Speeds speeds = speeds_of(keys, usual);
+  // A logger may leave out keys that are as the one before.
+  std::vector<double> gaps;
+  std::size_t widest = 0;
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    const double s = intervals[i];
+    const bool moves =
+        speeds.metres[i] * s > least_jump_m || speeds.radians[i] * s > least_jump_rad;
+    if (!moves || s < std::max(longest * usual, shortest_gap_s)) continue;
+    if (gaps.empty() || s > intervals[widest]) widest = i;
+    gaps.push_back(s);
+  }
+  if (!gaps.empty()) {
     doubts.push_back(text("it has no key from %.3f to %.3f s, and is interpolated there",
                           keys[widest].time_s, keys[widest + 1].time_s) +
-                     (gaps > 1 ? text(", as in %d other places", static_cast<int>(gaps - 1)) : ""));
+                     (gaps.size() > 1 ? text(" (gaps of this kind: %zu)", gaps.size()) : ""));
   }
-  const Speeds speeds = speeds_of(keys);
-  std::vector<std::size_t> jumps = jumps_in(speeds.metres, intervals, least_jump_m);
-  std::ranges::copy(jumps_in(speeds.radians, intervals, least_jump_rad), std::back_inserter(jumps));
+  std::vector<std::size_t> jumps = jumps_in(speeds.metres, intervals, least_jump_m, fastest_m_s);
+  std::ranges::copy(jumps_in(speeds.radians, intervals, least_jump_rad, fastest_rad_s),
+                    std::back_inserter(jumps));
   std::ranges::sort(jumps);
   const auto [end, last] = std::ranges::unique(jumps);
   jumps.erase(end, last);
-  if (!jumps.empty()) {
+  if (static_cast<double>(jumps.size()) > many_jumps * static_cast<double>(intervals.size())) {
+    doubts.push_back(
+        text("it moves in %zu of %zu steps, and hardly between: its poses are of fewer "
+             "moments than it has keys",
+             jumps.size(), intervals.size()));
+  } else if (!jumps.empty()) {
     const std::size_t i = jumps.front();
-    doubts.push_back((jumps.size() > 1
-                          ? text("it jumps in %d steps, first", static_cast<int>(jumps.size()))
-                          : "it jumps") +
-                     text(" from %.3f to %.3f s, by %.3g m and %.3g degrees", keys[i].time_s,
-                          keys[i + 1].time_s, speeds.metres[i] * intervals[i],
-                          speeds.radians[i] * intervals[i] * 180 / std::numbers::pi));
+    doubts.push_back(
+        (jumps.size() > 1 ? text("it jumps in %zu steps, first", jumps.size()) : "it jumps") +
+        text(" from %.3f to %.3f s, by %.3g m and %.3g degrees", keys[i].time_s, keys[i + 1].time_s,
+             length(keys[i + 1].position - keys[i].position),
+             angle_between(keys[i].set_from_cam, keys[i + 1].set_from_cam) * 180 /
+                 std::numbers::pi));
   }
   return doubts;
 }

@@ -224,8 +224,9 @@ void VideoFile::describe(const AVFrame& first) {
   if (first.interlaced_frame != 0) {
     info_.description += ", interlaced (taken as it is)";
     info_.doubt =
-        "it is interlaced, and each frame taken for a whole picture: its rows are of two moments, "
-        "and colours run from one into the other; deinterlace it first, as by ffmpeg -vf bwdif";
+        "it is marked as interlaced, and each frame taken for a whole picture: unless both fields "
+        "are of one moment (PsF), rows and colours of two are mixed; deinterlace it first, as by "
+        "ffmpeg -vf bwdif";
   }
   if (turn.any()) {
     info_.description += ", " + capture::describe(turn);

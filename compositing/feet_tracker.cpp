@@ -15,7 +15,7 @@ namespace {
 
 constexpr double acceleration_m_s2 = 30;  // of feet that land
 constexpr double stride_m = 1.2;          // between two feet, sideways in the picture
-constexpr double step_m = 0.55;            // and along the view: of a foot that overtakes the other
+constexpr double step_m = 0.55;           // and along the view: of a foot that overtakes the other
 constexpr double picture_s = 0.04;        // both within that time,
 constexpr double reach_m_s = 6;           // and so much further beyond it: some run
 constexpr double gate = 4;                // standard deviations

@@ -30,7 +30,7 @@ enum Id : std::uint32_t {
   tag_name = 0x45A3,
   tag_string = 0x4487
 };
-constexpr std::uint8_t void_id = 0xEC;
+constexpr std::uint8_t void_id = 0xEC, crc_id = 0xBF;
 constexpr int most_elements = 1'000'000;  // that are looked at
 
 struct Element {
@@ -114,6 +114,14 @@ std::array<std::uint8_t, n> big_endian(std::uint64_t bits) {
   return bytes;
 }
 
+// An element's check sum, which begins it, is no longer that of what it holds.
+void void_check(Elements& file, const Element& parent) {
+  file.each(parent, [&](const Element& element) {
+    if (element.id == crc_id) file.write(element.place, std::array{void_id});
+    return false;
+  });
+}
+
 void shorten_info(Elements& file, const Element& parent, double length_s) {
   double ns_per_tick = 1e6;
   Element told;
@@ -183,8 +191,12 @@ void mend_cut_matroska(int descriptor, std::int64_t end, double length_s) noexce
   file.each(0, all, [&](const Element& top) {
     if (top.id != segment) return true;
     file.each(top, [&](const Element& element) {
-      if (element.id == info) shorten_info(file, element, length_s);
+      if (element.id == info) {
+        void_check(file, element);
+        shorten_info(file, element, length_s);
+      }
       if (element.id == tags) {
+        void_check(file, element);
         file.each(element, [&](const Element& one) {
           file.each(one, [&](const Element& simple) {
             if (simple.id == simple_tag) shorten_tag(file, simple, length_s);
@@ -196,7 +208,10 @@ void mend_cut_matroska(int descriptor, std::int64_t end, double length_s) noexce
       return element.id != cluster;
     });
     file.each(end, all, [&](const Element& element) {
-      if (element.id == cues) void_cues(file, element, top.data, end);
+      if (element.id == cues) {
+        void_check(file, element);
+        void_cues(file, element, top.data, end);
+      }
       return true;
     });
     return false;

@@ -49,11 +49,16 @@ Opened open_to_write(const std::string& path) {
   while (true) {
     int descriptor = ::open(path.c_str(), how | O_EXCL, 0666);
     const bool made = descriptor >= 0;
-    if (!made && errno == EEXIST) descriptor = ::open(path.c_str(), how, 0666);
+    // Opening a pipe would wait for its reader.
+    if (!made && errno == EEXIST) descriptor = ::open(path.c_str(), how | O_NONBLOCK, 0666);
+    if (descriptor < 0 && errno == ENXIO) {
+      throw std::runtime_error(path + ": nobody reads from this pipe: start its reader first");
+    }
     if (descriptor < 0) {
       throw std::runtime_error(path +
                                ": cannot be written: " + std::generic_category().message(errno));
     }
+    ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) & ~O_NONBLOCK);
     struct stat found {};
     if (::fstat(descriptor, &found) != 0 || !S_ISREG(found.st_mode)) return {descriptor, made};
     lock(descriptor, path, "file");
@@ -77,8 +82,12 @@ bool is_one_file(const std::string& a, const std::string& b) {
 
 void require_writable(const std::string& path) {
   struct stat found {};
-  // Opening a pipe would wait for its reader.
-  if (::stat(path.c_str(), &found) == 0 && S_ISFIFO(found.st_mode)) return;
+  // A pipe's reader would take that it is closed again for its end.
+  if (::stat(path.c_str(), &found) == 0 && S_ISFIFO(found.st_mode)) {
+    if (::access(path.c_str(), W_OK) == 0) return;
+    throw std::runtime_error(path +
+                             ": cannot be written: " + std::generic_category().message(errno));
+  }
   const Opened opened = open_to_write(path);
   if (opened.made) ::unlink(path.c_str());
   ::close(opened.descriptor);

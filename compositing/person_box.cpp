@@ -19,6 +19,7 @@ constexpr int around_px = 2;
 constexpr double at_edge_px = 3;  // of the picture: an outline so near goes on
 constexpr double least_z = 0.02;  // of a unit direction, that has a place in the camera's plane
 constexpr double reach_m = 3, above_floor_m = 1e-3, margin_m = 0.02;
+constexpr double limb_m = 0.8;  // that may reach farther aside beyond a picture than within it
 
 // All p with dot(normal, p) <= limit.
 struct HalfSpace {
@@ -36,9 +37,10 @@ Cut cut_of(const OutlinedView& view) {
           bottom >= view.lens.height - 1 - at_edge_px};
 }
 
-// The outline's cone: four planes through the camera, without those of the picture's edges.
-// `sides_go_on`: what is below or above the picture may be wider than what it shows.
-void add_cone(const OutlinedView& view, bool sides_go_on, std::vector<HalfSpace>& spaces) {
+// The outline's cone: four planes through the camera, without those of the picture's edges. What is
+// beyond one edge may be wider than what the picture shows: planes of the edges beside it let as
+// much as a limb by, where another view shows it whole (`some_whole`).
+void add_cone(const OutlinedView& view, bool some_whole, std::vector<HalfSpace>& spaces) {
   const auto [left, top, right, bottom] = view.box;
   const Cut cut = cut_of(view);
   double x0 = infinity, x1 = -infinity, y0 = infinity, y1 = -infinity;
@@ -55,15 +57,15 @@ void add_cone(const OutlinedView& view, bool sides_go_on, std::vector<HalfSpace>
   }
   const calibrate::Pose set_from_cam = inverse(view.cam_from_set);
   const Vec3 camera = calibrate::position_of(view.cam_from_set);
-  const auto add = [&](bool at_edge, Vec3 v_cam) {
+  const auto add = [&](bool at_edge, bool goes_on, Vec3 v_cam) {
     if (at_edge) return;
     const Vec3 normal = set_from_cam.R * normalize(v_cam);
-    spaces.push_back({normal, dot(normal, camera)});
+    spaces.push_back({normal, dot(normal, camera) + (some_whole && goes_on ? limb_m : 0)});
   };
-  add(cut.left || sides_go_on, {-1, 0, x0});
-  add(cut.right || sides_go_on, {1, 0, -x1});
-  add(cut.top, {0, -1, y0});
-  add(cut.bottom, {0, 1, -y1});
+  add(cut.left, cut.top || cut.bottom, {-1, 0, x0});
+  add(cut.right, cut.top || cut.bottom, {1, 0, -x1});
+  add(cut.top, cut.left || cut.right, {0, -1, y0});
+  add(cut.bottom, cut.left || cut.right, {0, 1, -y1});
 }
 
 // Where three planes meet.
@@ -99,12 +101,12 @@ std::optional<PersonBox> person_box(std::span<const OutlinedView> views, Vec3 st
       {{-1, 0, 0}, reach_m - standing.x},        {{1, 0, 0}, reach_m + standing.x},
       {{0, -1, 0}, reach_m - standing.y},        {{0, 1, 0}, reach_m + standing.y},
       {{0, 0, -1}, -above_floor_m - standing.z}, {{0, 0, 1}, reach_m + standing.z}};
-  // Where no view shows the person from head to foot, what each shows has to stand for the rest.
-  const auto is_cut = [](const OutlinedView& view) {
-    return cut_of(view).top || cut_of(view).bottom;
-  };
-  const bool some_whole = !std::ranges::all_of(views, is_cut);
-  for (const OutlinedView& view : views) add_cone(view, some_whole && is_cut(view), spaces);
+  // Where no view shows all of the person, what each shows has to stand for the rest.
+  const bool some_whole = std::ranges::any_of(views, [](const OutlinedView& view) {
+    const Cut cut = cut_of(view);
+    return !cut.left && !cut.top && !cut.right && !cut.bottom;
+  });
+  for (const OutlinedView& view : views) add_cone(view, some_whole, spaces);
   // Few planes: all their corners are tried.
   PersonBox box{{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
   constexpr double rounding = 1e-6;

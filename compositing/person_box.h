@@ -33,7 +33,8 @@ struct PersonBox {
 // The least upright box, along the set's axes, that holds all places that each view sees within its
 // outline or beyond its picture, no further than 3 m from `standing` and no higher than 3 m, from a
 // millimetre above the floor it stands on; 20 mm wider than that. An outline that touches the
-// picture's edge goes on beyond it. Nothing if there is no such place, or it is not finite.
+// picture's edge goes on beyond it, there .8 m wider, if any view shows all of the person. Nothing
+// if there is no such place, or it is not finite.
 std::optional<PersonBox> person_box(std::span<const OutlinedView> views, calibrate::Vec3 standing);
 
 }  // namespace compositing

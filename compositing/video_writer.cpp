@@ -294,7 +294,8 @@ std::int64_t VideoWriter::State::room_for_index() const {
 // Writes the index after what was cut back to `place`. The muxer counts what was cut off, too.
 void VideoWriter::State::end_shortened(std::int64_t place) {
   if (av_write_trailer(muxer.get()) < 0) return;
-  const std::int64_t end = pictures > 0 ? ends[static_cast<std::size_t>(pictures - 1)] : 0;
+  if (pictures == 0) return;
+  const std::int64_t end = ends[static_cast<std::size_t>(pictures - 1)];
   file.shorten(place, static_cast<double>(end) / settings.rate.value());
 }
 

@@ -95,8 +95,8 @@ void KeptTransport::follow(const FrameKeys& keys, const FrameContext& frame) {
     changes.stalls = PictureStalls::changed(stalls_, frame.stalls);
     if (moved->empty() && changes.stalls.empty()) return;
     if (grid_.is_laid()) {
-      // Beyond its walls the grid tells little. It is laid anew as soon as hardly more is lost by
-      // that.
+      // In its outermost boxes the grid tells little. It is laid anew, and all is lost, as soon as
+      // a move there loses nearly as much, or moves have lost as much again and again.
       const bool beyond = !held(*moved) || !held(changes.stalls);
       const std::size_t before = beyond ? count_kept() : 0;
       if (caustics_before && frame.caustics && caustics_before->key() != frame.caustics->key()) {
@@ -106,7 +106,11 @@ void KeptTransport::follow(const FrameKeys& keys, const FrameContext& frame) {
       changes.but_apart = *Scene::moved_but_apart(places_, scene.places());
       changes.moved = std::move(*moved);
       forget(std::move(changes), frame);
-      if (2 * count_kept() < before) forget_all(scene);
+      const std::size_t lost = beyond ? before - count_kept() : 0;
+      lost_beyond_ += lost;
+      if (beyond && (4 * lost >= 3 * before || lost_beyond_ >= 2 * cells_.size())) {
+        forget_all(scene);
+      }
     } else {
       forget_all(scene);
     }
@@ -137,6 +141,7 @@ void KeptTransport::forget_all(const Scene& scene) {
   bends_plate_ = false;
   cones_.clear();
   grid_ = SpaceGrid(scene.virtual_bounds());
+  lost_beyond_ = 0;
 }
 
 void KeptTransport::forget(Changes changes, const FrameContext& frame) {

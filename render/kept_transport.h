@@ -155,6 +155,7 @@ class KeptTransport {
   Scene::Places places_;
   PictureStalls stalls_;
   SpaceGrid grid_;
+  std::size_t lost_beyond_ = 0;  // cells, by moves in its outermost boxes
   int columns_ = 0, rows_ = 0;
   std::vector<Cell> cells_;
   std::size_t max_bytes_ = 0;

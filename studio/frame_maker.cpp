@@ -89,7 +89,7 @@ FrameMaker::FrameMaker(Set set, std::optional<capture::Rational> rate, bool live
   });
   collecting([&] { light_ = light.get(); });
   if (const auto all = faults.sorted(); !all.empty()) throw SetError(all);
-  doubt_track();
+  if (track_) note_track(calibrate::doubts_of(*track_));
   if (!plate_->info().doubt.empty()) notes_.push_back("the plate: " + plate_->info().doubt);
 
   const capture::Rational plate_rate = plate_->info().rate;
@@ -296,9 +296,7 @@ void FrameMaker::note_plate(const capture::Frame& frame) {
 }
 
 // Notes what is to be doubted of the camera's track, unless it was noted before.
-void FrameMaker::doubt_track() {
-  std::vector<std::string> doubts;
-  if (track_) doubts = calibrate::doubts_of(*track_);
+void FrameMaker::note_track(std::vector<std::string> doubts) {
   if (doubts == track_doubts_) return;
   for (const std::string& doubt : doubts) {
     notes_.push_back(

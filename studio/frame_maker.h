@@ -158,6 +158,7 @@ class FrameMaker {
     std::unique_ptr<PersonFeed> persons;
     std::unique_ptr<VideoFeed> videos;
     std::optional<calibrate::Track> track;
+    std::vector<std::string> track_doubts;
     std::shared_ptr<const calibrate::DirectionTable> directions;
     std::shared_ptr<const calibrate::Lens> lens;
   };
@@ -208,7 +209,7 @@ class FrameMaker {
   void open_once_left(const Open& open) const;
   void finish_change();
   void note_plate(const capture::Frame& frame);
-  void doubt_track();
+  void note_track(std::vector<std::string> doubts);
   calibrate::Pose pose_at(capture::Time time);
   double place_of(capture::Time time) const;
   std::int64_t number_of(const capture::Frame& picture);

@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "calibrate/track_check.h"
 #include "studio/file_times.h"
 #include "studio/frame_maker.h"
 #include "studio/set_scene.h"
@@ -221,6 +222,7 @@ FrameMaker::Change FrameMaker::prepare(Set set,
     change.videos = std::make_unique<VideoFeed>(set, std::nullopt, live, &videos);
   });
   change.track = track_of(set);
+  if (change.track) change.track_doubts = calibrate::doubts_of(*change.track);
   change.directions = directions_of(set);
   change.lens = std::make_shared<calibrate::Lens>(lens_of(set));
   change.set_scene = describe_scene(set, given_up_.get_token());
@@ -283,7 +285,7 @@ void FrameMaker::take_over(Change change) {
   scene_ = std::move(change.scene);
   lamps_ = describe_lamps(set_);
   track_ = std::move(change.track);
-  doubt_track();
+  note_track(std::move(change.track_doubts));
   directions_ = std::move(change.directions);
   lens_ = std::move(change.lens);
   repeat_commands(*change.videos);

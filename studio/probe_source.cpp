@@ -9,6 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "calibrate/lens.h"
 #include "capture/bracketed_camera.h"
 #include "capture/camera_response.h"
@@ -446,13 +448,12 @@ ProbeSource::Radiance ProbeSource::at(capture::Time time, bool on_clock) {
     if (ahead_.empty() && camera_->has_ended(on_its_clock))
       status_.kept_because = "the probe has ended";
     status_.age = on_its_clock - newest_.time;
-    if (!camera_->is_live() && -status_.age > soonest_told && !is_told_ahead_) {
-      is_told_ahead_ = true;
-      notes_.push_back(
-          fmt::format("the probe's recording has no light until {:.2f} s later: its first stands "
-                      "until then; is "
-                      "probe.offset_s right?",
-                      std::chrono::duration<double>(-status_.age).count()));
+    const capture::Time ahead = camera_->first().time - on_its_clock;
+    if (!camera_->is_live() && ahead > soonest_told && !std::exchange(is_told_ahead_, true)) {
+      notes_.push_back(fmt::format(
+          "the probe's recording begins {:.2f} s later: its first light stands until then; is "
+          "probe.offset_s right?",
+          std::chrono::duration<double>(ahead).count()));
     }
   }
   return {newest_.image, newest_.time + passed_ + begun_.value_or(capture::Time{})};

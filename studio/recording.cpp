@@ -65,13 +65,15 @@ void Recording::start(const RecordSettings& settings) {
   stop();
   while (ended_.size() > most_ended) finish_oldest();
   note_last_errors();
+  auto opened = std::make_unique<compositing::Recorder>(recorder);
   take_.emplace();
   take_->settings = settings;
-  take_->recorder = std::make_unique<compositing::Recorder>(recorder);
+  take_->recorder = std::move(opened);
 }
 
 void Recording::stop() {
   if (!take_) return;
+  note_missing();
   take_->recorder->begin_close();
   ended_.push_back(std::move(*take_));
   take_.reset();
@@ -91,6 +93,7 @@ void Recording::finish_oldest() {
   note_last_errors();
   if (last_status_.dropped == 0) return;
   for (const compositing::RecordedOutput& output : last_status_.outputs) {
+    if (!output.error.empty()) continue;
     notes_.push_back(output.name + ": " + std::to_string(last_status_.dropped) +
                      " frames are not in it");
   }

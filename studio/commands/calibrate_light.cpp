@@ -185,18 +185,22 @@ Collected collect(const Set& set, const std::vector<PaintedPatch>& patches, std:
 
 // What both cameras' directions tell of the exposures that a fit by patches found: their ratio, the
 // median of the frames; nothing if too few are seen. They are of things far away, patches are not.
+// The pairs are in the frames' order.
 std::optional<double> told_by_overlap(const calibrate::LightGain& found,
                                       std::span<const calibrate::LightPair> overlap) {
   std::vector<double> ratios;
   for (std::size_t frame = 0; frame < found.exposures.size(); ++frame) {
-    std::vector<calibrate::LightPair> pairs;
-    std::ranges::copy_if(overlap, std::back_inserter(pairs),
-                         [&](const auto& pair) { return pair.frame == frame; });
+    const auto pairs = std::ranges::equal_range(overlap, frame, {}, &calibrate::LightPair::frame);
     if (pairs.size() < ExposureFollower::fewest_pairs || !(found.exposures[frame] > 0)) continue;
-    ratios.push_back(calibrate::follow_exposure(found, pairs) / found.exposures[frame]);
+    try {
+      ratios.push_back(calibrate::follow_exposure(found, pairs) / found.exposures[frame]);
+    } catch (const std::invalid_argument&) {
+      // A matrix that takes what is far away below 0.
+    }
   }
   if (ratios.empty()) return std::nullopt;
-  return capture::median_in_place(ratios);
+  const double told = capture::median_in_place(ratios);
+  return told > 0.01 && told < 100 ? std::optional(told) : std::nullopt;  // as sets may have it
 }
 
 struct Fit {
@@ -301,8 +305,8 @@ void calibrate_light(const LightOptions& options, Console& console) {
       told * most_off_overlap < 1 || told > most_off_overlap) {
     found.warnings.push_back(fmt::format(
         "directions that both cameras see tell {:.2g} of the patches' gain: the probe or "
-        "the plate's camera looks elsewhere than is said, or a patch has another albedo "
-        "or normal",
+        "the plate's camera looks elsewhere than is said, what both see is near, or a patch has "
+        "another albedo or normal",
         told));
   }
   const std::size_t pairs = collected.pairs.size();

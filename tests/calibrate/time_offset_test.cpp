@@ -307,6 +307,12 @@ TEST(FindTimeOffset, TellsOfALampInStepWithTheFrames) {
     EXPECT_GT(found.edges, 10U);
     EXPECT_NEAR(found.offset_s, 0.5, 1e-3);
   }
+  // Of a dim lamp only moments in the middle of an exposure are told.
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    made::Random random(seed);
+    const auto dim = record(random_lamp(0.3, random), {0.003, 0, frame_s, 0.036}, 20, 0.04, random);
+    EXPECT_FALSE(are_in_step(find_edges(dim))) << seed;
+  }
 }
 
 template <class Seen>

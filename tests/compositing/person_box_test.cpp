@@ -115,6 +115,22 @@ TEST(PersonBox, HoldsFeetThatACloseCameraDoesNotSee) {
   const auto box = person_box(views, at);
   ASSERT_TRUE(box);
   expect_inside(*box, shape, "close");
+  EXPECT_LT(box->upper.y - box->lower.y, 3.5);
+  // The same on their sides.
+  for (OutlinedView& view : views) {
+    const auto [left, top, right, bottom] = view.box;
+    const auto height = static_cast<float>(view.lens.height);
+    view.box = {height - 1 - bottom, left, height - 1 - top, right};
+    std::swap(view.lens.width, view.lens.height);
+    std::swap(view.lens.parameters[2], view.lens.parameters[3]);
+    view.lens.parameters[2] = static_cast<double>(height) - 1 - view.lens.parameters[2];
+    const calibrate::Mat3 turned{{0, -1, 0, 1, 0, 0, 0, 0, 1}};
+    view.cam_from_set = {turned * view.cam_from_set.R, turned * view.cam_from_set.t};
+  }
+  const auto aside = person_box(views, at);
+  ASSERT_TRUE(aside);
+  EXPECT_NEAR(aside->lower.y, box->lower.y, 0.02);
+  EXPECT_NEAR(aside->upper.x, box->upper.x, 0.02);
 }
 
 TEST(PersonBox, IsNoneWhereOutlinesDoNotMeetOrNumbersAreNone) {

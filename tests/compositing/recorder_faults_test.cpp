@@ -113,9 +113,10 @@ TEST_F(RecorderFaultsTest, StopsCleanlyWhenTheDiskIsFull) {
     EXPECT_LE(static_cast<std::int64_t>(times_s.size()), status.written + 1);
     // What was cut off counts neither there nor in the index.
     EXPECT_NEAR(duration_s, static_cast<double>(times_s.size()) / 25, 0.002) << codec;
-    EXPECT_THAT(probe(file, "stream_tags=DURATION"),
-                testing::AnyOf(testing::HasSubstr(std::to_string(duration_s).substr(0, 4)),
-                               testing::HasSubstr("0" + std::to_string(duration_s).substr(0, 4))));
+    std::istringstream tags(probe(file, "stream_tags=DURATION", ""));
+    for (std::string tag; tags >> tag;) {
+      EXPECT_LE(std::stod(tag.substr(tag.rfind(':') + 1)), duration_s + 0.05) << codec;
+    }
     EXPECT_EQ(picture_times_s(file).size(), times_s.size());
     const std::string last =
         output_of("ffmpeg -v error -xerror -ss 99 -i " + file + " -f rawvideo -pix_fmt gray -");

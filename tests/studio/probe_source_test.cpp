@@ -149,7 +149,7 @@ TEST(ProbeSource, ShowsWhatWasTakenByThenWhateverItsClock) {
 }
 
 // An offset of the wrong sign, or of another take.
-TEST(ProbeSource, SaysThatARecordingHasNoLightYet) {
+TEST(ProbeSource, SaysThatARecordingBeginsLater) {
   capture::register_camera("scripted", [&](std::string_view, const capture::CameraOptions&) {
     return std::make_unique<ScriptedCamera>([](std::int64_t) { return Moment{.radiance = 100}; });
   });
@@ -164,8 +164,7 @@ TEST(ProbeSource, SaysThatARecordingHasNoLightYet) {
     const std::vector<std::string> notes = source.take_notes();
     EXPECT_EQ(std::ranges::count_if(notes,
                                     [](const std::string& note) {
-                                      return note.find("has no light until 3.0") !=
-                                             std::string::npos;
+                                      return note.find("begins 3.00 s later") != std::string::npos;
                                     }),
               offset_s < -1 ? 1 : 0);
   }

@@ -158,7 +158,7 @@ TEST_F(ShowNotes, NotesWhatIsToBeDoubtedOfThePlateAndItsTrack) {
   Set set = made_set("file:" + clip);
   set.camera.pose.track = (dir_ / "track.csv").string();
   EXPECT_THAT(check_show(set),
-              AllOf(Contains(StartsWith("the plate: it is interlaced")),
+              AllOf(Contains(StartsWith("the plate: it is marked as interlaced")),
                     Contains(AllOf(StartsWith("the camera's track is doubtful: the camera hangs "
                                               "upside down throughout"),
                                    HasSubstr("track.csv")))));
