@@ -15,6 +15,7 @@
 #include "calibrate/angles.h"
 #include "compositing/billboard.h"
 #include "compositing/billboard_place.h"
+#include "compositing/feet.h"
 #include "compositing/key_error.h"
 #include "compositing/keyed_picture.h"
 #include "compositing/made_walker.h"
@@ -42,10 +43,17 @@ Vec3 round_at(double degrees, double radius_m, double z) {
   return {radius_m * std::sin(degrees * degree), -radius_m * std::cos(degrees * degree), z};
 }
 
+capture::Image alpha_of(const capture::Image& rgba) {
+  capture::Image alpha = capture::make_image(rgba.height, rgba.width, 1);
+  for (std::size_t i = 0; i < alpha.pixels.size(); ++i) alpha.pixels[i] = rgba.pixels[i * 4 + 3];
+  return alpha;
+}
+
 struct Filmed {
   BillboardCamera camera;
   std::shared_ptr<const compositing::KeyedPicture> picture;
-  std::array<float, 4> box{};  // of the person, pixels: left, top, right, bottom
+  std::array<float, 4> box{};            // of the person, pixels: left, top, right, bottom
+  std::vector<calibrate::Vec2> lower{};  // Feet::lower
 };
 
 struct Shown {
@@ -154,6 +162,7 @@ class HullChart {
                     std::max(film.box[2], fx + 1), std::max(film.box[3], fy + 1)};
       }
     }
+    film.lower = compositing::find_feet(alpha_of(rgba)).lower;
     film.picture =
         std::make_shared<compositing::KeyedPicture>(compositing::make_keyed_texture(rgba), true);
     return films_.emplace_back(std::pair(degrees, time_s), std::move(film)).second;
@@ -178,9 +187,9 @@ class HullChart {
       const compositing::Lowest foot =
           compositing::lowest_of({lens_, film.camera.cam_from_set, directions_}, walker_, time_s);
       const Vec3 at = method.in_middle ? body : foot.centre;
-      const auto place =
-          compositing::place_billboard(lens_, film.camera.cam_from_set, {at.x, at.y, 0}, film.box,
-                                       round_at(view_deg, distance_m, camera_m), turn_rad);
+      const auto place = compositing::place_billboard(
+          lens_, film.camera.cam_from_set, {at.x, at.y, 0}, film.box,
+          round_at(view_deg, distance_m, camera_m), turn_rad, film.lower);
       if (place) person.set_from_object = place->set_from_object;
       return scene;
     }
