@@ -1,4 +1,5 @@
 // Takes that go wrong: killed, disk full, folders that vanish, settings that cannot be.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -246,12 +247,20 @@ TEST_F(RecorderFaultsTest, GoesOnInFillKeyAndExrFramesWhenItIsTheProgrammeThatFa
 TEST_F(RecorderFaultsTest, WritesIntoAPipe) {
   const std::string pipe = path("pipe.mkv"), copy = path("copy.mkv");
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  std::thread reader([&] {
-    std::ifstream in(pipe, std::ios::binary);
-    std::ofstream(copy, std::ios::binary) << in.rdbuf();
-  });
+  EXPECT_THROW(Recorder(small_take(pipe)), std::runtime_error) << "nobody reads it";
+  const int end = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(end, 0);
+  std::thread reader;
   {
     Recorder recorder(small_take(pipe));
+    ::fcntl(end, F_SETFL, 0);
+    reader = std::thread([&] {
+      std::ofstream out(copy, std::ios::binary);
+      std::array<char, 4096> bytes;
+      for (ssize_t n; (n = ::read(end, bytes.data(), bytes.size())) > 0;) {
+        out.write(bytes.data(), n);
+      }
+    });
     for (int n = 0; n < 6; ++n) {
       recorder.wait_for_room();
       EXPECT_TRUE(recorder.push(picture(n, textured(64, 48, n))));
@@ -261,6 +270,7 @@ TEST_F(RecorderFaultsTest, WritesIntoAPipe) {
     EXPECT_EQ(recorder.status().written, 6);
   }
   reader.join();
+  ::close(end);
   EXPECT_EQ(picture_times_s(copy).size(), 6U);
 }
 

@@ -172,9 +172,11 @@ TEST_F(ShowNotes, NotesFramesThatAreMissingInARecording) {
   set.record.codec = "lossless";
   ASSERT_EQ(::mkfifo(set.record.file.c_str(), 0600), 0);
   std::atomic<bool> told = false;
+  const int pipe = ::open(set.record.file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  ASSERT_GE(pipe, 0);
+  ::fcntl(pipe, F_SETFL, 0);
+  ::fcntl(pipe, F_SETPIPE_SZ, 4096);
   std::thread reader([&] {
-    const int pipe = ::open(set.record.file.c_str(), O_RDONLY | O_CLOEXEC);
-    ::fcntl(pipe, F_SETPIPE_SZ, 4096);
     const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(20);
     while (!told && std::chrono::steady_clock::now() < give_up) std::this_thread::yield();
     std::array<char, 4096> bytes;
