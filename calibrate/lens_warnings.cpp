@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <numbers>
 #include <optional>
 
 #include "calibrate/angles.h"
+#include "calibrate/words.h"
 #include "capture/median.h"
 
 namespace calibrate {
@@ -28,13 +28,6 @@ constexpr double named_sigmas = 3;
 // Fish-eyes show nothing beyond, and the picture is black there.
 constexpr double image_circle_rad = 95 * degree;
 
-template <class... T>
-std::string text(const char* format, T... values) {
-  char buffer[400];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return buffer;
-}
-
 void warn_of_corners(const LensProblem& problem,
                      const LensCalibration& c,
                      std::vector<std::string>& warnings) {
@@ -49,28 +42,28 @@ void warn_of_corners(const LensProblem& problem,
     used += view.used;
   }
   if (c.start.not_finite > 0) {
-    warnings.push_back(text("%zu corners are no numbers or far outside of the picture; left out",
-                            c.start.not_finite));
+    warnings.push_back(words("%zu corners are no numbers or far outside of the picture; left out",
+                             c.start.not_finite));
   }
   if (static_cast<double>(seen - used) > outlier_share * static_cast<double>(seen)) {
-    warnings.push_back(text("%.0f %% of the corners do not fit: check how they were found",
-                            100 * static_cast<double>(seen - used) / static_cast<double>(seen)));
+    warnings.push_back(words("%.0f %% of the corners do not fit: check how they were found",
+                             100 * static_cast<double>(seen - used) / static_cast<double>(seen)));
   }
   if (c.sigma_px > scatter_px) {
     warnings.push_back(
-        text("corners scatter by %.1f px: blurred or moving pictures, or a board that is not flat",
-             c.sigma_px));
+        words("corners scatter by %.1f px: blurred or moving pictures, or a board that is not flat",
+              c.sigma_px));
   }
   if (hypotenuse(c.warp_m.x, c.warp_m.y) > bend_m) {
-    warnings.push_back(text("the board is bent by %.1f mm; that is taken into account",
-                            1000 * hypotenuse(c.warp_m.x, c.warp_m.y)));
+    warnings.push_back(words("the board is bent by %.1f mm; that is taken into account",
+                             1000 * hypotenuse(c.warp_m.x, c.warp_m.y)));
   }
   const double agreement = agreement_of_neighbours(problem, c.start, c.solve());
   if (agreement > suspicious_agreement) {
     warnings.push_back(
-        text("residuals of neighbouring corners agree (correlation %.2f): something is not in the "
-             "model, such as a rolling shutter, a moving board or one that is bent in another way",
-             agreement));
+        words("residuals of neighbouring corners agree (correlation %.2f): something is not in the "
+              "model, such as a rolling shutter, a moving board or one that is bent in another way",
+              agreement));
   }
 }
 
@@ -94,13 +87,13 @@ void warn_of_views(const LensCalibration& c, std::vector<std::string>& warnings)
   }
   if (used < few_views) {
     warnings.push_back(
-        text("only %zu pictures could be used: take 10 or more, over the whole picture", used));
+        words("only %zu pictures could be used: take 10 or more, over the whole picture", used));
   }
   if (used > 1 && most_tilt < tilt_rad) {
     warnings.push_back(
-        text("all boards face the same way (within %.0f degrees): the focal length and the "
-             "distance cannot be told apart; tilt the board by 30 degrees and more",
-             most_tilt / degree));
+        words("all boards face the same way (within %.0f degrees): the focal length and the "
+              "distance cannot be told apart; tilt the board by 30 degrees and more",
+              most_tilt / degree));
   }
 }
 
@@ -117,15 +110,15 @@ void warn_of_focal_lengths(const LensCalibration& c, std::vector<std::string>& w
   for (std::size_t i = 0; i < std::min(order.size(), most_named); ++i) {
     if (i > 0 && c.focal.deviation(order[i]) < named_sigmas) break;
     const double off = c.focal.views[order[i]]->factor / c.focal.mean_factor - 1;
-    named += (i > 0 ? ", " : "") + c.views[order[i]].name + text(" (%+.1f %%)", 100 * off);
+    named += (i > 0 ? ", " : "") + c.views[order[i]].name + words(" (%+.1f %%)", 100 * off);
   }
   warnings.push_back(
       "the pictures do not agree on one focal length (zoom or focus changed, a rolling shutter, or "
       "a board that is not flat or longer one way); farthest off: " +
       named +
-      text(". The error is told %.1f times larger, but if zoom or focus changed it is larger yet "
-           "and the lens not to be trusted: take them anew with one zoom and focus",
-           c.focal.error_factor()));
+      words(". The error is told %.1f times larger, but if zoom or focus changed it is larger yet "
+            "and the lens not to be trusted: take them anew with one zoom and focus",
+            c.focal.error_factor()));
 }
 
 // Beyond the image circle of a fish-eye there is nothing to see; such lenses fill their pictures.
@@ -165,7 +158,7 @@ void warn_of_coverage(const LensProblem& problem,
     }
   }
   if (blind > 0) {
-    warnings.push_back(text(
+    warnings.push_back(words(
         "the lens is blind in %.1f %% of the picture, for its polynomial turns back there: take "
         "pictures with the board at the rim and in the corners, or let --model name a simpler "
         "form",
@@ -174,20 +167,20 @@ void warn_of_coverage(const LensProblem& problem,
   seen += blind;
   unknown += blind;
   if (static_cast<double>(unknown) > unseen_share * static_cast<double>(seen)) {
-    warnings.push_back(text("no corners in %.0f %% of the picture: the lens is a guess there",
-                            100 * static_cast<double>(unknown) / static_cast<double>(seen)));
+    warnings.push_back(words("no corners in %.0f %% of the picture: the lens is a guess there",
+                             100 * static_cast<double>(unknown) / static_cast<double>(seen)));
   }
   if (farthest_rad > 1.1 * c.coverage_deg * degree) {
     warnings.push_back(
-        text("no corners beyond %.0f degrees off the axis: the rim is a guess", c.coverage_deg));
+        words("no corners beyond %.0f degrees off the axis: the rim is a guess", c.coverage_deg));
   }
   if (errors.empty()) return;
   const double error_px = capture::median_in_place(errors);
   if (error_px > large_error_px) {
     warnings.push_back(
-        text("a virtual object may be off by %.0f px in half of the picture: take more pictures, "
-             "tilted in all directions",
-             error_px));
+        words("a virtual object may be off by %.0f px in half of the picture: take more pictures, "
+              "tilted in all directions",
+              error_px));
   }
 }
 

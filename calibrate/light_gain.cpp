@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
 #include <unordered_map>
@@ -11,6 +10,7 @@
 
 #include <Eigen/Dense>
 
+#include "calibrate/words.h"
 #include "capture/median.h"
 
 namespace calibrate {
@@ -356,10 +356,8 @@ LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOption
     const double factor = largest_factor(pairs, logs);
     constexpr double much = 1.3;
     if (factor > much) {
-      std::array<char, 100> text{};
-      std::snprintf(text.data(), text.size(),
-                    "these differ by a factor of %.1f: is an albedo or a normal wrong?", factor);
-      fit.warnings.emplace_back(text.data());
+      fit.warnings.push_back(
+          words("these differ by a factor of %.1f: is an albedo or a normal wrong?", factor));
     }
     return fit;
   }

@@ -131,14 +131,14 @@ std::vector<SignalEdge> find_edges(std::span<const SignalSample> signal) {
 }
 
 bool are_in_step(std::span<const SignalEdge> edges) {
-  constexpr std::size_t fewest = 6;
+  constexpr double fewest = 6;
   constexpr double most_apart = 0.1;  // standard deviation; at random it is .29
   double count = 0, sum = 0, squares = 0;
   for (const SignalEdge& edge : edges) {
     if (!edge.share) continue;
     count += 1, sum += *edge.share, squares += *edge.share * *edge.share;
   }
-  if (count < static_cast<double>(fewest)) return false;
+  if (count < fewest) return false;
   const double mean = sum / count;
   return squares / count - mean * mean < most_apart * most_apart;
 }

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <iterator>
 #include <numbers>
 #include <span>
 
+#include "calibrate/words.h"
 #include "capture/median.h"
 
 namespace calibrate {
@@ -23,13 +23,6 @@ constexpr double far_m = 500;    // as far as a camera may be from the set
 constexpr double jump = 8, least_jump_m = 0.02, least_jump_rad = 0.02;
 constexpr double fastest_m_s = 4, fastest_rad_s = 12;
 constexpr double many_jumps = 0.1;  // of the steps: the poses change more rarely than lines come
-
-template <class... T>
-std::string text(const char* format, T... values) {
-  char buffer[200];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return buffer;
-}
 
 double angle_between(const Quaternion& a, const Quaternion& b) {
   const double cosine = std::abs(a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z);
@@ -71,7 +64,7 @@ std::vector<std::string> doubts_of(const Track& track) {
   const std::span<const TrackKey> keys = track.keys;
   std::vector<std::string> doubts;
   if (std::ranges::all_of(keys, [](const TrackKey& key) { return length(key.position) > far_m; })) {
-    doubts.push_back(text("no key is nearer than %.0f m: are its places in millimetres?", far_m));
+    doubts.push_back(words("no key is nearer than %.0f m: are its places in millimetres?", far_m));
   }
   // How far the picture's way down goes up in the set.
   constexpr double downwards = 0.1;
@@ -88,27 +81,29 @@ std::vector<std::string> doubts_of(const Track& track) {
     intervals.push_back(keys[i].time_s - keys[i - 1].time_s);
   }
   const double usual = capture::median(intervals);
+  if (std::ranges::all_of(intervals, [](double s) { return s == 1; })) {
+    doubts.emplace_back("its keys are 1 s apart: do its times count frames?");
+    return doubts;
+  }
   if (usual > slowest_s) {
-    doubts.push_back(text(
-        "its keys are %.4g s apart: are its times seconds, not milliseconds or frames?", usual));
+    doubts.push_back(words("its keys are %.4g s apart: are its times milliseconds?", usual));
     return doubts;
   }
   const Speeds speeds = speeds_of(keys, usual);
   // A logger may leave out keys that are as the one before.
-  std::vector<double> gaps;
-  std::size_t widest = 0;
+  std::size_t gaps = 0, widest = 0;
   for (std::size_t i = 0; i < intervals.size(); ++i) {
     const double s = intervals[i];
     const bool moves =
         speeds.metres[i] * s > least_jump_m || speeds.radians[i] * s > least_jump_rad;
     if (!moves || s < std::max(longest * usual, shortest_gap_s)) continue;
-    if (gaps.empty() || s > intervals[widest]) widest = i;
-    gaps.push_back(s);
+    if (gaps == 0 || s > intervals[widest]) widest = i;
+    ++gaps;
   }
-  if (!gaps.empty()) {
-    doubts.push_back(text("it has no key from %.3f to %.3f s, and is interpolated there",
-                          keys[widest].time_s, keys[widest + 1].time_s) +
-                     (gaps.size() > 1 ? text(" (gaps of this kind: %zu)", gaps.size()) : ""));
+  if (gaps > 0) {
+    doubts.push_back(words("it has no key from %.3f to %.3f s, and is interpolated there",
+                           keys[widest].time_s, keys[widest + 1].time_s) +
+                     (gaps > 1 ? words(" (gaps of this kind: %zu)", gaps) : ""));
   }
   std::vector<std::size_t> jumps = jumps_in(speeds.metres, intervals, least_jump_m, fastest_m_s);
   std::ranges::copy(jumps_in(speeds.radians, intervals, least_jump_rad, fastest_rad_s),
@@ -118,17 +113,17 @@ std::vector<std::string> doubts_of(const Track& track) {
   jumps.erase(end, last);
   if (static_cast<double>(jumps.size()) > many_jumps * static_cast<double>(intervals.size())) {
     doubts.push_back(
-        text("it moves in %zu of %zu steps, and hardly between: its poses are of fewer "
-             "moments than it has keys",
-             jumps.size(), intervals.size()));
+        words("it moves in %zu of %zu steps, and hardly between: its poses are of fewer "
+              "moments than it has keys",
+              jumps.size(), intervals.size()));
   } else if (!jumps.empty()) {
     const std::size_t i = jumps.front();
     doubts.push_back(
-        (jumps.size() > 1 ? text("it jumps in %zu steps, first", jumps.size()) : "it jumps") +
-        text(" from %.3f to %.3f s, by %.3g m and %.3g degrees", keys[i].time_s, keys[i + 1].time_s,
-             length(keys[i + 1].position - keys[i].position),
-             angle_between(keys[i].set_from_cam, keys[i + 1].set_from_cam) * 180 /
-                 std::numbers::pi));
+        (jumps.size() > 1 ? words("it jumps in %zu steps, first", jumps.size()) : "it jumps") +
+        words(" from %.3f to %.3f s, by %.3g m and %.3g degrees", keys[i].time_s,
+              keys[i + 1].time_s, length(keys[i + 1].position - keys[i].position),
+              angle_between(keys[i].set_from_cam, keys[i + 1].set_from_cam) * 180 /
+                  std::numbers::pi));
   }
   return doubts;
 }

@@ -91,6 +91,8 @@ void turn_image(const Turn& turn, const Image& from, Image& to) {
   }
   if (from.channels == 4) {
     copy_turned<4>(first, step_y, step_x, to);
+  } else if (from.channels == 1) {
+    copy_turned<1>(first, step_y, step_x, to);
   } else {
     copy_turned<3>(first, step_y, step_x, to);
   }

@@ -6,7 +6,10 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "capture/turn.h"
 
 namespace compositing {
 
@@ -459,15 +462,7 @@ Field field_of(const capture::Image& image, const char* what) {
   return field;
 }
 
-// A quarter turn to the right.
-Field turned(const Field& field) {
-  Field to{field.width, field.height, std::vector<float>(field.of.size())};
-  for (int y = 0; y < field.height; ++y)
-    for (int x = 0; x < field.width; ++x) to.at(x, field.height - 1 - y) = field.at(y, x);
-  return to;
-}
-
-// And back: what was found in a picture that was turned from one of that height.
+// What was found in a picture that was turned by a quarter to the right, from one of that height.
 Feet turned_back(Feet feet, int height) {
   const auto back = [&](calibrate::Vec2& q) { q = {q.y, height - 1 - q.x}; };
   back(feet.q);
@@ -486,15 +481,25 @@ Feet find_feet(const capture::Image& image, int turns, const capture::Image& mas
   if (!mask.empty()) masked = field_of(mask, "mask");
   if (!mask.empty() && (mask.height != image.height || mask.width != image.width))
     throw std::invalid_argument("find_feet: the mask must be of the matte's size");
-  std::vector<int> heights;  // before each turn
-  for (int i = 0; i < (turns % 4 + 4) % 4; ++i) {
-    heights.push_back(alpha.height);
-    alpha = turned(alpha);
-    masked = turned(masked);
-  }
-  Feet feet = find_upright(alpha, masked);
+  const int quarters = (turns % 4 + 4) % 4;
+  if (quarters == 0) return find_upright(alpha, masked);
+  static constexpr std::array<capture::Turn, 4> to_the_right{
+      {{},
+       {.transposed = true, .mirrored = true},
+       {.mirrored = true, .upended = true},
+       {.transposed = true, .upended = true}}};
+  const auto turned = [&](const Field& field) {
+    capture::Image from = capture::make_image(field.height, field.width, 1), to;
+    from.pixels = field.of;
+    capture::turn_image(to_the_right[static_cast<std::size_t>(quarters)], from, to);
+    return Field{to.height, to.width, std::move(to.pixels)};
+  };
+  Feet feet = find_upright(turned(alpha), mask.empty() ? masked : turned(masked));
   if (feet.status == FeetStatus::absent) return feet;
-  for (; !heights.empty(); heights.pop_back()) feet = turned_back(std::move(feet), heights.back());
+  // The last quarter first: what was before it is as high as the picture, or as wide.
+  for (int i = quarters; i > 0; --i) {
+    feet = turned_back(std::move(feet), i % 2 == 1 ? image.height : image.width);
+  }
   return feet;
 }
 

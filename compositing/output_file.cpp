@@ -207,11 +207,11 @@ void OutputFile::shorten(std::int64_t place, double length_s) const noexcept {
   ::close(descriptor);
 }
 
-void OutputFile::mark(std::int64_t pictures) {
+void OutputFile::mark(Whole whole) {
   const std::int64_t here = place();
   if (!marks_.empty() && marks_.back().place == here) return;
   if (marks_.size() == marks_kept) marks_.erase(marks_.begin());
-  marks_.push_back({here, pictures});
+  marks_.push_back({here, whole});
 }
 
 void OutputFile::discard(bool discarding) noexcept {

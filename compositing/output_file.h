@@ -46,12 +46,15 @@ class OutputFile {
 
   AVIOContext* context() const { return context_; }
 
-  // Remembers that all up to here is whole, and so many pictures of it. Only the last few places
-  // are kept.
-  void mark(std::int64_t pictures);
+  // What is whole: so many pictures, of which `end` is the index after the last.
+  struct Whole {
+    std::int64_t pictures = 0, end = 0;
+  };
+  // Remembers that all up to here is whole, and what that is. Only the last few places are kept.
+  void mark(Whole whole);
 
-  // Pictures up to the last place that is remembered: after cut_back(), those that are left.
-  std::int64_t whole_pictures() const { return marks_.empty() ? 0 : marks_.back().pictures; }
+  // Up to the last place that is remembered: after cut_back(), what is left.
+  Whole whole() const { return marks_.empty() ? Whole{} : marks_.back().whole; }
 
   // Bytes so far.
   std::int64_t place() const;
@@ -78,7 +81,8 @@ class OutputFile {
 
  private:
   struct Mark {
-    std::int64_t place = 0, pictures = 0;
+    std::int64_t place = 0;
+    Whole whole;
   };
 
   static int write(void* file, std::uint8_t* data, int size);

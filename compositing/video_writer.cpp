@@ -180,7 +180,7 @@ struct VideoWriter::State {
   std::int64_t next_sample = 0;
   std::vector<Checkpoint> checkpoints;  // the last few
   std::int64_t pictures = 0;            // that the muxer has; after a failure, that the file has
-  std::vector<std::int64_t> ends;       // of so many pictures, the index after the last
+  std::int64_t end = 0;                 // the index after the last of them
   bool begun = false, drained = false, finished = false;
 };
 
@@ -236,13 +236,13 @@ void VideoWriter::State::open_streams() {
   const int error = avformat_write_header(context, &options);
   av_dict_free(&options);
   if (error < 0) fail("the header cannot be written", error);
-  file.mark(0);
+  file.mark({});
 }
 
 void VideoWriter::State::write_packet(AVPacket* ready,
                                       const AVStream* stream,
                                       AVRational time_base) {
-  const std::int64_t end = ready->pts + 1;  // of a picture
+  const std::int64_t pts = ready->pts;
   ready->stream_index = stream->index;
   av_packet_rescale_ts(ready, time_base, stream->time_base);
   // Not interleaved by libav: it would hold pictures back until sound comes, and sound may end.
@@ -250,10 +250,10 @@ void VideoWriter::State::write_packet(AVPacket* ready,
   av_packet_unref(ready);
   if (error < 0) fail("writing failed", error);
   // The muxer gathers a cluster, and writes it at once when the next one starts: now, perhaps.
-  file.mark(pictures);
+  file.mark({pictures, end});
   if (stream == picture_stream) {
     ++pictures;
-    ends.push_back(std::max(ends.empty() ? 0 : ends.back(), end));
+    end = std::max(end, pts + 1);
   }
   file.require_there(false);
 }
@@ -274,7 +274,7 @@ void VideoWriter::State::write_gathered() {
   if (const int error = av_write_frame(muxer.get(), nullptr); error < 0) {
     fail("writing failed", error);
   }
-  file.mark(pictures);
+  file.mark({pictures, end});
 }
 
 // What the muxer still holds refers to pictures that were lost.
@@ -293,9 +293,7 @@ std::int64_t VideoWriter::State::room_for_index() const {
 
 // Writes the index after what was cut back to `place`. The muxer counts what was cut off, too.
 void VideoWriter::State::end_shortened(std::int64_t place) {
-  if (av_write_trailer(muxer.get()) < 0) return;
-  if (pictures == 0) return;
-  const std::int64_t end = ends[static_cast<std::size_t>(pictures - 1)];
+  if (av_write_trailer(muxer.get()) < 0 || pictures == 0) return;
   file.shorten(place, static_cast<double>(end) / settings.rate.value());
 }
 
@@ -403,7 +401,8 @@ void VideoWriter::salvage() noexcept {
   state.finished = true;
   state.give_gathered_up();
   const bool has_room = state.file.cut_back(state.room_for_index());
-  state.pictures = state.file.whole_pictures();
+  state.pictures = state.file.whole().pictures;
+  state.end = state.file.whole().end;
   if (has_room) state.end_shortened(state.file.place());
 }
 
@@ -424,8 +423,8 @@ void VideoWriter::salvage_together(VideoWriter& a, VideoWriter& b) noexcept {
     const auto same = std::ranges::find(other.checkpoints, last->index, &Checkpoint::index);
     if (same == other.checkpoints.end()) continue;
     const bool fits = one.file.cut_to(last->place, room) & other.file.cut_to(same->place, room);
-    one.pictures = last->pictures;
-    other.pictures = same->pictures;
+    one.pictures = last->pictures, other.pictures = same->pictures;
+    one.end = other.end = last->index + 1;
     if (!fits) continue;
     one.end_shortened(last->place);
     other.end_shortened(same->place);

@@ -18,7 +18,6 @@ constexpr double pixels_along_texel = 3;
 constexpr int most_step = 16;
 // Fewer plate pixels than this in a texel are its rim.
 constexpr int least_pixels_per_texel = 4;
-// Above this spread, the two cameras do not look at the same things.
 
 using Colour = std::array<float, 3>;
 

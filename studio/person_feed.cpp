@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -442,10 +443,10 @@ void PersonFeed::place_billboard(Person& person, Vec3 viewer) {
   auto& place = person.frame.places[index];
   if (camera.lens) {
     const std::array<float, 4> box = feed.person_box();
-    const std::vector<calibrate::Vec2> none;
+    std::span<const calibrate::Vec2> lower;
+    if (s.by_feet) lower = person.cameras[index].lower;
     const auto placed = compositing::place_billboard(
-        *camera.lens, camera.cam_from_set, status.position, box, viewer, s.turn_rad,
-        s.by_feet ? person.cameras[index].lower : none);
+        *camera.lens, camera.cam_from_set, status.position, box, viewer, s.turn_rad, lower);
     if (!placed) {
       const bool nobody = !(box[2] > box[0] && box[3] > box[1]);
       if (nobody) return;  // nothing is to be seen of it, wherever it is

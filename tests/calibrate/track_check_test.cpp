@@ -84,15 +84,17 @@ TEST(TrackDoubts, TellJumpsOfPlaceAndOfDirection) {
 }
 
 TEST(TrackDoubts, TellOtherUnitsAndAxes) {
-  Track milliseconds = walk(300), millimetres = walk(300), y_up = walk(300);
+  Track milliseconds = walk(300), frames = walk(300), millimetres = walk(300), y_up = walk(300);
   for (TrackKey& key : milliseconds.keys) key.time_s *= 1000;
+  for (std::size_t i = 0; i < 300; ++i) frames.keys[i].time_s = static_cast<double>(i);
   for (TrackKey& key : millimetres.keys) key.position = key.position * 1000.0;
   // As a camera whose y is up, which looks along -z, has it.
   for (TrackKey& key : y_up.keys) {
     const Quaternion q = key.set_from_cam;
     key.set_from_cam = {-q.x, q.w, q.z, -q.y};  // times i, half a turn about x
   }
-  EXPECT_THAT(doubts_of(milliseconds), ElementsAre(HasSubstr("are its times seconds")));
+  EXPECT_THAT(doubts_of(milliseconds), ElementsAre(HasSubstr("are its times milliseconds?")));
+  EXPECT_THAT(doubts_of(frames), ElementsAre(HasSubstr("do its times count frames?")));
   EXPECT_THAT(doubts_of(millimetres), Contains(HasSubstr("are its places in millimetres?")));
   EXPECT_THAT(doubts_of(y_up), ElementsAre(HasSubstr("upside down throughout")));
 }
