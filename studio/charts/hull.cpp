@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <list>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -187,9 +188,12 @@ class HullChart {
       const compositing::Lowest foot =
           compositing::lowest_of({lens_, film.camera.cam_from_set, directions_}, walker_, time_s);
       const Vec3 at = method.in_middle ? body : foot.centre;
-      const auto place = compositing::place_billboard(
-          lens_, film.camera.cam_from_set, {at.x, at.y, 0}, film.box,
-          round_at(view_deg, distance_m, camera_m), turn_rad, film.lower);
+      // As shows have it: of persons that stand by their feet.
+      std::span<const calibrate::Vec2> lower;
+      if (!method.in_middle) lower = film.lower;
+      const auto place =
+          compositing::place_billboard(lens_, film.camera.cam_from_set, {at.x, at.y, 0}, film.box,
+                                       round_at(view_deg, distance_m, camera_m), turn_rad, lower);
       if (place) person.set_from_object = place->set_from_object;
       return scene;
     }
