@@ -265,11 +265,13 @@ std::array<float, 4> KeyedTexture::filtered(float u, float v, float footprint_uv
     return std::clamp(place * n - 0.5F, 0.0F, n - 1);
   };
   const auto answer = [](Four sum) { return std::array{sum[0], sum[1], sum[2], sum[3]}; };
-  if (!(footprint > 0.5F)) {
+  if (!(footprint > 1)) {
     const HalfImage& at = level(0);
     return answer(bilinear(at, texels(unit(u), at.width), texels(unit(v), at.height)));
   }
-  const float apart = 0.25F * footprint * std::min(2 * footprint - 1, 1.0F);
+  // Four interpolated texels this far from the middle spread as far as a square of texels does.
+  const float apart =
+      footprint < 2 ? std::sqrt((footprint * footprint - 1) / 12) : 0.25F * footprint;
   const float level_of = std::max(0.0F, std::log2(render::trilinear_texel * 0.5F * footprint));
   const auto fine = std::min(static_cast<std::size_t>(level_of), coarser_.size());
   const float share = fine < coarser_.size() ? level_of - static_cast<float>(fine) : 0;

@@ -39,8 +39,10 @@ class KeyedTexture {
   bool is_bare() const { return bare_everywhere_; }
   // Whether it is here: not where the person is near.
   bool is_clear(float u, float v, float footprint_uv) const;
-  // Red, green, blue and alpha at (u, v), filtered over a square of `footprint_uv`, of the places
-  // that render::find_video_samples() has.
+  // Red, green, blue and alpha at (u, v), filtered over a square of `footprint_uv`. A texel counts
+  // as the mean of its own square, as a camera's pixel is: up to one texel wide it is interpolated
+  // once, so that a person who is seen as filmed is as sharp as filmed. From two texels on, the
+  // places are those of render::find_video_samples().
   std::array<float, 4> filtered(float u, float v, float footprint_uv) const;
 
  private:

@@ -99,6 +99,8 @@ TEST(KeyedTexture, FiltersAsTheRendersTexturesDo) {
     for (int i = 0; i < 3000; ++i) {
       const float u = 1.2F * one(random) - 0.1F, v = 1.2F * one(random) - 0.1F;
       const float wide = std::exp2(-9 * one(random));
+      const float texels = wide * std::sqrt(static_cast<float>(width * height));
+      if (texels > 0.5F && texels < 2) continue;  // there a texel counts as the mean of its square
       const auto seen = texture->filtered(u, v, wide);
       const auto truth = reference(wanted, u, v, wide);
       for (std::size_t c = 0; c < 4; ++c) {
@@ -106,6 +108,42 @@ TEST(KeyedTexture, FiltersAsTheRendersTexturesDo) {
             << width << "x" << height << ": " << u << " " << v << " wide " << wide;
       }
     }
+  }
+}
+
+// The mean of a picture whose texels are squares, over a square of `wide` texels about (x, y).
+double mean_of_squares(const capture::Image& image, double x, double y, double wide, int c) {
+  double sum = 0;
+  for (int j = 0; j < image.height; ++j) {
+    const double high = std::min(j + 1.0, y + wide / 2) - std::max<double>(j, y - wide / 2);
+    for (int i = 0; i < image.width && high > 0; ++i) {
+      const double broad = std::min(i + 1.0, x + wide / 2) - std::max<double>(i, x - wide / 2);
+      if (broad > 0) sum += high * broad * static_cast<double>(image.at(j, i, c));
+    }
+  }
+  return sum / (wide * wide);
+}
+
+TEST(KeyedTexture, IsAsSharpAsFilmedWhereAPixelSeesOneTexel) {
+  constexpr int size = 64;
+  const capture::Image image = random_picture(size, size, 4, 9);
+  const auto texture = make_keyed_texture(image);
+  const double deviation = std::sqrt(1.0 / 12);  // of the texels
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> inside(4, size - 4);
+  for (const auto& [wide, most] :
+       {std::pair(1.0, 0.001), {1.05, 0.04}, {1.2, 0.08}, {1.5, 0.08}, {1.8, 0.06}, {2.0, 0.04}}) {
+    double squares = 0;
+    constexpr int places = 2000;
+    for (int i = 0; i < places; ++i) {
+      const double x = inside(random), y = inside(random);
+      const auto seen =
+          texture->filtered(static_cast<float>(x / size), static_cast<float>(y / size),
+                            static_cast<float>(wide / size));
+      const double error = static_cast<double>(seen[1]) - mean_of_squares(image, x, y, wide, 1);
+      squares += error * error;
+    }
+    EXPECT_LT(std::sqrt(squares / places), most * deviation) << wide << " texels";
   }
 }
 
