@@ -24,7 +24,7 @@ constexpr std::size_t most_instances = 100'000;
 
 bool is_vertex_data(const std::string& attribute) {
   return attribute == "POSITION" || attribute == "NORMAL" || attribute == "TANGENT" ||
-         attribute.starts_with("TEXCOORD_");
+         attribute == "COLOR_0" || attribute.starts_with("TEXCOORD_");
 }
 
 const json& extension(const json& object, const char* name) {
@@ -299,8 +299,10 @@ class Mender {
         if (!is_vertex_data(name)) continue;
         values[name] = values_->floats(gltf_index(index));
         const std::size_t wide = gltf_components(array("accessors")[gltf_index(index)]);
-        if (wide != (name == "TANGENT" ? 4U : 3U) && !name.starts_with("TEXCOORD_"))
-          refuse_gltf("the attribute " + name + " has a wrong type");
+        const bool sound = name == "TANGENT"   ? wide == 4
+                           : name == "COLOR_0" ? wide == 3 || wide == 4
+                                               : wide == 3 || name.starts_with("TEXCOORD_");
+        if (!sound) refuse_gltf("the attribute " + name + " has a wrong type");
       }
       morph(values, primitive, weights);
       if (!joints.empty()) bend(values, primitive, joints);

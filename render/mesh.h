@@ -17,9 +17,10 @@ using calibrate::Vec3f;
 
 struct Mesh {
   std::vector<Vec3f> positions;
-  std::vector<Vec3f> normals;                  // per vertex, unit; empty = flat
-  std::vector<std::array<float, 2>> uvs;       // per vertex; empty = none
-  std::vector<std::array<float, 4>> tangents;  // per vertex, xyz + handedness; empty = none
+  std::vector<Vec3f> normals;                        // per vertex, unit; empty = flat
+  std::vector<std::array<float, 2>> uvs;             // per vertex; empty = none
+  std::vector<std::array<float, 4>> tangents;        // per vertex, xyz + handedness; empty = none
+  std::vector<std::array<std::uint8_t, 3>> colours;  // per vertex, sRGB codes; empty = white
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint32_t> materials;  // per triangle, or one for all: of the scene
   // Of a mesh that deforms: where its vertices are at rest, which all its shapes share. Its tree is

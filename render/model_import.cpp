@@ -273,13 +273,19 @@ Axes stated_axes(const aiScene& scene, const Axes& otherwise) {
 // Walks the nodes and gathers what is shown.
 class ModelBuilder {
  public:
-  ModelBuilder(const aiScene& source, const LoadOptions& options, const ModelFormat& format)
+  // Not `painted`: nothing in the file tells a colour of its materials.
+  ModelBuilder(const aiScene& source,
+               const LoadOptions& options,
+               const ModelFormat& format,
+               bool painted)
       : source_(source),
         options_(options),
         format_(format),
+        painted_(painted),
         materials_(source, format, model_.report.notes),
         meshes_(source.mNumMeshes, -1),
         material_of_(source.mNumMaterials, -1),
+        white_material_of_(source.mNumMaterials, -1),
         imported_(source.mNumMaterials),
         corner_normals_(source.mNumMeshes) {}
 
@@ -404,12 +410,13 @@ class ModelBuilder {
       add_note("points and lines are left out");
       return -1;
     }
-    const std::uint32_t material = material_for(source.mMaterialIndex);
-    if (source.HasVertexColors(0)) add_note("vertex colours are left out");
+    const std::uint32_t material = material_for(source.mMaterialIndex, source.HasVertexColors(0));
+    if (source.HasVertexColors(0) && imported_[source.mMaterialIndex].glass)
+      add_note("vertex colours of solid glass are left out");
     if (source.HasBones()) add_note("skins are left out: parts stand as the file stores them");
     if (source.mNumAnimMeshes > 0) add_note("morph targets are left out");
-    Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], format_.smooth_normals,
-                             format_.stl, corner_normals_[index], left_out_);
+    Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], format_,
+                             corner_normals_[index], left_out_);
     corner_normals_[index] = {};
     if (mesh.triangles.empty()) return -1;
     mesh.materials = {material};
@@ -419,19 +426,24 @@ class ModelBuilder {
     return meshes_[index];
   }
 
-  std::uint32_t material_for(unsigned index) {
+  // Vertex colours take the place of the grey of what has no material, and tint all others.
+  std::uint32_t material_for(unsigned index, bool coloured) {
     if (index >= source_.mNumMaterials) throw std::runtime_error("a mesh has no material");
-    if (material_of_[index] < 0) {
-      const aiMaterial& source = *source_.mMaterials[index];
+    const aiMaterial& source = *source_.mMaterials[index];
+    aiString name;
+    source.Get(AI_MATKEY_NAME, name);
+    const bool bare = !painted_ || name == aiString(AI_DEFAULT_MATERIAL_NAME);
+    const bool white = coloured && bare;
+    std::int64_t& known = (white ? white_material_of_ : material_of_)[index];
+    if (known < 0) {
       imported_[index] = materials_.import(source);
-      imported_[index].parameters.emission_gain *= options_.emission_gain;
-      aiString name;
-      source.Get(AI_MATKEY_NAME, name);
-      material_of_[index] = static_cast<std::int64_t>(model_.materials.size());
-      model_.materials.push_back(
-          {name.C_Str(), imported_[index].parameters, imported_[index].glass});
+      StandardParameters& parameters = imported_[index].parameters;
+      parameters.emission_gain *= options_.emission_gain;
+      if (white || !painted_) std::fill_n(parameters.base_color, 3, white ? 1 : grey_paint);
+      known = static_cast<std::int64_t>(model_.materials.size());
+      model_.materials.push_back({name.C_Str(), parameters, imported_[index].glass});
     }
-    return static_cast<std::uint32_t>(material_of_[index]);
+    return static_cast<std::uint32_t>(known);
   }
 
   void add_note(const std::string& text) {
@@ -448,10 +460,11 @@ class ModelBuilder {
   const aiScene& source_;
   const LoadOptions& options_;
   const ModelFormat& format_;
+  bool painted_;
   RawModel model_;
   MaterialImport materials_;
   std::vector<std::int64_t> meshes_;
-  std::vector<std::int64_t> material_of_;
+  std::vector<std::int64_t> material_of_, white_material_of_;
   std::vector<ImportedMaterial> imported_;
   std::vector<std::vector<Vec3f>> corner_normals_;  // by mesh; empty where they are its own
   std::size_t left_out_ = 0;
@@ -551,11 +564,7 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
   if (format.gltf) check_faces(*scene, facts);
   apply_libraries(*scene, libraries);
   if (mended) apply_materials(*scene, mended->materials);
-  RawModel model = ModelBuilder(*scene, options, format).build(set_from_root);
-  if (!painted) {
-    for (RawMaterial& material : model.materials)
-      std::fill_n(material.parameters.base_color, 3, grey_paint);
-  }
+  RawModel model = ModelBuilder(*scene, options, format, painted).build(set_from_root);
   auto& notes = model.report.notes;
   std::vector<std::string> more = facts.notes;
   if (mended) more.insert(more.end(), mended->notes.begin(), mended->notes.end());

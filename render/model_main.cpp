@@ -59,6 +59,7 @@ void send(const render::RawModel& model) {
     write_all(std::as_bytes(std::span(mesh.normals)));
     write_all(std::as_bytes(std::span(mesh.uvs)));
     write_all(std::as_bytes(std::span(mesh.tangents)));
+    write_all(std::as_bytes(std::span(mesh.colours)));
     write_all(std::as_bytes(std::span(mesh.triangles)));
   }
   for (const render::RawTexture& texture : model.textures) write_all(texture.bytes);

@@ -3,14 +3,17 @@
 
 #include <assimp/mesh.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "render/join_vertices.h"
+#include "render/srgb_codes.h"
 
 namespace render {
 namespace {
@@ -87,6 +90,7 @@ void part_mirrored(Mesh& mesh) {
         mesh.positions.push_back(Vec3f(mesh.positions[corner]));
         mesh.normals.push_back(Vec3f(mesh.normals[corner]));
         mesh.uvs.push_back(std::array(mesh.uvs[corner]));
+        if (!mesh.colours.empty()) mesh.colours.push_back(std::array(mesh.colours[corner]));
       }
       corner = twin[corner];
     }
@@ -146,10 +150,26 @@ void make_flat(Mesh& mesh) {
       flat.positions.push_back(mesh.positions[corner]);
       flat.normals.push_back(dot(face, face) > 0.5F ? face : Vec3f{0, 0, 1});
       flat.uvs.push_back(mesh.uvs[corner]);
+      if (!mesh.colours.empty()) flat.colours.push_back(mesh.colours[corner]);
     }
     flat.triangles.push_back({first, first + 1, first + 2});
   }
   mesh = std::move(flat);
+}
+
+// glTF's are linear, as its colours of materials are, and those of X3D and STL are taken for that.
+// Programs that scan or paint write codes of a display to the others.
+void copy_colours(const aiMesh& source, const ModelFormat& format, Mesh& mesh) {
+  const bool codes = format.ply || format.obj || format.fbx;
+  mesh.colours.reserve(source.mNumVertices);
+  for (unsigned i = 0; i < source.mNumVertices; ++i) {
+    const aiColor4D& c = source.mColors[0][i];
+    const auto code = [](float value) {
+      return static_cast<std::uint8_t>(value > 0 ? std::min(value, 1.0F) * 255 + 0.5F : 0);
+    };
+    mesh.colours.push_back(codes ? std::array{code(c.r), code(c.g), code(c.b)}
+                                 : codes_of_light({c.r, c.g, c.b}));
+  }
 }
 
 void copy_tangents(const aiMesh& source, Mesh& mesh) {
@@ -196,13 +216,12 @@ Mesh convert_shape(const aiMesh& source, std::size_t& left_out) {
 
 Mesh convert_mesh(const aiMesh& source,
                   const ImportedMaterial& material,
-                  bool join,
-                  bool facets,
+                  const ModelFormat& format,
                   std::span<const Vec3f> corner_normals,
                   std::size_t& left_out) {
   Mesh mesh = convert_shape(source, left_out);
   if (source.HasNormals()) copy_normals(source, mesh);
-  if (source.HasNormals() && facets) mend_facets(mesh);
+  if (source.HasNormals() && format.stl) mend_facets(mesh);
   const unsigned set =
       material.uv_set < AI_MAX_NUMBER_OF_TEXTURECOORDS && source.HasTextureCoords(material.uv_set)
           ? material.uv_set
@@ -217,6 +236,8 @@ Mesh convert_mesh(const aiMesh& source,
       mesh.uvs.push_back(sound ? std::array<float, 2>{u, v} : std::array<float, 2>{});
     }
   }
+  if (source.HasVertexColors(0) && !material.glass) copy_colours(source, format, mesh);
+  const bool join = format.smooth_normals;
   if (join) join_vertices(mesh, corner_normals);
   if (material.parameters.normal_texture >= 0) {
     if (mesh.normals.empty() && !mesh.uvs.empty()) make_flat(mesh);

@@ -5,26 +5,26 @@
 #include <span>
 
 #include "render/mesh.h"
+#include "render/model_format.h"
 #include "render/model_material.h"
 
 struct aiMesh;
 
 namespace render {
 
-// A mesh with the texture coordinates that its material wants and, where that has a normal map,
-// tangents. With `join`, equal vertices become one, and missing normals are made (join_vertices.h);
-// without, a mesh without normals stays flat; where it has a normal map, each of its triangles gets
-// vertices of its own. Triangles whose positions are not finite, or beyond
-// `farthest_position`, are left out and counted in `left_out`; texture coordinates that are not
-// finite, or beyond a million, become 0. Throws std::runtime_error if a triangle names a vertex
+// A mesh with the texture coordinates that its material wants, vertex colours and, where that has a
+// normal map, tangents. Where the format has smooth normals, equal vertices become one, and missing
+// normals are made (join_vertices.h); else a mesh without normals stays flat; where it has a normal
+// map, each of its triangles gets vertices of its own. Triangles whose positions are not finite, or
+// beyond `farthest_position`, are left out and counted in `left_out`; texture coordinates that are
+// not finite, or beyond a million, become 0. Throws std::runtime_error if a triangle names a vertex
 // that is not there. Normals that are missing are `corner_normals`, unless that is empty
 // (normals_across).
 //
-// With `facets`, which STL has, a normal that is not its triangle's (by over 25 degrees) is that.
+// In STL, a normal that is not its triangle's (by over 25 degrees) is that.
 Mesh convert_mesh(const aiMesh& source,
                   const ImportedMaterial& material,
-                  bool join,
-                  bool facets,
+                  const ModelFormat& format,
                   std::span<const Vec3f> corner_normals,
                   std::size_t& left_out);
 

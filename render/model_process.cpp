@@ -168,6 +168,7 @@ class Conversation {
       hear_all(mesh.normals, sizes.meshes[i].normals);
       hear_all(mesh.uvs, sizes.meshes[i].uvs);
       hear_all(mesh.tangents, sizes.meshes[i].tangents);
+      hear_all(mesh.colours, sizes.meshes[i].colours);
       hear_all(mesh.triangles, sizes.meshes[i].triangles);
       check_arrays(mesh);
     }

@@ -68,7 +68,7 @@ void check(const RawModel& model, const RawSizes& sizes, const ByteReader& in) {
   for (const RawSizes::OfMesh& mesh : sizes.meshes) {
     const auto fits = [&](std::uint64_t count) { return count == 0 || count == mesh.positions; };
     if (mesh.positions > max_vertices || mesh.triangles > max_model_triangles ||
-        !fits(mesh.normals) || !fits(mesh.uvs) || !fits(mesh.tangents)) {
+        !fits(mesh.normals) || !fits(mesh.uvs) || !fits(mesh.tangents) || !fits(mesh.colours)) {
       in.fail("has arrays of wrong lengths");
     }
     vertices += mesh.positions;
@@ -98,8 +98,9 @@ std::vector<std::byte> write_head(const RawModel& model) {
   put_report(out, model.report);
   out.put(static_cast<std::uint64_t>(model.meshes.size()));
   for (const Mesh& mesh : model.meshes) {
-    put_block(out, RawSizes::OfMesh{mesh.positions.size(), mesh.normals.size(), mesh.uvs.size(),
-                                    mesh.tangents.size(), mesh.triangles.size()});
+    put_block(out,
+              RawSizes::OfMesh{mesh.positions.size(), mesh.normals.size(), mesh.uvs.size(),
+                               mesh.tangents.size(), mesh.colours.size(), mesh.triangles.size()});
     out.put(mesh.materials.at(0));
   }
   out.put(static_cast<std::uint64_t>(model.materials.size()));

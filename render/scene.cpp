@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "render/scene_parts.h"
+#include "render/srgb_codes.h"
 #include "render/transform.h"
 
 namespace render {
@@ -22,7 +23,7 @@ void check(const SceneDescription& scene) {
     const std::size_t n = mesh.positions.size();
     const auto bad_size = [n](std::size_t size) { return size != 0 && size != n; };
     if (bad_size(mesh.normals.size()) || bad_size(mesh.uvs.size()) ||
-        bad_size(mesh.tangents.size())) {
+        bad_size(mesh.colours.size()) || bad_size(mesh.tangents.size())) {
       fail("mesh " + std::to_string(i) + ": per-vertex arrays differ in length");
     }
     if (mesh.rest && mesh.rest->size() != n) {
@@ -179,6 +180,11 @@ Facet facet_of(const Mesh& mesh,
     hit.uv_per_metre = facet.uv_per_metre;
     hit.u_slope = facet.u_slope;
     hit.v_slope = facet.v_slope;
+  }
+  hit.colour = {1, 1, 1};
+  if (!mesh.colours.empty()) {
+    hit.colour = light_of_codes(mesh.colours[a]) * w + light_of_codes(mesh.colours[b]) * u +
+                 light_of_codes(mesh.colours[c]) * v;
   }
   hit.tangent = {};
   hit.handedness = 1;

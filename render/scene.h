@@ -73,7 +73,8 @@ struct HitPoint {
   Vec3f normal;            // interpolated vertex normal, unit, flipped to the same side
   Vec3f tangent;           // unit, with handedness; zero if the mesh has none
   float handedness = 1;
-  float u = 0, v = 0;  // texture coordinates
+  float u = 0, v = 0;     // texture coordinates
+  Vec3f colour{1, 1, 1};  // interpolated vertex colour, linear
   // How the interpolated normal turns, per metre along `edge` (unit, in the triangle) and across
   // it; 0 where it does not.
   Vec3f edge;

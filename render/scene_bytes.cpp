@@ -5,13 +5,14 @@
 namespace render {
 namespace {
 
-constexpr std::uint32_t scene_magic = 0x39435350;  // "PSC9"
+constexpr std::uint32_t scene_magic = 0x41435350;  // "PSCA"
 
 void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);
   out.put_all(mesh.normals);
   out.put_all(mesh.uvs);
   out.put_all(mesh.tangents);
+  out.put_all(mesh.colours);
   out.put_all(mesh.triangles);
   out.put_all(mesh.materials);
   out.put(static_cast<std::uint8_t>(mesh.rest != nullptr));
@@ -24,6 +25,7 @@ Mesh get_mesh(ByteReader& in) {
   in.get_all(mesh.normals);
   in.get_all(mesh.uvs);
   in.get_all(mesh.tangents);
+  in.get_all(mesh.colours);
   in.get_all(mesh.triangles);
   in.get_all(mesh.materials);
   if (in.get<std::uint8_t>() != 0) {

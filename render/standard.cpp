@@ -173,9 +173,9 @@ StandardSurface standard_surface(const StandardParameters& parameters,
   };
   StandardSurface surface;
   const auto base = look_up(parameters.base_color_texture, parameters.base_color_uv);
-  surface.base = {unit(parameters.base_color[0] * base[0]),
-                  unit(parameters.base_color[1] * base[1]),
-                  unit(parameters.base_color[2] * base[2])};
+  surface.base = {unit(parameters.base_color[0] * base[0] * hit.colour.x),
+                  unit(parameters.base_color[1] * base[1] * hit.colour.y),
+                  unit(parameters.base_color[2] * base[2] * hit.colour.z)};
   surface.alpha = parameters.base_color_alpha *
                   (parameters.alpha_texture < 0 ? base[3] : alpha_of(parameters.alpha_texture));
   const auto metallic_roughness =

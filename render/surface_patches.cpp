@@ -6,6 +6,8 @@
 #include <queue>
 #include <utility>
 
+#include "render/srgb_codes.h"
+
 namespace render {
 namespace {
 
@@ -223,6 +225,10 @@ void halve_largest(Mesh& mesh, std::size_t count) {
     if (!mesh.uvs.empty()) {
       mesh.uvs.push_back(
           {(mesh.uvs[a][0] + mesh.uvs[b][0]) / 2, (mesh.uvs[a][1] + mesh.uvs[b][1]) / 2});
+    }
+    if (!mesh.colours.empty()) {
+      mesh.colours.push_back(codes_of_light(
+          (light_of_codes(mesh.colours[a]) + light_of_codes(mesh.colours[b])) * 0.5F));
     }
     mesh.triangles[t] = {a, middle, c};
     mesh.triangles.push_back({middle, b, c});

@@ -8,33 +8,20 @@
 #include <string>
 #include <vector>
 
-#include "capture/colour.h"
 #include "render/area_cover.h"
+#include "render/srgb_codes.h"
 
 namespace render {
 namespace {
 
-struct LightTables {
-  std::array<float, 256> light_of_code;
-  std::array<float, 256> unit_of_code;
-  std::array<std::uint8_t, 16384> code_of_light;  // fine enough for sRGB's steepest part
-
-  LightTables() {
-    for (std::size_t i = 0; i < 256; ++i) {
-      const double value = static_cast<double>(i) / 255;
-      unit_of_code[i] = static_cast<float>(value);
-      light_of_code[i] = static_cast<float>(capture::decode(capture::Transfer::srgb, value));
-    }
-    for (std::size_t i = 0; i < code_of_light.size(); ++i) {
-      const double light = static_cast<double>(i) / static_cast<double>(code_of_light.size() - 1);
-      const double value = capture::encode(capture::Transfer::srgb, light);
-      code_of_light[i] = static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
-    }
-  }
-};
-const LightTables& light_tables() {
-  static const LightTables tables;
-  return tables;
+const std::array<float, 256>& unit_of_code() {
+  static const std::array<float, 256> units = [] {
+    std::array<float, 256> of{};
+    for (std::size_t i = 0; i < of.size(); ++i)
+      of[i] = static_cast<float>(static_cast<double>(i) / 255);
+    return of;
+  }();
+  return units;
 }
 
 void halve(const std::uint8_t* source,
@@ -45,7 +32,7 @@ void halve(const std::uint8_t* source,
            std::uint8_t* target,
            int target_width,
            int target_height) {
-  const LightTables& tables = light_tables();
+  const SrgbTables& tables = srgb_tables();
   const int colour_channels = !srgb ? 0 : channels >= 3 ? 3 : 1;
   std::vector<AreaCover> columns;
   for (int x = 0; x < target_width; ++x) columns.emplace_back(x, width, target_width);
@@ -62,17 +49,15 @@ void halve(const std::uint8_t* source,
           const std::uint8_t* texel = source + (row + static_cast<std::size_t>(column.first + i)) *
                                                    static_cast<std::size_t>(channels);
           for (int c = 0; c < channels; ++c) {
-            const auto& table = c < colour_channels ? tables.light_of_code : tables.unit_of_code;
+            const auto& table = c < colour_channels ? tables.light_of_code : unit_of_code();
             sum[static_cast<std::size_t>(c)] += weight * table[texel[c]];
           }
         }
       }
       for (int c = 0; c < channels; ++c) {
         const float value = std::clamp(sum[static_cast<std::size_t>(c)], 0.0F, 1.0F);
-        const auto top = static_cast<float>(tables.code_of_light.size() - 1);
-        *target++ = c < colour_channels
-                        ? tables.code_of_light[static_cast<std::size_t>(value * top + 0.5F)]
-                        : static_cast<std::uint8_t>(value * 255 + 0.5F);
+        *target++ = c < colour_channels ? tables.code(value)
+                                        : static_cast<std::uint8_t>(value * 255 + 0.5F);
       }
     }
   }
@@ -157,9 +142,8 @@ float wrapped(float coordinate, Wrap wrap) {
 template <int channels, bool repeats>
 [[gnu::always_inline]] inline std::array<float, channels> sample_levels(
     const Texture& texture, float u, float v, const UvFootprint& footprint, TextureFilter filter) {
-  const LightTables& tables = light_tables();
-  const float* alpha = tables.unit_of_code.data();
-  const float* colour = texture.srgb ? tables.light_of_code.data() : alpha;
+  const float* alpha = unit_of_code().data();
+  const float* colour = texture.srgb ? srgb_tables().light_of_code.data() : alpha;
   const auto coarser = [](const Level& from) {
     return Level{from.texels + static_cast<std::size_t>(from.width) *
                                    static_cast<std::size_t>(from.height) * channels,

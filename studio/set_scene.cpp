@@ -199,6 +199,7 @@ void add_stand_in(SceneDescription& scene,
       bare.materials = {material};
       bare.uvs.clear();
       bare.tangents.clear();
+      bare.colours.clear();
       scene.meshes.push_back(std::make_shared<Mesh>(std::move(bare)));
     }
     const auto first = static_cast<std::uint32_t>(scene.meshes.size() - model.meshes.size());

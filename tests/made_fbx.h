@@ -77,7 +77,7 @@ struct FbxPart {
 };
 
 inline FbxNode fbx_geometry(const FbxPart& part, std::int64_t id) {
-  std::vector<double> points, normals, uvs;
+  std::vector<double> points, normals, uvs, colours;
   std::vector<std::int32_t> corners;
   for (const auto& p : part.mesh.positions) points.insert(points.end(), {p.x, p.y, p.z});
   for (const auto& triangle : part.mesh.triangles) {
@@ -86,6 +86,9 @@ inline FbxNode fbx_geometry(const FbxPart& part, std::int64_t id) {
       const auto& n = part.mesh.normals[corner];
       normals.insert(normals.end(), {n.x, n.y, n.z});
       uvs.insert(uvs.end(), {part.mesh.uvs[corner][0], 1 - part.mesh.uvs[corner][1]});
+      if (part.mesh.colours.empty()) continue;
+      const auto& [r, g, b] = part.mesh.colours[corner];
+      colours.insert(colours.end(), {r / 255.0, g / 255.0, b / 255.0, 1});
     }
     corners.back() = -corners.back() - 1;  // the polygon's last
   }
@@ -100,8 +103,12 @@ inline FbxNode fbx_geometry(const FbxPart& part, std::int64_t id) {
         .with(FbxNode{"MappingInformationType"}.text(mapping))
         .with(FbxNode{"ReferenceInformationType"}.text(reference));
   };
-  return FbxNode{"Geometry"}
-      .id(id)
+  FbxNode geometry{"Geometry"};
+  if (!colours.empty()) {
+    geometry.with(
+        element("Color", "ByPolygonVertex", "Direct").with(FbxNode{"Colors"}.reals(colours)));
+  }
+  return geometry.id(id)
       .text(part.name + std::string("\0\1", 2) + "Geometry")
       .text("Mesh")
       .with(FbxNode{"Vertices"}.reals(points))
