@@ -398,6 +398,11 @@ SetScene describe_scene(const Set& set, const std::stop_token& stop) {
                                scene.instances.size(), most_instances));
     throw SetError(faults.sorted());
   }
+  if (!set.objects.empty() && !set.probe && set.lamps.empty() && set.videos.empty()) {
+    result.notes.emplace_back(
+        "nothing lights the objects: without [probe], [[lamp]] or [[video_light]] they are black, "
+        "but for what glows by itself");
+  }
   return result;
 }
 

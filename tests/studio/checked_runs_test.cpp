@@ -57,6 +57,22 @@ TEST_F(CheckedRuns, AreToldOfPicturesThatAreMissing) {
   EXPECT_EQ(nlohmann::json::parse(content_of(json))["notes"].size(), 1U);
 }
 
+TEST_F(CheckedRuns, AreToldOfObjectsThatNothingLights) {
+  const auto with = [&](const std::string& more) {
+    write_set();
+    return write("dark.toml",
+                 "[show]\nwidth = 64\nheight = 48\n"
+                 "[camera]\nsource = \"plate_%d.png\"\nmodel = \"pinhole\"\nfocal_px = 60\n"
+                 "pose = { position = [0, -8, 4], look_at = [0, 0, 0.5] }\n" +
+                     more);
+  };
+  const std::string car = "[[object]]\nmade = \"car\"\n";
+  const std::string lamp = "[[lamp]]\nposition = [0, 0, 5]\nintensity = 100\n";
+  EXPECT_THAT(run("check " + with(car)).out, HasSubstr("note: nothing lights the objects"));
+  EXPECT_THAT(run("check " + with(car + lamp)).out, Not(HasSubstr("nothing lights")));
+  EXPECT_THAT(run("check " + with("")).out, Not(HasSubstr("nothing lights")));
+}
+
 // Exposures that are the wrong way round.
 TEST_F(CheckedRuns, AreToldOfAProbeWhoseShotsContradictEachOther) {
   const std::vector<std::uint8_t> dark(32 * 16 * 3, 60), bright(32 * 16 * 3, 200);
