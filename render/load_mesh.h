@@ -47,8 +47,8 @@ struct LoadedModel {
 // hang what reads it: that is an error here and nothing more.
 //
 // glTF materials: base colour, metallic-roughness, normal, clear coat, transmission (as a thin
-// wall; a volume of it as solid glass, glass.h, if it is hardly rough), emission, alpha cut-outs
-// (blended alpha is cut at a half), vertex colours without their alpha. Not handled, and noted in
+// wall; a volume of it as solid glass, glass.h, if it is hardly rough), emission, alpha cut out or
+// blended, vertex colours without their alpha. Not handled, and noted in
 // the report: occlusion maps (the light is traced) and every other map that is not taken, sheen,
 // volumes that are not clear, the roughness of transmission, animation. Morph targets and skins of
 // glTF show as they rest (models.md); those of FBX are noted. Materials of other formats: colour,

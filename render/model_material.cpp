@@ -328,7 +328,7 @@ void MaterialImport::take_volume(const aiMaterial& material,
     if (has) lost += (lost.empty() ? "" : ", ") + std::string(what);
   };
   lose(p.base_color_texture >= 0, "base colour map");
-  lose(p.alpha_cutoff > 0, "cut-outs");
+  lose(p.alpha_cutoff > 0 || p.alpha_blend != 0, "cut-outs");
   lose(p.metallic_roughness_texture >= 0, "roughness map");
   lose(p.normal_texture >= 0, "normal map");
   lose(p.clearcoat > 0, "clear coat");
@@ -385,10 +385,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   taken_.emplace_back(AI_MATKEY_VOLUME_THICKNESS_TEXTURE);  // the shape tells it
   if (format_.obj) {
     p.alpha_texture = textured(aiTextureType_OPACITY, 0, false, p.alpha_uv);
-    if (p.alpha_texture >= 0) {
-      p.alpha_cutoff = 0.5F;
-      note("material '" + name + "': its opacity map is cut at a half");
-    }
+    p.alpha_blend = p.alpha_texture >= 0 ? 1 : 0;
   }
 
   const float unit_roughness = metallic_roughness ? 1.0F : 0.5F;
@@ -425,8 +422,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
     if (mode == "BLEND" && p.base_color_texture < 0) {
       p.opacity = std::exchange(p.base_color_alpha, 1.0F);
     } else if (mode == "BLEND") {
-      p.alpha_cutoff = 0.5F;
-      note("material '" + name + "': blended alpha is cut at a half");
+      p.alpha_blend = 1;
     }
   }
   result.uv_set = uv_set_.value_or(0);

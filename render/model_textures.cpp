@@ -92,16 +92,25 @@ class Substitution {
  public:
   explicit Substitution(const std::vector<Source>& sources) {
     std::int32_t next = 0;
-    for (const Source& source : sources) indices_.push_back(source.texture ? next++ : -1);
+    for (const Source& source : sources) {
+      indices_.push_back(source.texture ? next++ : -1);
+      opaque_.push_back(source.texture && source.texture->channels % 2 == 1);
+    }
     used_.resize(sources.size());
   }
 
   void apply(RawMaterial& material) {
     StandardParameters& p = material.parameters;
+    // Blended alpha of a picture that has none is as without a picture.
+    if (p.alpha_blend != 0 && p.alpha_texture < 0 && is_opaque(p.base_color_texture)) {
+      p.alpha_blend = 0;
+      p.opacity *= std::exchange(p.base_color_alpha, 1.0F);
+    }
     if (lost(p.base_color_texture, "magenta stands in its place")) {
       constexpr float magenta[3] = {1, 0, 1};
       std::copy_n(magenta, 3, p.base_color);
       p.base_color_alpha = 1;
+      p.alpha_blend = 0;
     }
     if (lost(p.emission_texture, "nothing glows in its place")) {
       std::fill_n(p.emission, 3, 0.0F);
@@ -111,7 +120,7 @@ class Substitution {
     lost(p.normal_texture, left_out);
     lost(p.clearcoat_texture, left_out);
     lost(p.clearcoat_roughness_texture, left_out);
-    if (lost(p.alpha_texture, left_out)) p.alpha_cutoff = 0;
+    if (lost(p.alpha_texture, left_out)) p.alpha_blend = 0;
   }
 
   // What became of a lost texture, in words.
@@ -126,6 +135,10 @@ class Substitution {
  private:
   static constexpr const char* left_out = "the map is left out";
 
+  bool is_opaque(std::int32_t texture) const {
+    return texture >= 0 && opaque_.at(static_cast<std::size_t>(texture));
+  }
+
   bool lost(std::int32_t& texture, std::string_view instead) {
     if (texture < 0) return false;
     const auto index = static_cast<std::size_t>(texture);
@@ -137,6 +150,7 @@ class Substitution {
   }
 
   std::vector<std::int32_t> indices_;
+  std::vector<bool> opaque_;
   std::vector<std::vector<std::string_view>> used_;
 };
 

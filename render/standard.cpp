@@ -16,7 +16,7 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 300, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 304, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
@@ -201,6 +201,10 @@ StandardSurface standard_surface(const StandardParameters& parameters,
     const auto emission = look_up(parameters.emission_texture, parameters.emission_uv);
     surface.emission = {surface.emission.x * emission[0], surface.emission.y * emission[1],
                         surface.emission.z * emission[2]};
+  }
+  if (parameters.alpha_blend != 0) {
+    surface.coverage = unit(surface.alpha);
+    surface.emission = surface.emission * surface.coverage;
   }
   const MappedNormal mapped = mapped_normal(parameters, scene, hit, area, filter);
   surface.normal = mapped.normal;

@@ -8,7 +8,7 @@
 //   transmission (1 - Fc)(1 - metallic)(1 - Fd) transmission * base, straight through (thin wall)
 //   emission     added
 // Opacity below 1 takes that share of diffuse, of transmission and of what metal mirrors; the rest
-// goes straight through untinted.
+// goes straight through untinted. Coverage below 1 (blended alpha) takes that share of all of it.
 // The lobes are GGX's distribution of visible normals (Heitz, "Sampling the GGX Distribution of
 // Visible Normals", JCGT 2018), mirrored once more where they would go below the surface, and not
 // weakened by masking: each keeps all its energy, so that a white furnace stays white.
@@ -54,8 +54,9 @@ struct StandardParameters {
   float emission[3] = {0, 0, 0};  // radiance
   float emission_gain = 1;
   float normal_scale = 1;
-  float alpha_cutoff = 0;  // texels of base alpha below this are holes; 0 = opaque
-  float opacity = 1;       // 1 - the share that passes untinted, beside what a dielectric mirrors
+  float alpha_cutoff = 0;        // texels of base alpha below this are holes; 0 = none are
+  std::int32_t alpha_blend = 0;  // 1 = base alpha is the share of what is behind that is covered
+  float opacity = 1;  // 1 - the share that passes untinted, beside what a dielectric mirrors
   std::int32_t base_color_texture = -1;
   std::int32_t metallic_roughness_texture = -1;  // green roughness, blue metallic
   std::int32_t normal_texture = -1;
@@ -93,6 +94,7 @@ struct StandardSurface {
   Vec3f normal;       // with the normal map, unit, on the viewer's side of the surface
   Vec3f coat_normal;  // without it: the coat is smooth over a rough ground
   float alpha;        // below alpha_cutoff = hole
+  float coverage = 1;
   float specular = 1;
   // Of diffuse light, what the normals within the footprint get beside their mean.
   float facing = 1;
@@ -142,15 +144,16 @@ inline StandardWeights standard_weights(const StandardSurface& surface, Vec3f vi
   const float dielectric = 1 - surface.metallic;
   const float sheen = surface.specular * schlick(0.04F, cosine);
   const float below = under * dielectric * (1 - sheen);
-  const float opacity = surface.opacity;
+  const float opacity = surface.opacity, coverage = surface.coverage;
   const float matte = below * (1 - surface.transmission) * surface.facing * opacity;
   const float tinted = below * surface.transmission * opacity;
   const float untinted = (below + under * surface.metallic) * (1 - opacity);
   const float metal = surface.metallic * opacity;
+  weights.coat *= coverage;
   const auto channel = [&](float base, float& specular, float& diffuse, float& transmission) {
-    specular = under * (dielectric * sheen + metal * schlick(base, cosine));
-    diffuse = matte * base;
-    transmission = tinted * base + untinted;
+    specular = coverage * under * (dielectric * sheen + metal * schlick(base, cosine));
+    diffuse = coverage * matte * base;
+    transmission = coverage * (tinted * base + untinted) + (1 - coverage);
   };
   channel(surface.base.x, weights.specular.x, weights.diffuse.x, weights.transmission.x);
   channel(surface.base.y, weights.specular.y, weights.diffuse.y, weights.transmission.y);

@@ -97,7 +97,9 @@ class StandardShader final : public Shader {
   }
 
  private:
-  static bool passes(const StandardParameters& p) { return p.transmission > 0 || p.opacity < 1; }
+  static bool passes(const StandardParameters& p) {
+    return p.transmission > 0 || p.opacity < 1 || p.alpha_blend != 0;
+  }
   // A step across what a sample sees, of all that a rough lobe sees there, which rays that stand
   // for a part of one have in their steps already.
   static Vec3f as_wide(Vec3f step, float blur_m) {

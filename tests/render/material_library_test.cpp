@@ -25,15 +25,15 @@ TEST(MaterialLibrary, PlacesEachMapOfMaterialLibraries) {
   EXPECT_THAT(notes_of(model), testing::IsEmpty());
 }
 
-TEST(MaterialLibrary, CutsHolesByTheOpacityMapOfObj) {
+TEST(MaterialLibrary, BlendsByTheOpacityMapOfObj) {
   const LoadedModel model = load_obj("newmtl m\nmap_Kd a.png\nmap_d b.png\n");
   const StandardParameters p = parameters_of(model);
   ASSERT_GE(p.alpha_texture, 0);
   EXPECT_NE(p.alpha_texture, p.base_color_texture);
-  EXPECT_EQ(p.alpha_cutoff, 0.5F);
-  EXPECT_THAT(notes_of(model), Contains(HasSubstr("cut at a half")));
+  EXPECT_EQ(p.alpha_blend, 1);
+  EXPECT_THAT(notes_of(model), testing::IsEmpty());
   const LoadedModel without = load_obj("newmtl m\nmap_d lost.png\n");
-  EXPECT_EQ(parameters_of(without).alpha_cutoff, 0);
+  EXPECT_EQ(parameters_of(without).alpha_blend, 0);
 }
 
 TEST(MaterialLibrary, TakesOptionsOfMapsInMaterialLibraries) {

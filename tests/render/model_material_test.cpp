@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "capture/png.h"
 #include "render/glass.h"
 #include "render/load_mesh.h"
 #include "render/standard.h"
@@ -450,6 +452,31 @@ TEST(ModelMaterial, TakesBlendedAlphaWithoutAPictureForOpacity) {
   EXPECT_EQ(p.base_color_alpha, 1);
   EXPECT_EQ(p.alpha_cutoff, 0);
   EXPECT_THAT(notes_of(pane), testing::IsEmpty());
+}
+
+TEST(ModelMaterial, BlendsByThePictureThatHasAlpha) {
+  const auto load = [](std::uint8_t alpha) {
+    GlbParts parts;
+    parts.material =
+        R"({"alphaMode":"BLEND","pbrMetallicRoughness":{"baseColorFactor":[1,1,1,0.25],
+"baseColorTexture":{"index":0}}})";
+    parts.more = R"(,"images":[{"uri":"p.png"}],"textures":[{"source":0}])";
+    const fs::path folder = made_folder();
+    const std::vector<std::uint8_t> texels{9, 99, 199, alpha, 9, 99, 199, 255};
+    capture::write_png(folder / "p.png", 2, 1, 4, texels);
+    return load_model(write(folder / "a.glb", make_glb(parts)));
+  };
+  const LoadedModel decal = load(100);
+  const StandardParameters p = parameters_of(decal);
+  EXPECT_EQ(p.alpha_blend, 1);
+  EXPECT_EQ(p.base_color_alpha, 0.25F);
+  EXPECT_EQ(p.alpha_cutoff, 0);
+  EXPECT_EQ(p.opacity, 1);
+  EXPECT_THAT(notes_of(decal), testing::IsEmpty());
+  // Exporters that say so of all materials: without alpha it is as without a picture.
+  const StandardParameters opaque = parameters_of(load(255));
+  EXPECT_EQ(opaque.alpha_blend, 0);
+  EXPECT_EQ(opaque.opacity, 0.25F);
 }
 
 TEST(ModelMaterial, CountsTheShininessOfX3dAsAShare) {

@@ -57,6 +57,7 @@ TEST(StandardWeights, PassOnAllLightOfAWhiteSurface) {
     surface.transmission = random();
     surface.specular = random();
     surface.opacity = random();
+    surface.coverage = random();
     Vec3f view = random.direction();
     if (dot(view, normal) < 0) view = -view;
     const auto w = render::standard_weights(surface, view);
@@ -92,6 +93,36 @@ TEST(StandardWeights, PassLightUntintedByOpacity) {
   EXPECT_NEAR(tinted.diffuse.y, 0.96 * 0.25 * 0.5, 1e-5);
 }
 
+TEST(StandardWeights, CoverWhatIsBehindByTheirCoverage) {
+  StandardSurface surface = white_surface({0, 0, 1});
+  surface.base = {1, 0.5F, 0};
+  surface.clearcoat = 1;
+  const auto whole = render::standard_weights(surface, {0, 0, 1});
+  surface.coverage = 0.25F;
+  const auto quarter = render::standard_weights(surface, {0, 0, 1});
+  EXPECT_NEAR(quarter.coat, 0.25 * whole.coat, 1e-6);
+  EXPECT_NEAR(quarter.specular.y, 0.25 * whole.specular.y, 1e-6);
+  EXPECT_NEAR(quarter.diffuse.y, 0.25 * whole.diffuse.y, 1e-6);
+  EXPECT_NEAR(quarter.transmission.y, 0.75, 1e-6) << "the rest is seen as if it was not there";
+}
+
+TEST(StandardSurface, IsCoveredByTheAlphaOfItsPictureWhereThatBlends) {
+  StandardParameters p;
+  p.base_color_texture = 0;
+  p.base_color_alpha = 0.5F;
+  std::fill_n(p.emission, 3, 4.0F);
+  SceneDescription scene;
+  scene.textures = {std::make_shared<const render::Texture>(
+      render::Texture{1, 1, 4, true, {255, 255, 255, 102}})};
+  HitPoint hit;
+  hit.normal = hit.geometric_normal = {0, 0, 1};
+  EXPECT_EQ(render::standard_surface(p, scene, hit).coverage, 1);
+  p.alpha_blend = 1;
+  const StandardSurface surface = render::standard_surface(p, scene, hit);
+  EXPECT_NEAR(surface.coverage, 0.5 * 0.4, 1e-5);
+  EXPECT_NEAR(surface.emission.x, 4 * 0.2, 1e-5);
+}
+
 TEST(StandardWeights, NeverPassOnMoreThanArrives) {
   Random random(2);
   for (int trial = 0; trial < 1000; ++trial) {
@@ -102,6 +133,7 @@ TEST(StandardWeights, NeverPassOnMoreThanArrives) {
     surface.clearcoat = random();
     surface.transmission = random();
     surface.opacity = random();
+    surface.coverage = random();
     const auto w = render::standard_weights(surface, random.direction());
     const Vec3f sum = w.specular + w.diffuse + w.transmission;
     for (const float channel : {sum.x, sum.y, sum.z}) {
