@@ -119,13 +119,15 @@ void join_vertices(Mesh& mesh, std::span<const Vec3f> made) {
   const Places places = places_of(mesh.positions);
   const CornersByPlace by_place(mesh, places);
   const bool has_normals = !mesh.normals.empty();
-  const bool has_uvs = !mesh.uvs.empty(), has_colours = !mesh.colours.empty();
+  const bool has_uvs = !mesh.uvs.empty(), has_second = !mesh.second_uvs.empty();
+  const bool has_colours = !mesh.colours.empty();
   Mesh joined;
   joined.triangles.resize(mesh.triangles.size());
   joined.materials = mesh.materials;
   joined.positions.reserve(places.count);
   joined.normals.reserve(places.count);
   if (has_uvs) joined.uvs.reserve(places.count);
+  if (has_second) joined.second_uvs.reserve(places.count);
   if (has_colours) joined.colours.reserve(places.count);
   std::vector<Wedge> wedges;
   std::vector<Vec3f> normals;
@@ -149,6 +151,7 @@ void join_vertices(Mesh& mesh, std::span<const Vec3f> made) {
       std::size_t same = std::max(first, made - std::min(made, most_compared));
       while (same < made && !(joined.normals[same] == normals[k] &&
                               (!has_uvs || joined.uvs[same] == mesh.uvs[vertex]) &&
+                              (!has_second || joined.second_uvs[same] == mesh.second_uvs[vertex]) &&
                               (!has_colours || joined.colours[same] == mesh.colours[vertex]))) {
         ++same;
       }
@@ -156,6 +159,7 @@ void join_vertices(Mesh& mesh, std::span<const Vec3f> made) {
         joined.positions.push_back(mesh.positions[vertex]);
         joined.normals.push_back(normals[k]);
         if (has_uvs) joined.uvs.push_back(mesh.uvs[vertex]);
+        if (has_second) joined.second_uvs.push_back(mesh.second_uvs[vertex]);
         if (has_colours) joined.colours.push_back(mesh.colours[vertex]);
       }
       joined.triangles[corners[k] / 3][corners[k] % 3] = static_cast<std::uint32_t>(same);

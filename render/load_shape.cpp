@@ -83,6 +83,7 @@ LoadedModel load_deforming_model(const std::string& path,
     MeshShape shape = shape_of(source, instance.set_from_object);
     Mesh mesh;
     mesh.uvs = by_corners(source, source.uvs, mirrored);
+    mesh.second_uvs = by_corners(source, source.second_uvs, mirrored);
     mesh.colours = by_corners(source, source.colours, mirrored);
     mesh.materials = source.materials;
     mesh.triangles.resize(source.triangles.size());
@@ -128,6 +129,7 @@ std::shared_ptr<const Mesh> in_shape(const Mesh& mesh, MeshShape shape) {
   result->normals = std::move(shape.normals);
   result->tangents = std::move(shape.tangents);
   result->uvs = mesh.uvs;
+  result->second_uvs = mesh.second_uvs;
   result->colours = mesh.colours;
   result->triangles = mesh.triangles;
   result->materials = mesh.materials;
@@ -137,7 +139,8 @@ std::shared_ptr<const Mesh> in_shape(const Mesh& mesh, MeshShape shape) {
 
 std::size_t bytes_of(const Mesh& mesh) {
   return sizeof(Vec3f) * (mesh.positions.size() + mesh.normals.size()) +
-         sizeof(mesh.uvs[0]) * mesh.uvs.size() + sizeof(mesh.tangents[0]) * mesh.tangents.size() +
+         sizeof(mesh.uvs[0]) * (mesh.uvs.size() + mesh.second_uvs.size()) +
+         sizeof(mesh.tangents[0]) * mesh.tangents.size() +
          sizeof(mesh.colours[0]) * mesh.colours.size() +
          sizeof(mesh.triangles[0]) * mesh.triangles.size() +
          sizeof(mesh.materials[0]) * mesh.materials.size();

@@ -19,6 +19,7 @@ struct Mesh {
   std::vector<Vec3f> positions;
   std::vector<Vec3f> normals;                        // per vertex, unit; empty = flat
   std::vector<std::array<float, 2>> uvs;             // per vertex; empty = none
+  std::vector<std::array<float, 2>> second_uvs;      // per vertex; empty = those
   std::vector<std::array<float, 4>> tangents;        // per vertex, xyz + handedness; empty = none
   std::vector<std::array<std::uint8_t, 3>> colours;  // per vertex, sRGB codes; empty = white
   std::vector<std::array<std::uint32_t, 3>> triangles;

@@ -58,6 +58,7 @@ void send(const render::RawModel& model) {
     write_all(std::as_bytes(std::span(mesh.positions)));
     write_all(std::as_bytes(std::span(mesh.normals)));
     write_all(std::as_bytes(std::span(mesh.uvs)));
+    write_all(std::as_bytes(std::span(mesh.second_uvs)));
     write_all(std::as_bytes(std::span(mesh.tangents)));
     write_all(std::as_bytes(std::span(mesh.colours)));
     write_all(std::as_bytes(std::span(mesh.triangles)));

@@ -203,8 +203,12 @@ std::int32_t MaterialImport::texture(
   }
   uv = transform_of(material, type, slot);
   if (!uv_set_) uv_set_ = channel;
-  if (uv_set_ != channel)
-    say("its textures name several sets of coordinates; all take that of the first");
+  if (uv_set_ != channel) {
+    if (!second_uv_set_) second_uv_set_ = channel;
+    uv.second = second_uv_set_ == channel ? 1 : 0;
+    if (uv.second == 0)
+      say("its textures name more than two sets of coordinates; the others take the first");
+  }
   int filter = 0;
   constexpr int nearest = 9728;  // glTF's
   if (material.Get(AI_MATKEY_GLTF_MAPPINGFILTER_MAG(ai_type, slot), filter) == aiReturn_SUCCESS &&
@@ -343,7 +347,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
   StandardParameters& p = result.parameters;
   const std::string name = name_of(material);
   taken_.clear();
-  uv_set_.reset();
+  uv_set_.reset(), second_uv_set_.reset();
   const auto textured = [&](unsigned type, unsigned slot, bool srgb, UvTransform& uv) {
     return texture(material, type, slot, srgb, uv);
   };
@@ -426,6 +430,7 @@ ImportedMaterial MaterialImport::import(const aiMaterial& material) {
     }
   }
   result.uv_set = uv_set_.value_or(0);
+  result.second_uv_set = second_uv_set_;
   take_volume(material, name, result);
   constexpr float frosted = 0.1F;
   if (p.transmission > 0 && p.metallic < 1 && p.roughness > frosted)

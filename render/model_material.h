@@ -27,7 +27,8 @@ inline constexpr const char* dispersion_key = "$mat.dispersion";
 struct ImportedMaterial {
   StandardParameters parameters;
   std::optional<GlassParameters> glass;  // a volume that light passes: this, in place of those
-  unsigned uv_set = 0;  // of the file's sets of coordinates: that which its mesh has
+  unsigned uv_set = 0;  // of the file's sets of coordinates: that which its mesh has first
+  std::optional<unsigned> second_uv_set;
 };
 
 // Takes materials, and collects the textures that they ask for.
@@ -71,7 +72,7 @@ class MaterialImport {
   ModelFormat format_;
   std::vector<std::string>& notes_;
   std::vector<std::pair<unsigned, unsigned>> taken_;  // types and slots of the material's maps
-  std::optional<unsigned> uv_set_;                    // of the material's first texture
+  std::optional<unsigned> uv_set_, second_uv_set_;    // of the material's textures
   std::map<TextureKey, std::int32_t> indices_;
   std::vector<RawTexture> textures_;
   std::vector<const aiTexture*> embedded_;  // of each, or null

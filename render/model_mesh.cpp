@@ -65,24 +65,25 @@ void mend_facets(Mesh& mesh) {
 
 // Twice a triangle's area in texture coordinates: below 0 where the picture is mirrored, 0 where
 // that cannot be told.
-float uv_determinant(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
-  const auto &a = mesh.uvs[triangle[0]], &b = mesh.uvs[triangle[1]], &c = mesh.uvs[triangle[2]];
+float uv_determinant(const std::vector<std::array<float, 2>>& uvs,
+                     const std::array<std::uint32_t, 3>& triangle) {
+  const auto &a = uvs[triangle[0]], &b = uvs[triangle[1]], &c = uvs[triangle[2]];
   const float determinant = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
   return std::isfinite(determinant) ? determinant : 0;
 }
 
 // Vertices that mirrored triangles share with others get a twin, so that each has one sense of
 // rotation (as in Mikkelsen, "Simulation of Wrinkled Surfaces Revisited", 2008, section 3.1).
-void part_mirrored(Mesh& mesh) {
+void part_mirrored(Mesh& mesh, const std::vector<std::array<float, 2>>& uvs) {
   constexpr std::uint32_t none = ~0U;
   std::vector<bool> upright(mesh.positions.size(), false);
   for (const auto& triangle : mesh.triangles) {
-    if (uv_determinant(mesh, triangle) <= 0) continue;
+    if (uv_determinant(uvs, triangle) <= 0) continue;
     for (const std::uint32_t corner : triangle) upright[corner] = true;
   }
   std::vector<std::uint32_t> twin(mesh.positions.size(), none);
   for (auto& triangle : mesh.triangles) {
-    if (uv_determinant(mesh, triangle) >= 0) continue;
+    if (uv_determinant(uvs, triangle) >= 0) continue;
     for (std::uint32_t& corner : triangle) {
       if (!upright[corner]) continue;
       if (twin[corner] == none) {
@@ -90,6 +91,8 @@ void part_mirrored(Mesh& mesh) {
         mesh.positions.push_back(Vec3f(mesh.positions[corner]));
         mesh.normals.push_back(Vec3f(mesh.normals[corner]));
         mesh.uvs.push_back(std::array(mesh.uvs[corner]));
+        if (!mesh.second_uvs.empty())
+          mesh.second_uvs.push_back(std::array(mesh.second_uvs[corner]));
         if (!mesh.colours.empty()) mesh.colours.push_back(std::array(mesh.colours[corner]));
       }
       corner = twin[corner];
@@ -104,17 +107,18 @@ void compute_tangents(Mesh& mesh, const UvTransform& of_map) {
   const float map_determinant = of_map.u[0] * of_map.v[1] - of_map.u[1] * of_map.v[0];
   const UvTransform map_from_mesh = map_determinant != 0 ? of_map : UvTransform{};
   const bool mirrors = map_determinant < 0;
-  part_mirrored(mesh);
+  const auto& uvs = of_map.second != 0 && !mesh.second_uvs.empty() ? mesh.second_uvs : mesh.uvs;
+  part_mirrored(mesh, uvs);
   std::vector<Vec3f> along_u(mesh.positions.size());
   std::vector<Vec3f> along_v(mesh.positions.size());
   for (const auto& triangle : mesh.triangles) {
-    const float determinant = uv_determinant(mesh, triangle);
+    const float determinant = uv_determinant(uvs, triangle);
     if (determinant == 0) continue;
     const auto [a, b, c] = triangle;
     const Vec3f e1 = mesh.positions[b] - mesh.positions[a];
     const Vec3f e2 = mesh.positions[c] - mesh.positions[a];
-    const auto step_to = [&, &from = mesh.uvs[a]](std::uint32_t corner) {
-      return map_from_mesh.of_step({mesh.uvs[corner][0] - from[0], mesh.uvs[corner][1] - from[1]});
+    const auto step_to = [&, &from = uvs[a]](std::uint32_t corner) {
+      return map_from_mesh.of_step({uvs[corner][0] - from[0], uvs[corner][1] - from[1]});
     };
     const auto [u1, v1] = step_to(b);
     const auto [u2, v2] = step_to(c);
@@ -150,11 +154,25 @@ void make_flat(Mesh& mesh) {
       flat.positions.push_back(mesh.positions[corner]);
       flat.normals.push_back(dot(face, face) > 0.5F ? face : Vec3f{0, 0, 1});
       flat.uvs.push_back(mesh.uvs[corner]);
+      if (!mesh.second_uvs.empty()) flat.second_uvs.push_back(mesh.second_uvs[corner]);
       if (!mesh.colours.empty()) flat.colours.push_back(mesh.colours[corner]);
     }
     flat.triangles.push_back({first, first + 1, first + 2});
   }
   mesh = std::move(flat);
+}
+
+std::vector<std::array<float, 2>> uvs_of(const aiMesh& source, unsigned set) {
+  std::vector<std::array<float, 2>> uvs;
+  uvs.reserve(source.mNumVertices);
+  for (unsigned i = 0; i < source.mNumVertices; ++i) {
+    const aiVector3D& t = source.mTextureCoords[set][i];
+    const float u = t.x, v = 1 - t.y;
+    constexpr float most = 1e6F;
+    const bool sound = std::abs(u) <= most && std::abs(v) <= most;
+    uvs.push_back(sound ? std::array<float, 2>{u, v} : std::array<float, 2>{});
+  }
+  return uvs;
 }
 
 // glTF's are linear, as its colours of materials are, and those of X3D and STL are taken for that.
@@ -222,20 +240,13 @@ Mesh convert_mesh(const aiMesh& source,
   Mesh mesh = convert_shape(source, left_out);
   if (source.HasNormals()) copy_normals(source, mesh);
   if (source.HasNormals() && format.stl) mend_facets(mesh);
-  const unsigned set =
-      material.uv_set < AI_MAX_NUMBER_OF_TEXTURECOORDS && source.HasTextureCoords(material.uv_set)
-          ? material.uv_set
-          : 0;
-  if (source.HasTextureCoords(set)) {
-    mesh.uvs.reserve(source.mNumVertices);
-    for (unsigned i = 0; i < source.mNumVertices; ++i) {
-      const aiVector3D& t = source.mTextureCoords[set][i];
-      const float u = t.x, v = 1 - t.y;
-      constexpr float most = 1e6F;
-      const bool sound = std::abs(u) <= most && std::abs(v) <= most;
-      mesh.uvs.push_back(sound ? std::array<float, 2>{u, v} : std::array<float, 2>{});
-    }
-  }
+  const auto has = [&](unsigned set) {
+    return set < AI_MAX_NUMBER_OF_TEXTURECOORDS && source.HasTextureCoords(set);
+  };
+  const unsigned set = has(material.uv_set) ? material.uv_set : 0;
+  if (has(set)) mesh.uvs = uvs_of(source, set);
+  if (const auto second = material.second_uv_set; second && has(*second) && !mesh.uvs.empty())
+    mesh.second_uvs = uvs_of(source, *second);
   if (source.HasVertexColors(0) && !material.glass) copy_colours(source, format, mesh);
   const bool join = format.smooth_normals;
   if (join) join_vertices(mesh, corner_normals);

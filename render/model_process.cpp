@@ -167,6 +167,7 @@ class Conversation {
       hear_all(mesh.positions, sizes.meshes[i].positions);
       hear_all(mesh.normals, sizes.meshes[i].normals);
       hear_all(mesh.uvs, sizes.meshes[i].uvs);
+      hear_all(mesh.second_uvs, sizes.meshes[i].second_uvs);
       hear_all(mesh.tangents, sizes.meshes[i].tangents);
       hear_all(mesh.colours, sizes.meshes[i].colours);
       hear_all(mesh.triangles, sizes.meshes[i].triangles);

@@ -68,7 +68,8 @@ void check(const RawModel& model, const RawSizes& sizes, const ByteReader& in) {
   for (const RawSizes::OfMesh& mesh : sizes.meshes) {
     const auto fits = [&](std::uint64_t count) { return count == 0 || count == mesh.positions; };
     if (mesh.positions > max_vertices || mesh.triangles > max_model_triangles ||
-        !fits(mesh.normals) || !fits(mesh.uvs) || !fits(mesh.tangents) || !fits(mesh.colours)) {
+        !fits(mesh.normals) || !fits(mesh.uvs) || !fits(mesh.second_uvs) || !fits(mesh.tangents) ||
+        !fits(mesh.colours)) {
       in.fail("has arrays of wrong lengths");
     }
     vertices += mesh.positions;
@@ -98,9 +99,9 @@ std::vector<std::byte> write_head(const RawModel& model) {
   put_report(out, model.report);
   out.put(static_cast<std::uint64_t>(model.meshes.size()));
   for (const Mesh& mesh : model.meshes) {
-    put_block(out,
-              RawSizes::OfMesh{mesh.positions.size(), mesh.normals.size(), mesh.uvs.size(),
-                               mesh.tangents.size(), mesh.colours.size(), mesh.triangles.size()});
+    put_block(out, RawSizes::OfMesh{mesh.positions.size(), mesh.normals.size(), mesh.uvs.size(),
+                                    mesh.second_uvs.size(), mesh.tangents.size(),
+                                    mesh.colours.size(), mesh.triangles.size()});
     out.put(mesh.materials.at(0));
   }
   out.put(static_cast<std::uint64_t>(model.materials.size()));
@@ -174,7 +175,9 @@ void check_arrays(const Mesh& mesh) {
   const auto finite = [](Vec3f v) { return is_finite(v); };
   bool sound =
       std::ranges::all_of(mesh.positions, finite) && std::ranges::all_of(mesh.normals, finite);
-  for (const auto& [u, v] : mesh.uvs) sound = sound && std::isfinite(u) && std::isfinite(v);
+  for (const auto* uvs : {&mesh.uvs, &mesh.second_uvs}) {
+    for (const auto& [u, v] : *uvs) sound = sound && std::isfinite(u) && std::isfinite(v);
+  }
   for (const auto& tangent : mesh.tangents) {
     for (const float x : tangent) sound = sound && std::isfinite(x);
   }

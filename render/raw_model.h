@@ -42,7 +42,8 @@ struct RawModel {
 // How many elements the arrays of a model have that are sent apart from all else.
 struct RawSizes {
   struct OfMesh {
-    std::uint64_t positions = 0, normals = 0, uvs = 0, tangents = 0, colours = 0, triangles = 0;
+    std::uint64_t positions = 0, normals = 0, uvs = 0, second_uvs = 0, tangents = 0, colours = 0,
+                  triangles = 0;
   };
   std::vector<OfMesh> meshes;
   std::vector<std::uint64_t> textures;

@@ -7,6 +7,8 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 
 #include "render/scene_parts.h"
 #include "render/srgb_codes.h"
@@ -23,7 +25,8 @@ void check(const SceneDescription& scene) {
     const std::size_t n = mesh.positions.size();
     const auto bad_size = [n](std::size_t size) { return size != 0 && size != n; };
     if (bad_size(mesh.normals.size()) || bad_size(mesh.uvs.size()) ||
-        bad_size(mesh.colours.size()) || bad_size(mesh.tangents.size())) {
+        bad_size(mesh.second_uvs.size()) || bad_size(mesh.colours.size()) ||
+        bad_size(mesh.tangents.size())) {
       fail("mesh " + std::to_string(i) + ": per-vertex arrays differ in length");
     }
     if (mesh.rest && mesh.rest->size() != n) {
@@ -86,6 +89,20 @@ namespace {
   hit.turn_both = 0.5F * (along_b + across_a);
 }
 
+// How texture coordinates, of the corners t0 to t2, grow along a triangle, per metre.
+std::pair<Vec3f, Vec3f> uv_slopes(const Facet& facet,
+                                  float per_double_area,
+                                  const std::array<float, 2>& t0,
+                                  const std::array<float, 2>& t1,
+                                  const std::array<float, 2>& t2) {
+  const auto& [p0, p1, p2] = facet.corners;
+  // How the second and the third corner's shares of a point grow.
+  const Vec3f second = cross(p2 - p0, facet.normal) * per_double_area;
+  const Vec3f third = cross(facet.normal, p1 - p0) * per_double_area;
+  return {second * (t1[0] - t0[0]) + third * (t2[0] - t0[0]),
+          second * (t1[1] - t0[1]) + third * (t2[1] - t0[1])};
+}
+
 }  // namespace
 
 Facet facet_of(const Mesh& mesh,
@@ -108,11 +125,7 @@ Facet facet_of(const Mesh& mesh,
   const auto &t0 = mesh.uvs[a], &t1 = mesh.uvs[b], &t2 = mesh.uvs[c];
   const float u1 = t1[0] - t0[0], v1 = t1[1] - t0[1], u2 = t2[0] - t0[0], v2 = t2[1] - t0[1];
   facet.uv_per_metre = std::sqrt(std::abs(u1 * v2 - u2 * v1) / double_area);
-  // How the second and the third corner's shares of a point grow along the triangle.
-  const Vec3f second = cross(p2 - p0, facet.normal) * (1 / double_area);
-  const Vec3f third = cross(facet.normal, p1 - p0) * (1 / double_area);
-  facet.u_slope = second * u1 + third * u2;
-  facet.v_slope = second * v1 + third * v2;
+  std::tie(facet.u_slope, facet.v_slope) = uv_slopes(facet, 1 / double_area, t0, t1, t2);
   return facet;
 }
 
@@ -185,6 +198,14 @@ Facet facet_of(const Mesh& mesh,
   if (!mesh.colours.empty()) {
     hit.colour = light_of_codes(mesh.colours[a]) * w + light_of_codes(mesh.colours[b]) * u +
                  light_of_codes(mesh.colours[c]) * v;
+  }
+  hit.has_second_uvs = !mesh.second_uvs.empty();
+  if (hit.has_second_uvs) {
+    const auto &t0 = mesh.second_uvs[a], &t1 = mesh.second_uvs[b], &t2 = mesh.second_uvs[c];
+    hit.second_uv = {t0[0] * w + t1[0] * u + t2[0] * v, t0[1] * w + t1[1] * u + t2[1] * v};
+    const float double_area = length(cross(p1 - p0, p2 - p0));
+    std::tie(hit.second_u_slope, hit.second_v_slope) =
+        uv_slopes(facet, double_area > 0 ? 1 / double_area : 0, t0, t1, t2);
   }
   hit.tangent = {};
   hit.handedness = 1;

@@ -11,6 +11,7 @@ void put(ByteWriter& out, const Mesh& mesh) {
   out.put_all(mesh.positions);
   out.put_all(mesh.normals);
   out.put_all(mesh.uvs);
+  out.put_all(mesh.second_uvs);
   out.put_all(mesh.tangents);
   out.put_all(mesh.colours);
   out.put_all(mesh.triangles);
@@ -24,6 +25,7 @@ Mesh get_mesh(ByteReader& in) {
   in.get_all(mesh.positions);
   in.get_all(mesh.normals);
   in.get_all(mesh.uvs);
+  in.get_all(mesh.second_uvs);
   in.get_all(mesh.tangents);
   in.get_all(mesh.colours);
   in.get_all(mesh.triangles);

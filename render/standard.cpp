@@ -16,21 +16,39 @@ namespace render {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<StandardParameters>);
-static_assert(sizeof(StandardParameters) == 304, "blocks travel: no padding, no surprise");
+static_assert(sizeof(StandardParameters) == 336, "blocks travel: no padding, no surprise");
 
 const Texture* texture_at(const SceneDescription& scene, std::int32_t index) {
   return index < 0 ? nullptr : scene.textures[static_cast<std::size_t>(index)].get();
 }
 
-// A texture at a hit, over the footprint in the mesh's coordinates.
+// A hit, and how much of its surface is seen: in metres, and in the mesh's coordinates.
+struct SeenPart {
+  const HitPoint& hit;
+  Spread footprint;
+  UvFootprint area;
+  SeenPart(const HitPoint& at, const Spread& seen)
+      : hit(at), footprint(seen), area{uv_of_step(at, seen.a), uv_of_step(at, seen.b)} {}
+  SeenPart point() const { return {hit, {}}; }
+};
+
 std::array<float, 4> sample_at(const Texture& texture,
                                const UvTransform& uv,
-                               const HitPoint& hit,
-                               const UvFootprint& footprint,
+                               const SeenPart& seen,
                                TextureFilter filter) {
-  if (uv == UvTransform{}) return sample(texture, hit.u, hit.v, footprint, filter);
-  const auto [u, v] = uv.of_place({hit.u, hit.v});
-  return sample(texture, u, v, {uv.of_step(footprint.a), uv.of_step(footprint.b)}, filter);
+  const HitPoint& hit = seen.hit;
+  if (uv == UvTransform{}) return sample(texture, hit.u, hit.v, seen.area, filter);
+  std::array<float, 2> place{hit.u, hit.v};
+  UvFootprint area = seen.area;
+  if (uv.second != 0 && hit.has_second_uvs) {
+    const auto step = [&hit](Vec3f s) {
+      return std::array{dot(hit.second_u_slope, s), dot(hit.second_v_slope, s)};
+    };
+    place = hit.second_uv;
+    area = {step(seen.footprint.a), step(seen.footprint.b)};
+  }
+  const auto [u, v] = uv.of_place(place);
+  return sample(texture, u, v, {uv.of_step(area.a), uv.of_step(area.b)}, filter);
 }
 
 // Of what sample() gives of a texture that is nothing but alpha.
@@ -81,16 +99,16 @@ float facing_of_normals(float l) { return (1 + 3 * l) / 4; }
 
 MappedNormal mapped_normal(const StandardParameters& parameters,
                            const SceneDescription& scene,
-                           const HitPoint& hit,
-                           const UvFootprint& footprint,
+                           const SeenPart& seen,
                            TextureFilter filter) {
+  const HitPoint& hit = seen.hit;
   const Texture* map = texture_at(scene, parameters.normal_texture);
   if (map == nullptr || dot(hit.tangent, hit.tangent) == 0) return {hit.normal};
-  const auto in_tangents = [&](const UvFootprint& over) {
-    const auto texel = sample_at(*map, parameters.normal_uv, hit, over, filter);
+  const auto in_tangents = [&](const SeenPart& over) {
+    const auto texel = sample_at(*map, parameters.normal_uv, over, filter);
     return Vec3f{2 * texel[0] - 1, 2 * texel[1] - 1, 2 * texel[2] - 1};
   };
-  const Vec3f mean = in_tangents(footprint);
+  const Vec3f mean = in_tangents(seen);
   const Vec3f tangent = normalize(hit.tangent - hit.normal * dot(hit.normal, hit.tangent));
   const Vec3f bitangent = cross(hit.normal, tangent) * hit.handedness;
   const float scale = parameters.normal_scale;
@@ -98,9 +116,9 @@ MappedNormal mapped_normal(const StandardParameters& parameters,
   const float l = length(normal);
   if (!(l > 1e-6F) || !(dot(normal, hit.normal) > 0)) return {hit.normal};
   MappedNormal mapped{normal / l};
-  if (footprint == UvFootprint{}) return mapped;
+  if (seen.footprint.a == Vec3f{} && seen.footprint.b == Vec3f{}) return mapped;
   // Beside the map's own texels, whose eight bits are no unit vectors either.
-  const float of_map = length(mean) / length(in_tangents({}));
+  const float of_map = length(mean) / length(in_tangents(seen.point()));
   mapped.rougher = scale * scale * spread_of_normals(of_map);
   if (mapped.rougher > 0) mapped.facing = facing_of_normals(length_of_mean(mapped.rougher));
   return mapped;
@@ -162,11 +180,11 @@ StandardSurface standard_surface(const StandardParameters& parameters,
                                  const HitPoint& hit,
                                  const Spread& footprint,
                                  TextureFilter filter) {
-  const UvFootprint area{uv_of_step(hit, footprint.a), uv_of_step(hit, footprint.b)};
+  const SeenPart seen(hit, footprint);
   const auto look_up = [&](std::int32_t index, const UvTransform& uv) -> std::array<float, 4> {
     const Texture* texture = texture_at(scene, index);
     return texture == nullptr ? std::array<float, 4>{1, 1, 1, 1}
-                              : sample_at(*texture, uv, hit, area, filter);
+                              : sample_at(*texture, uv, seen, filter);
   };
   const auto alpha_of = [&](std::int32_t index) {
     return look_up(index, parameters.alpha_uv)[alpha_channel(*texture_at(scene, index))];
@@ -206,7 +224,7 @@ StandardSurface standard_surface(const StandardParameters& parameters,
     surface.coverage = unit(surface.alpha);
     surface.emission = surface.emission * surface.coverage;
   }
-  const MappedNormal mapped = mapped_normal(parameters, scene, hit, area, filter);
+  const MappedNormal mapped = mapped_normal(parameters, scene, seen, filter);
   surface.normal = mapped.normal;
   surface.facing = mapped.facing;
   if (mapped.rougher > 0) {
@@ -226,7 +244,7 @@ float standard_alpha(const StandardParameters& parameters,
   const std::size_t channel = own ? alpha_channel(*own) : 3;
   const UvTransform& uv = own ? parameters.alpha_uv : parameters.base_color_uv;
   return parameters.base_color_alpha *
-         sample_at(*texture, uv, hit, {}, TextureFilter::dense)[channel];
+         sample_at(*texture, uv, SeenPart(hit, {}), TextureFilter::dense)[channel];
 }
 
 Vec3f sample_lobe(Vec3f normal, Vec3f view, float roughness, std::array<float, 2> random) {

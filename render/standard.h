@@ -32,6 +32,7 @@ namespace render {
 // u[2], and v' as well.
 struct UvTransform {
   std::array<float, 3> u{1, 0, 0}, v{0, 1, 0};
+  std::int32_t second = 0;  // 1 = of the mesh's second coordinates, if it has any
   friend bool operator==(const UvTransform&, const UvTransform&) = default;
   std::array<float, 2> of_place(std::array<float, 2> uv) const {
     const auto [du, dv] = of_step(uv);

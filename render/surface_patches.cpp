@@ -222,9 +222,10 @@ void halve_largest(Mesh& mesh, std::size_t count) {
     const auto middle = static_cast<std::uint32_t>(mesh.positions.size());
     mesh.positions.push_back((mesh.positions[a] + mesh.positions[b]) * 0.5F);
     mesh.normals.push_back(normalize(mesh.normals[a] + mesh.normals[b]));
-    if (!mesh.uvs.empty()) {
-      mesh.uvs.push_back(
-          {(mesh.uvs[a][0] + mesh.uvs[b][0]) / 2, (mesh.uvs[a][1] + mesh.uvs[b][1]) / 2});
+    for (auto* uvs : {&mesh.uvs, &mesh.second_uvs}) {
+      if (uvs->empty()) continue;
+      const auto p = (*uvs)[a], q = (*uvs)[b];
+      uvs->push_back({(p[0] + q[0]) / 2, (p[1] + q[1]) / 2});
     }
     if (!mesh.colours.empty()) {
       mesh.colours.push_back(codes_of_light(

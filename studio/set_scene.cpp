@@ -198,6 +198,7 @@ void add_stand_in(SceneDescription& scene,
       Mesh bare = *mesh;
       bare.materials = {material};
       bare.uvs.clear();
+      bare.second_uvs.clear();
       bare.tangents.clear();
       bare.colours.clear();
       scene.meshes.push_back(std::make_shared<Mesh>(std::move(bare)));

@@ -285,9 +285,56 @@ TEST(ModelMaterial, NotesTransformsAndSetsOfCoordinatesThatItDoesNotTake) {
                                    R"(,"normalTexture":)" + placed(1, "\"scale\":[1e39,1]") + "}");
   EXPECT_THAT(notes_of(far), ElementsAre(HasSubstr("the transform of a texture")));
   EXPECT_EQ(parameters_of(far).normal_uv, UvTransform{});
-  const LoadedModel two = load_glb(R"({"name":"m",)" + base_map(R"({"index":0})") +
-                                   R"(,"normalTexture":{"index":1,"texCoord":1}})");
-  EXPECT_THAT(notes_of(two), ElementsAre(HasSubstr("several sets of coordinates")));
+  const LoadedModel three = load_glb(R"({"name":"m",)" + base_map(R"({"index":0})") +
+                                     R"(,"normalTexture":{"index":1,"texCoord":1},
+"emissiveTexture":{"index":2,"texCoord":2}})");
+  EXPECT_THAT(notes_of(three), ElementsAre(HasSubstr("more than two sets of coordinates")));
+}
+
+// Of the second set u runs up where that of the first runs to the right.
+TEST(ModelMaterial, LooksEachTextureUpInItsSetOfCoordinates) {
+  const std::string data =
+      made::bytes_of(std::vector<float>{0, 0, 0, 1, 0, 0, 0, 1, 0}) +  // places
+      made::bytes_of(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1}) +  // normals
+      made::bytes_of(std::vector<float>{0, 1, 1, 1, 0, 0}) +
+      made::bytes_of(std::vector<float>{0.5F, 0, 0.5F, 0.25F, 1, 0});
+  const auto load = [&](const std::string& textures) {
+    const std::string accessor = R"({"bufferView":0,"componentType":5126,"count":3,"byteOffset":)";
+    return load_model(write(
+        made_folder("ab") / "a.glb",
+        made::glb(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"NORMAL":1,"TEXCOORD_0":2,
+"TEXCOORD_1":3},"material":0}]}],"materials":[{)" +
+                      textures +
+                      R"(}],"images":[{"uri":"a.png"},{"uri":"b.png"}],
+"textures":[{"source":0},{"source":1}],"accessors":[)" +
+                      accessor + R"(0,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},)" + accessor +
+                      R"(36,"type":"VEC3"},)" + accessor + R"(72,"type":"VEC2"},)" + accessor +
+                      R"(96,"type":"VEC2"}],
+"bufferViews":[{"buffer":0,"byteLength":120}],"buffers":[{"byteLength":120}]})",
+                  data)));
+  };
+  const auto on = [](const char* base, const char* normal) {
+    return base_map(std::string(R"({"index":0,"texCoord":)") + base + "}") +
+           R"(,"normalTexture":{"index":1,"texCoord":)" + normal + "}";
+  };
+  const LoadedModel mixed = load(on("0", "1"));
+  EXPECT_THAT(notes_of(mixed), testing::IsEmpty());
+  EXPECT_EQ(parameters_of(mixed).base_color_uv.second, 0);
+  EXPECT_EQ(parameters_of(mixed).normal_uv.second, 1);
+  const Mesh& mesh = *mixed.scene.meshes.at(0);
+  EXPECT_THAT(mesh.uvs, ElementsAre(ElementsAre(0, 1), ElementsAre(1, 1), ElementsAre(0, 0)));
+  EXPECT_THAT(mesh.second_uvs,
+              ElementsAre(ElementsAre(0.5F, 0), ElementsAre(0.5F, 0.25F), ElementsAre(1, 0)));
+  ASSERT_EQ(mesh.tangents.size(), 3U);
+  EXPECT_NEAR(mesh.tangents[0][1], 1, 1e-6) << "along u of the normal map";
+  // The same, the first named first.
+  const LoadedModel turned = load(on("1", "0"));
+  EXPECT_EQ(turned.scene.meshes.at(0)->uvs, mesh.second_uvs);
+  EXPECT_EQ(turned.scene.meshes.at(0)->second_uvs, mesh.uvs);
+  EXPECT_NEAR(turned.scene.meshes.at(0)->tangents.at(0)[0], 1, 1e-6);
+  // One set alone is no second one.
+  EXPECT_THAT(load(on("1", "1")).scene.meshes.at(0)->second_uvs, testing::IsEmpty());
 }
 
 TEST(ModelMaterial, NotesEveryMapThatIsLeftOut) {

@@ -366,6 +366,16 @@ TEST(StandardSurface, LooksEachTextureUpByItsOwnTransform) {
         EXPECT_NEAR(found[k], expected[k], wide > 0 ? 0.03 : 2e-4) << trial << " " << k;
       }
       EXPECT_NEAR(standard_alpha(p, scene, hit), expected_alpha, 2e-4);
+      // The same of a mesh whose second coordinates these are.
+      HitPoint second = hit;
+      second.has_second_uvs = true;
+      second.second_uv = {hit.u, hit.v};
+      second.second_u_slope = hit.u_slope, second.second_v_slope = hit.v_slope;
+      second.u = second.v = 0.3F;
+      second.u_slope = second.v_slope = {};
+      (p.*place).second = 1;
+      EXPECT_EQ(all_of(standard_surface(p, scene, second, footprint)), found);
+      EXPECT_EQ(all_of(standard_surface(p, scene, hit, footprint)), found) << "which has none";
     }
   }
 }

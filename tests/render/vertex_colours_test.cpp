@@ -198,11 +198,13 @@ TEST(VertexColours, KeepApartWhatIsNotOfOneColour) {
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 0}, {1, 0, 0}, {0, -1, 0}};
   mesh.normals.assign(6, {0, 0, 1});
   mesh.uvs.clear();
+  mesh.second_uvs = {{0, 0}, {1, 0}, {0, 1}, {0, 0}, {1, 0}, {0, 1}};
   mesh.colours = {red, green, blue, red, blue, blue};
   mesh.triangles = {{0, 1, 2}, {3, 5, 4}};
   join_vertices(mesh);
   EXPECT_EQ(mesh.positions.size(), 5U) << "one is shared, and one place has two colours";
   ASSERT_EQ(mesh.colours.size(), 5U);
+  EXPECT_EQ(mesh.second_uvs.size(), 5U);
   EXPECT_EQ(mesh.colours[mesh.triangles[0][1]], green);
   EXPECT_EQ(mesh.colours[mesh.triangles[1][2]], blue);
 }
