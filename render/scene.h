@@ -80,14 +80,14 @@ struct HitPoint {
   Vec3f edge;
   float turn_along = 0, turn_across = 0, turn_both = 0;
   bool back = false;  // the side that the triangle's corners run clockwise on: from inside a body
-  float uv_per_metre = 0;       // texture coordinate units per metre of surface, in the mean
-  Vec3f u_slope, v_slope;       // of texture coordinates on the triangle, per metre along it
-  bool has_second_uvs = false;  // else what follows is not set
-  std::array<float, 2> second_uv;
-  Vec3f second_u_slope, second_v_slope;
+  float uv_per_metre = 0;        // texture coordinate units per metre of surface, in the mean
+  Vec3f u_slope, v_slope;        // of texture coordinates on the triangle, per metre along it
   float largest_coordinate = 0;  // of the triangle's corners: its rounding is the hit's
   std::uint32_t material = 0;
   std::uint32_t instance = 0;
+  bool has_second_uvs = false;  // else what follows is not set
+  std::array<float, 2> second_uv;
+  Vec3f second_u_slope, second_v_slope;
 };
 
 // By how much texture coordinates change over a small step on the surface, in metres.
