@@ -157,11 +157,14 @@ TEST_F(ShowNotes, NotesWhatIsToBeDoubtedOfThePlateAndItsTrack) {
                                        "0,0,-8,4,0.7,0.7,0,0\n9,0,-8,4,0.7,0.7,0,0\n";
   Set set = made_set("file:" + clip);
   set.camera.pose.track = (dir_ / "track.csv").string();
-  EXPECT_THAT(check_show(set),
-              AllOf(Contains(StartsWith("the plate: it is marked as interlaced")),
-                    Contains(AllOf(StartsWith("the camera's track is doubtful: the camera hangs "
-                                              "upside down throughout"),
-                                   HasSubstr("track.csv")))));
+  EXPECT_THAT(
+      check_show(set),
+      AllOf(Contains(StartsWith("the plate: it is marked as interlaced, and is deinterlaced")),
+            Contains(AllOf(StartsWith("the camera's track is doubtful: the camera hangs "
+                                      "upside down throughout"),
+                           HasSubstr("track.csv")))));
+  set.camera.deinterlace = false;
+  EXPECT_THAT(check_show(set), Not(Contains(HasSubstr("interlaced"))));
   EXPECT_THAT(check_show(made_set("grey:9,25,0")), testing::IsEmpty());
 }
 
