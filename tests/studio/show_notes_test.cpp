@@ -20,6 +20,7 @@
 #include "studio/figures.h"
 #include "studio/recording.h"
 #include "studio/show.h"
+#include "studio/timed_source.h"
 #include "tests/capture/made_light_camera.h"
 #include "tests/independent_plate.h"
 #include "tests/studio/made_show.h"
@@ -165,6 +166,11 @@ TEST_F(ShowNotes, NotesWhatIsToBeDoubtedOfThePlateAndItsTrack) {
                            HasSubstr("track.csv")))));
   set.camera.deinterlace = false;
   EXPECT_THAT(check_show(set), Not(Contains(HasSubstr("interlaced"))));
+  VideoSource video;
+  video.uri = "file:" + clip;
+  EXPECT_THAT(open_video(video)->info().description, HasSubstr("(deinterlaced)"));
+  video.deinterlace = false;
+  EXPECT_THAT(open_video(video)->info().description, HasSubstr("interlaced (taken as it is)"));
   EXPECT_THAT(check_show(made_set("grey:9,25,0")), testing::IsEmpty());
 }
 
