@@ -67,6 +67,8 @@ struct CameraOptions {
   // Pictures of files that have alpha come with four channels: scene-linear, premultiplied, alpha 0
   // to 1; else without it.
   bool alpha = false;
+  // Videos: every picture is deinterlaced, or none; nothing = those that are marked as interlaced.
+  std::optional<bool> deinterlace;
   bool keep_coded = false;  // live cameras' frames keep the bytes that came
 };
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstring>
+#include <limits>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -29,7 +30,8 @@ libav::PacketHandle encode(const std::filesystem::path& path,
                            int width,
                            int height,
                            int channels,
-                           std::span<const std::uint8_t> texels) {
+                           std::span<const std::uint8_t> texels,
+                           Rational pixel_aspect) {
   libav::gather_log();
   libav::forget_log();
   const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_PNG);
@@ -44,7 +46,9 @@ libav::PacketHandle encode(const std::filesystem::path& path,
   context->height = height;
   context->pix_fmt = format_of_channels[static_cast<std::size_t>(channels - 1)];
   context->time_base = {1, 1};
-  context->sample_aspect_ratio = {1, 1};  // else a chunk says 0:1
+  // libav writes it as the pixels in a unit across and down, whose ratio is the other way round.
+  context->sample_aspect_ratio = {static_cast<int>(pixel_aspect.den),
+                                  static_cast<int>(pixel_aspect.num)};
   context->thread_count = 1;
   if (const int error = avcodec_open2(context.get(), codec, nullptr); error < 0) {
     fail(path, libav::reason(error));
@@ -77,7 +81,8 @@ void write_png(const std::filesystem::path& path,
                int width,
                int height,
                int channels,
-               std::span<const std::uint8_t> texels) {
+               std::span<const std::uint8_t> texels,
+               Rational pixel_aspect) {
   if (width < 1 || height < 1 || width > max_size || height > max_size || channels < 1 ||
       channels > 4) {
     throw std::invalid_argument("a PNG has 1 to 65535 rows and columns and 1 to 4 channels");
@@ -86,7 +91,12 @@ void write_png(const std::filesystem::path& path,
                            static_cast<std::size_t>(channels)) {
     throw std::invalid_argument("a PNG of another size than its texels");
   }
-  const libav::PacketHandle packet = encode(path, width, height, channels, texels);
+  constexpr std::int64_t most = std::numeric_limits<int>::max();
+  if (pixel_aspect.num < 1 || pixel_aspect.den < 1 || pixel_aspect.num > most ||
+      pixel_aspect.den > most) {
+    throw std::invalid_argument("a PNG's pixels have a width and a height above 0");
+  }
+  const libav::PacketHandle packet = encode(path, width, height, channels, texels, pixel_aspect);
   const std::span<const std::uint8_t> bytes(packet->data, static_cast<std::size_t>(packet->size));
   write_file(path.string(), std::as_bytes(bytes));
 }

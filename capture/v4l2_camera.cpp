@@ -148,6 +148,12 @@ void V4l2Camera::describe() {
   const V4l2Device& device = stream_->device();
   info_.description = device.card + " on " + device.bus + ", " +
                       name_of_fourcc(frames_.layout().fourcc) + ": " + frames_.description();
+  if (stream_->interlaced()) {
+    info_.description += ", interlaced (taken as it is)";
+    info_.doubt =
+        "it delivers interlaced pictures, which are taken as they are: where things move, rows and "
+        "colours of two moments are mixed; have it deliver progressive ones";
+  }
 }
 
 Time V4l2Camera::period() const {

@@ -115,6 +115,7 @@ void V4l2Stream::set_format(const V4l2Choice& choice) {
                              "; the device delivers it as single fields, which is not "
                              "handled");
   }
+  interlaced_ = picture.field != V4L2_FIELD_ANY && picture.field != V4L2_FIELD_NONE;
   layout_ = {choice.fourcc,
              choice.size.width,
              choice.size.height,

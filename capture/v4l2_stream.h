@@ -36,6 +36,8 @@ class V4l2Stream {
 
   const V4l2Device& device() const { return device_; }
   const CodedLayout& layout() const { return layout_; }
+  // Whether pictures hold two fields, of two moments.
+  bool interlaced() const { return interlaced_; }
   Rational rate() const { return rate_; }  // 0/1 = not told
   // What it is set to; 0 = automatic, not told, or changing.
   double exposure_s() const { return exposure_s_; }
@@ -61,6 +63,7 @@ class V4l2Stream {
   V4l2Node node_;
   V4l2Device device_;
   CodedLayout layout_;
+  bool interlaced_ = false;
   Rational rate_;
   double exposure_s_ = 0;
   bool exposure_is_ours_ = false;

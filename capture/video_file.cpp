@@ -11,10 +11,10 @@
 
 #include "capture/crop.h"
 #include "capture/pool.h"
+#include "capture/progressive_video.h"
 #include "capture/sound_decoder.h"
 #include "capture/stamp_clock.h"
 #include "capture/turn.h"
-#include "capture/video_decoder.h"
 
 extern "C" {
 #include <libavcodec/avcodec.h>
@@ -75,11 +75,12 @@ class VideoFile : public Camera {
 
  private:
   void open();
-  void describe(const AVFrame& first);
+  void describe(const ProgressivePicture& first);
+  void describe_interlacing(Interlacing interlacing);
   void skip_to(std::int64_t frame);
   bool jump_before(std::int64_t frame);
-  std::optional<DecodedPicture> start_again();
-  std::optional<DecodedPicture> first_again();
+  std::optional<ProgressivePicture> start_again();
+  std::optional<ProgressivePicture> first_again();
   std::optional<Frame> pass(bool makes_picture);
   Frame make_frame(const DecodedPicture& picture);
   void linearise(const DecodedPicture& picture, Frame& frame);
@@ -90,13 +91,14 @@ class VideoFile : public Camera {
   bool loop_;
   bool rewinds_ = true;  // to the first picture, as far as is known
   bool alpha_;
+  std::optional<bool> deinterlace_;
   CameraInfo info_;
   int source_width_ = 0;
   int source_height_ = 0;
   std::optional<Turn> turn_;  // nothing = one that is not made
   Crop crop_;                 // of the source's picture, before it is turned
   std::unique_ptr<MediaFile> file_;
-  std::unique_ptr<VideoDecoder> decoder_;
+  std::unique_ptr<ProgressiveVideo> decoder_;
   std::unique_ptr<SoundDecoder> sound_;
   std::string sound_note_;
   Lineariser lineariser_;
@@ -139,6 +141,7 @@ VideoFile::VideoFile(const std::string& path,
     : path_(path),
       loop_(options.loop),
       alpha_(options.alpha),
+      deinterlace_(options.deinterlace),
       file_(std::make_unique<MediaFile>(path)),
       lineariser_(curves) {
   open();
@@ -150,7 +153,7 @@ VideoFile::VideoFile(const std::string& path,
     skip_to(*options.frame);
   }
   for (;;) {
-    const std::optional<DecodedPicture> picture = decoder_->next();
+    const std::optional<ProgressivePicture> picture = decoder_->next();
     if (!picture && number_ <= options.frame.value_or(-1)) {
       throw std::runtime_error("cannot open " + path_ + " at frame " +
                                std::to_string(*options.frame) + ": it has " +
@@ -178,7 +181,7 @@ VideoFile::VideoFile(const std::string& path,
         throw std::runtime_error("cannot open " + path_ + ": " + error.what());
       }
       ahead_.push_back(make_frame(*picture));
-      describe(first);
+      describe(*picture);
       break;
     }
     ahead_.push_back(make_frame(*picture));
@@ -189,7 +192,7 @@ VideoFile::VideoFile(const std::string& path,
 }
 
 void VideoFile::open() {
-  decoder_ = std::make_unique<VideoDecoder>(*file_, alpha_);
+  decoder_ = std::make_unique<ProgressiveVideo>(*file_, alpha_, deinterlace_);
   const std::unique_ptr<SoundDecoder> before = std::move(sound_);
   if (file_->sound() != nullptr) {
     try {
@@ -203,7 +206,8 @@ void VideoFile::open() {
   }
 }
 
-void VideoFile::describe(const AVFrame& first) {
+void VideoFile::describe(const ProgressivePicture& picture) {
+  const AVFrame& first = *picture.frame;
   const Turn turn = turn_.value_or(Turn{});
   const auto [width, height] = turned_size(turn, crop_.width, crop_.height);
   const auto [whole_width, whole_height] = turned_size(turn, source_width_, source_height_);
@@ -221,13 +225,7 @@ void VideoFile::describe(const AVFrame& first) {
   }
   info_.description =
       std::string(avcodec_get_name(codec_of(*file_))) + ", " + lineariser_.description();
-  if (first.interlaced_frame != 0) {
-    info_.description += ", interlaced (taken as it is)";
-    info_.doubt =
-        "it is marked as interlaced, and each frame taken for a whole picture: unless both fields "
-        "are of one moment (PsF), rows and colours of two are mixed; deinterlace it first, as by "
-        "ffmpeg -vf bwdif";
-  }
+  describe_interlacing(picture.interlacing);
   if (turn.any()) {
     info_.description += ", " + capture::describe(turn);
   } else if (!turn_) {
@@ -240,6 +238,35 @@ void VideoFile::describe(const AVFrame& first) {
         std::string("; sound ") + avcodec_get_name(file_->sound()->codecpar->codec_id);
   } else if (!sound_note_.empty()) {
     info_.description += "; sound left out: " + sound_note_;
+  }
+}
+
+void VideoFile::describe_interlacing(Interlacing interlacing) {
+  switch (interlacing) {
+    case Interlacing::none:
+      break;
+    case Interlacing::removed:
+      info_.description += ", interlaced (deinterlaced)";
+      if (deinterlace_) break;  // as was asked for
+      info_.doubt =
+          "it is marked as interlaced, and is deinterlaced: where things move, every other row is "
+          "made from those around it. If both fields are of one moment (PsF), deinterlace = false "
+          "keeps all rows";
+      break;
+    case Interlacing::left:
+      info_.description += ", interlaced (taken as it is)";
+      if (deinterlace_ == false) break;
+      info_.doubt = "it is interlaced, and " + decoder_->why_left() +
+                    ". Each frame is taken for a whole picture: unless both fields are of one "
+                    "moment (PsF), rows and colours of two are mixed; deinterlace it first, as by "
+                    "ffmpeg -vf format=yuv422p10,bwdif";
+      break;
+    case Interlacing::field:
+      info_.description += ", single fields (taken as they are)";
+      info_.doubt =
+          "its pictures are single fields of interlaced video, and each is taken for a whole "
+          "picture; join and deinterlace them first, as by ffmpeg -vf weave,bwdif";
+      break;
   }
 }
 
@@ -257,7 +284,7 @@ void VideoFile::skip_to(std::int64_t frame) {
     open();
   }
   while (number_ < frame) {
-    const std::optional<DecodedPicture> picture = decoder_->next();
+    const std::optional<ProgressivePicture> picture = decoder_->next(false);
     if (!picture) {
       return;  // the constructor finds no picture, and says so
     }
@@ -285,7 +312,7 @@ bool VideoFile::jump_before(std::int64_t frame) {
     return false;
   }
   decoder_->restart();
-  const std::optional<DecodedPicture> picture = decoder_->next();
+  const std::optional<ProgressivePicture> picture = decoder_->next(false);
   if (!picture || !picture->pts) {
     return false;
   }
@@ -336,7 +363,7 @@ void VideoFile::linearise(const DecodedPicture& picture, Frame& frame) {
 }
 
 // The first picture of another pass through the file; nothing if there is none.
-std::optional<DecodedPicture> VideoFile::start_again() {
+std::optional<ProgressivePicture> VideoFile::start_again() {
   if (pass_frames_ == 0) {
     return std::nullopt;
   }
@@ -344,7 +371,7 @@ std::optional<DecodedPicture> VideoFile::start_again() {
   if (sound_) {
     sound_->finish(end);
   }
-  std::optional<DecodedPicture> first = first_again();
+  std::optional<ProgressivePicture> first = first_again();
   pass_start_ = end;
   pass_first_ = number_;
   pass_frames_ = 0;
@@ -353,10 +380,10 @@ std::optional<DecodedPicture> VideoFile::start_again() {
 }
 
 // Rewinds, or opens the file again if that does not lead to the picture that was the first.
-std::optional<DecodedPicture> VideoFile::first_again() {
+std::optional<ProgressivePicture> VideoFile::first_again() {
   if (rewinds_ && file_->rewind()) {
     decoder_->restart();
-    std::optional<DecodedPicture> first = decoder_->next();
+    std::optional<ProgressivePicture> first = decoder_->next();
     if (first && first->pts == clock_->first_stamp()) return first;
   }
   rewinds_ = false;
@@ -378,7 +405,7 @@ std::optional<Frame> VideoFile::pass(bool makes_picture) {
     frame = std::move(ahead_.front());
     ahead_.pop_front();
   } else {
-    std::optional<DecodedPicture> picture = decoder_->next();
+    std::optional<ProgressivePicture> picture = decoder_->next(makes_picture);
     if (!picture) judge_end();
     if (!picture && loop_) picture = start_again();
     if (!picture) {

@@ -5,8 +5,8 @@ packages=(
   # build
   build-essential clang-format cmake file ninja-build pkg-config git ca-certificates
   # capture
-  libaravis-dev libavcodec-dev libavformat-dev libavutil-dev libswresample-dev libswscale-dev
-  libeigen3-dev libexif-dev libimath-dev libopenexr-dev libusb-1.0-0-dev
+  libaravis-dev libavcodec-dev libavfilter-dev libavformat-dev libavutil-dev libswresample-dev
+  libswscale-dev libeigen3-dev libexif-dev libimath-dev libopenexr-dev libusb-1.0-0-dev
   # calibrate
   libceres-dev libmrcal-dev libopencv-contrib-dev libtomlplusplus-dev
   # render

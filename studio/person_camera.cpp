@@ -84,7 +84,7 @@ compositing::Window window_about(const std::array<float, 4>& outline,
 }
 
 VideoSource video_of(const PersonCamera& s, const std::string& base_dir) {
-  return {s.source, base_dir, s.loop, s.first, s.colour, !s.key, s.response, s.crop};
+  return {s.source, base_dir, s.loop, s.first, s.colour, !s.key, s.response, s.crop, s.deinterlace};
 }
 
 std::shared_ptr<TimedSource> open_source(const VideoSource& source,

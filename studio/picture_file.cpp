@@ -12,12 +12,14 @@ PictureFile::PictureFile(std::string path,
                          int width,
                          int height,
                          std::chrono::milliseconds period,
-                         std::function<void(const std::string&)> failed)
+                         std::function<void(const std::string&)> failed,
+                         capture::Rational pixel_aspect)
     : path_(std::move(path)),
       width_(width),
       height_(height),
       period_(period),
       failed_(std::move(failed)),
+      pixel_aspect_(pixel_aspect),
       thread_([this](const std::stop_token& stop) { write_on(stop); }) {}
 
 void PictureFile::show(Codes rgb8) {
@@ -38,7 +40,7 @@ void PictureFile::write_on(const std::stop_token& stop) {
     }
     const auto begin = std::chrono::steady_clock::now();
     try {
-      capture::write_png(path_, width_, height_, 3, *picture);
+      capture::write_png(path_, width_, height_, 3, *picture, pixel_aspect_);
       fails = false;
     } catch (const std::exception& error) {
       if (!std::exchange(fails, true)) failed_(error.what());
@@ -52,7 +54,7 @@ void PictureFile::write_on(const std::stop_token& stop) {
 void PictureFile::finish() {
   thread_ = {};
   if (const Codes last = std::exchange(next_, nullptr)) {
-    capture::write_png(path_, width_, height_, 3, *last);
+    capture::write_png(path_, width_, height_, 3, *last, pixel_aspect_);
   }
 }
 

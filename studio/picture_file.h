@@ -11,6 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "capture/frame.h"
+
 namespace studio {
 
 // Writes PNG on a thread of its own, each time whole (capture::write_file).
@@ -24,7 +26,8 @@ class PictureFile {
               int width,
               int height,
               std::chrono::milliseconds period,
-              std::function<void(const std::string&)> failed);
+              std::function<void(const std::string&)> failed,
+              capture::Rational pixel_aspect = {1, 1});
   PictureFile(const PictureFile&) = delete;
   PictureFile& operator=(const PictureFile&) = delete;
 
@@ -40,6 +43,7 @@ class PictureFile {
   int width_, height_;
   std::chrono::milliseconds period_;
   std::function<void(const std::string&)> failed_;
+  capture::Rational pixel_aspect_;
   std::mutex mutex_;
   std::condition_variable_any shown_;
   Codes next_;           // not written yet; by mutex_

@@ -64,6 +64,7 @@ struct CameraSettings {
   // Of a rig: how much later than the rig's clock its frames are stamped.
   std::optional<double> rig_offset_s;
   bool loop = false;
+  std::optional<bool> deinterlace;  // as capture::CameraOptions
 };
 
 // How probe radiance is brought to the plate's units.
@@ -207,6 +208,7 @@ struct PersonCamera {
   capture::Transfer colour = capture::Transfer::rec1886;
   std::optional<std::array<int, 4>> crop;  // x, y, width, height in source pixels
   std::string response;                    // .rsp file; "" = none
+  std::optional<bool> deinterlace;         // as capture::CameraOptions
   double offset_s = 0;                     // how much later than the plate its frames are stamped
   std::optional<KeyChoice> key;            // nothing = the source has alpha, or shows all
   std::optional<calibrate::Lens> lens;     // with its pose; further cameras always have both

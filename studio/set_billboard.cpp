@@ -71,6 +71,7 @@ void read_camera(Section& section, const SetContext& context, PersonCamera& came
   section.boolean("loop", camera.loop);
   read_start(section, camera.source, camera.first);
   read_colour(section, camera.colour);
+  read_deinterlace(section, camera.source, camera.deinterlace);
   std::optional<RigCamera> of_rig;
   if (section.has("rig_camera")) {
     of_rig = read_rig_camera(section, context, camera.lens, camera.cam_from_set, camera.response);

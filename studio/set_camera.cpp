@@ -223,6 +223,12 @@ bool read_start(Section& section, const std::string& uri, std::int64_t& frame) {
   return true;
 }
 
+void read_deinterlace(Section& section, const std::string& uri, std::optional<bool>& deinterlace) {
+  if (bool given = false; section.boolean("deinterlace", given)) deinterlace = given;
+  section.of_use_only(uri.empty() || uri.starts_with("file:"), "deinterlace",
+                      "video files: other sources' pictures are taken as they come");
+}
+
 bool read_source_key(Section& section,
                      std::string_view key,
                      const fs::path& base,
@@ -333,6 +339,7 @@ CameraSettings read_camera_section(Section section, const SetContext& context) {
   double exposure_s = 0;
   if (section.number("exposure_s", exposure_s, exposure_range)) camera.exposure_s = exposure_s;
   section.boolean("loop", camera.loop);
+  read_deinterlace(section, camera.source, camera.deinterlace);
 
   if (section.has("rig_camera")) {
     if (const auto of_rig = read_rig_camera(section, context)) {

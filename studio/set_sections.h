@@ -115,6 +115,9 @@ void read_offset(Section& section,
 // Where a source begins, `frame`; of a device nowhere but at 0. False if there is no such key.
 bool read_start(Section& section, const std::string& uri, std::int64_t& frame);
 
+// Whether a video file is deinterlaced, `deinterlace`; a fault with what is none.
+void read_deinterlace(Section& section, const std::string& uri, std::optional<bool>& deinterlace);
+
 // A source's URI with its path made absolute and, where it names a file or directory, found. Of a
 // device, that its settings can be read: it need not be there.
 bool read_source_key(Section& section,

@@ -82,6 +82,7 @@ class Show::Stages {
       : options_(options),
         maker_(std::move(set), options.rate, options.live),
         display_(make_display(maker_.set())),
+        pixel_aspect_(maker_.plate().info().pixel_aspect),
         recording_(form_of(maker_, display_)) {
     const Set& s = maker_.set();
     if (maker_.plate().is_live()) options_.live = true;
@@ -108,6 +109,7 @@ class Show::Stages {
   }
 
   bool is_live() const { return options_.live; }
+  capture::Rational pixel_aspect() const { return pixel_aspect_; }
   std::optional<std::int64_t> planned_frames() const { return planned_frames_; }
 
   void post(ShowCommand command) {
@@ -528,6 +530,7 @@ class Show::Stages {
 
   // Of the caller's thread.
   std::shared_ptr<const compositing::Display> display_;
+  capture::Rational pixel_aspect_;
   Recording recording_;
 
   // Shared.
@@ -575,6 +578,7 @@ Show::~Show() = default;
 void Show::post(ShowCommand command) { stages_->post(std::move(command)); }
 std::shared_ptr<const ShowStatus> Show::status() const { return stages_->status(); }
 void Show::run(const std::function<void(const ShownFrame&)>& on_frame) { stages_->run(on_frame); }
+capture::Rational Show::pixel_aspect() const { return stages_->pixel_aspect(); }
 bool Show::is_live() const { return stages_->is_live(); }
 std::optional<std::int64_t> Show::planned_frames() const { return stages_->planned_frames(); }
 

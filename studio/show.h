@@ -167,6 +167,8 @@ class Show {
 
   // Paced by the clock or a live plate.
   bool is_live() const;
+  // A pixel's width over its height, as the plate tells.
+  capture::Rational pixel_aspect() const;
   // Frames that run() will show; nothing if it does not know.
   std::optional<std::int64_t> planned_frames() const;
 

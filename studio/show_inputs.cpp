@@ -37,6 +37,7 @@ std::unique_ptr<Source> open_plate(const Set& set) {
   options.frame = camera.frame;
   options.crop = camera.crop;
   options.loop = camera.loop;
+  options.deinterlace = camera.deinterlace;
   options.response = camera.response;
   if (set.show.fps) options.picture_rate = *set.show.fps;
   std::unique_ptr<Source> source;
@@ -67,7 +68,8 @@ std::unique_ptr<Source> open_plate(const Set& set) {
 bool same_plate(const Set& a, const Set& b) {
   return a.camera.source == b.camera.source && a.camera.frame == b.camera.frame &&
          a.camera.crop == b.camera.crop && a.camera.colour == b.camera.colour &&
-         a.camera.response == b.camera.response && a.camera.loop == b.camera.loop;
+         a.camera.response == b.camera.response && a.camera.loop == b.camera.loop &&
+         a.camera.deinterlace == b.camera.deinterlace;
 }
 
 void require_same_plate(const Set& before, const Set& after) {

@@ -32,6 +32,7 @@ std::unique_ptr<capture::Camera> open_video(const VideoSource& source) {
   options.alpha = source.alpha;
   options.response = source.response;
   options.crop = source.crop;
+  options.deinterlace = source.deinterlace;
   if (source.first > 0) options.frame = source.first;
   return capture::open_camera(source.uri, options);
 }

@@ -22,6 +22,7 @@ struct VideoSource {
   bool alpha = false;                        // as capture::CameraOptions
   std::string response{};                    // the same, in place of `colour`
   std::optional<std::array<int, 4>> crop{};  // the same
+  std::optional<bool> deinterlace{};         // the same
   friend bool operator==(const VideoSource&, const VideoSource&) = default;
 };
 

@@ -319,7 +319,8 @@ void run(const RunOptions& options, Console& console) {
   if (!options.view_png.empty()) {
     picture = std::make_unique<PictureFile>(
         options.view_png, set.show.width, set.show.height, std::chrono::seconds(1),
-        [&](const std::string& why) { console.warn(why + "; the show goes on"); });
+        [&](const std::string& why) { console.warn(why + "; the show goes on"); },
+        show.pixel_aspect());
   }
 
   ShownFrame last;

@@ -79,7 +79,7 @@ void still(const StillOptions& options, Console& console) {
     picture = reference->rgb8;
   }
   draw_overlays(set, shown, options.overlays, picture);
-  capture::write_png(options.out, set.show.width, set.show.height, 3, picture);
+  capture::write_png(options.out, set.show.width, set.show.height, 3, picture, show.pixel_aspect());
   if (reference) {
     const auto& [rgb8, took, error] = *reference;
     console.figures(show_figures(set, *show.status(), error, took));

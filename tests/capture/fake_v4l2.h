@@ -69,9 +69,10 @@ struct FakeDevice {
   std::map<unsigned long, int> call_errors;  // errno, by request
   std::uint32_t stamp_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
   std::uint32_t first_sequence = 0;
-  std::vector<std::byte> picture;  // "" = zeros of the format's size
-  bool changes_size = false;       // S_FMT sets another one
-  std::deque<FakeEvent> events;    // then pictures without a fault
+  std::vector<std::byte> picture;         // "" = zeros of the format's size
+  bool changes_size = false;              // S_FMT sets another one
+  std::uint32_t field = V4L2_FIELD_NONE;  // that S_FMT sets
+  std::deque<FakeEvent> events;           // then pictures without a fault
 
   // What was set.
   v4l2_pix_format format{};
@@ -265,7 +266,7 @@ class FakeV4l2 final : public capture::V4l2Io {
                           : bytes                                  ? format.width
                                                                    : 2 * format.width;
     format.sizeimage = 2 * format.width * format.height;
-    format.field = V4L2_FIELD_NONE;
+    format.field = device.field;
     format.priv = V4L2_PIX_FMT_PRIV_MAGIC;
     device.format = format;
     return 0;

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -72,6 +73,25 @@ TEST(DecodeStill8, MakesRgbOfGrey) {
   for (std::size_t i = 0; i < texels.size(); ++i) {
     EXPECT_EQ(still.texels[3 * i], texels[i]);
     EXPECT_EQ(still.texels[3 * i + 2], texels[i]);
+  }
+}
+
+// PNG, third edition, 11.3.4.3: pixels in a unit across, then down, four bytes each.
+TEST(WritePng, TellsTheShapeOfPixels) {
+  for (const Rational aspect : {Rational{1, 1}, Rational{4, 3}, Rational{64, 45}}) {
+    const TemporaryFile file("shape.png");
+    write_png(file.path(), 5, 4, 1, made_texels(5, 4, 1), aspect);
+    const std::vector<std::byte> bytes = file.bytes();
+    constexpr std::array name{std::byte{'p'}, std::byte{'H'}, std::byte{'Y'}, std::byte{'s'}};
+    const auto chunk = std::search(bytes.begin(), bytes.end(), name.begin(), name.end());
+    ASSERT_NE(chunk, bytes.end());
+    const auto number = [&](int at) {
+      std::int64_t value = 0;
+      for (int i = 0; i < 4; ++i) value = 256 * value + std::to_integer<int>(chunk[at + i]);
+      return value;
+    };
+    EXPECT_EQ(number(4) * aspect.num, number(8) * aspect.den) << aspect.num << ":" << aspect.den;
+    EXPECT_GT(number(4), 0);
   }
 }
 
@@ -191,6 +211,10 @@ TEST(DecodeStill8, RoundsDeepCodesAndKeepsAlpha) {
 TEST(WritePng, RefusesTexelsOfAnotherSize) {
   EXPECT_THROW(write_png("/tmp/no.png", 2, 2, 3, made_texels(2, 2, 4)), std::invalid_argument);
   EXPECT_THROW(write_png("/tmp/no.png", 0, 2, 3, {}), std::invalid_argument);
+  for (const Rational aspect : {Rational{0, 1}, Rational{1, 0}, Rational{-4, 3}}) {
+    EXPECT_THROW(write_png("/tmp/no.png", 1, 1, 1, made_texels(1, 1, 1), aspect),
+                 std::invalid_argument);
+  }
 }
 
 TEST(WritePng, NamesTheFolderThatIsNotThere) {

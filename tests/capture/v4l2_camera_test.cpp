@@ -56,6 +56,17 @@ TEST_F(V4l2CameraTest, TakesTheLargestPictureUnasked) {
               AllOf(HasSubstr("Made camera on usb-0000:00:14.0-1"), HasSubstr("YUYV")));
 }
 
+TEST_F(V4l2CameraTest, TellsThatItsPicturesAreInterlaced) {
+  EXPECT_EQ(open("/dev/video0?format=YUYV")->info().doubt, "");
+  device().field = V4L2_FIELD_INTERLACED_TB;
+  auto camera = open("/dev/video0?format=YUYV");
+  EXPECT_THAT(camera->info().description, HasSubstr("interlaced (taken as it is)"));
+  EXPECT_THAT(camera->info().doubt, HasSubstr("interlaced pictures, which are taken as they are"));
+  camera.reset();
+  device().field = V4L2_FIELD_ALTERNATE;
+  EXPECT_THAT(refusal("/dev/video0?format=YUYV"), HasSubstr("as single fields"));
+}
+
 TEST_F(V4l2CameraTest, SetsWhatIsAskedFor) {
   const auto camera = open("/dev/video0?size=32x24&rate=60&gain=55");
   EXPECT_EQ(camera->info().width, 32);

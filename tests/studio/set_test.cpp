@@ -111,6 +111,7 @@ crop = [1000, 1200, 640, 480]
 colour = "sRGB"
 exposure_s = 0.05
 loop = true
+deinterlace = false
 [probe]
 source = "map.exr"
 yaw = 90
@@ -181,6 +182,7 @@ timecode = "10:00:00:00"
   EXPECT_EQ(set.camera.frame, 3);
   EXPECT_EQ(set.camera.colour, capture::Transfer::srgb);
   EXPECT_TRUE(set.camera.loop);
+  EXPECT_EQ(set.camera.deinterlace, false);
   ASSERT_TRUE(set.probe);
   EXPECT_EQ(set.probe->kind, ProbeSettings::Kind::map);
   EXPECT_NEAR(set.probe->yaw_rad, 90 * degree, 1e-12);

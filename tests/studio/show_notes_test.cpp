@@ -20,6 +20,7 @@
 #include "studio/figures.h"
 #include "studio/recording.h"
 #include "studio/show.h"
+#include "studio/timed_source.h"
 #include "tests/capture/made_light_camera.h"
 #include "tests/independent_plate.h"
 #include "tests/studio/made_show.h"
@@ -157,11 +158,19 @@ TEST_F(ShowNotes, NotesWhatIsToBeDoubtedOfThePlateAndItsTrack) {
                                        "0,0,-8,4,0.7,0.7,0,0\n9,0,-8,4,0.7,0.7,0,0\n";
   Set set = made_set("file:" + clip);
   set.camera.pose.track = (dir_ / "track.csv").string();
-  EXPECT_THAT(check_show(set),
-              AllOf(Contains(StartsWith("the plate: it is marked as interlaced")),
-                    Contains(AllOf(StartsWith("the camera's track is doubtful: the camera hangs "
-                                              "upside down throughout"),
-                                   HasSubstr("track.csv")))));
+  EXPECT_THAT(
+      check_show(set),
+      AllOf(Contains(StartsWith("the plate: it is marked as interlaced, and is deinterlaced")),
+            Contains(AllOf(StartsWith("the camera's track is doubtful: the camera hangs "
+                                      "upside down throughout"),
+                           HasSubstr("track.csv")))));
+  set.camera.deinterlace = false;
+  EXPECT_THAT(check_show(set), Not(Contains(HasSubstr("interlaced"))));
+  VideoSource video;
+  video.uri = "file:" + clip;
+  EXPECT_THAT(open_video(video)->info().description, HasSubstr("(deinterlaced)"));
+  video.deinterlace = false;
+  EXPECT_THAT(open_video(video)->info().description, HasSubstr("interlaced (taken as it is)"));
   EXPECT_THAT(check_show(made_set("grey:9,25,0")), testing::IsEmpty());
 }
 

@@ -12,6 +12,7 @@
 
 #include "capture/camera.h"
 #include "capture/png.h"
+#include "tests/independent_plate.h"
 #include "tests/studio/command_line.h"
 #include "tests/studio/made_show.h"
 
@@ -58,6 +59,19 @@ TEST_F(Stills, ShowTheReferenceThroughTheSameDisplay) {
     EXPECT_LT(difference / static_cast<double>(a.size()), 0.02);
     // Above the ground there is the plate alone.
     for (std::size_t i = 0; i < 64 * 3; ++i) ASSERT_EQ(a[i], b[i]) << i;
+  }
+}
+
+TEST_F(Stills, HaveThePlatesShapeOfPixels) {
+  independent::ffmpeg("-f lavfi -i color=c=gray:size=64x48,setsar=4/3 -frames:v 1 -c:v ffv1 '" +
+                      (dir_ / "wide.mkv").string() + "'");
+  const std::string set = write_made_set(dir_, "file:wide.mkv", "");
+  const std::string still = (dir_ / "still.png").string(), shown = (dir_ / "shown.png").string();
+  ASSERT_EQ(run("still " + set + " -o " + still).status, 0);
+  ASSERT_EQ(run("run " + set + " --view-png " + shown).status, 0);
+  for (const std::string& png : {still, shown}) {
+    // Pixels in a unit across and down.
+    EXPECT_THAT(content_of(png), HasSubstr(std::string("pHYs\0\0\0\3\0\0\0\4", 12))) << png;
   }
 }
 
