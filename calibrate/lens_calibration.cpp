@@ -344,7 +344,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
     result.lens.max_angle_rad =
         std::min(result.overlay->max_angle_rad() + guess_rad, std::numbers::pi);
   }
-  result.lens.error_px = result.overlay->rms_px();
+  result.lens.error_px = std::min(result.overlay->rms_px(), most_error_px(result.lens));
   fill_reports(problem, result);
   result.warnings = warnings_of(problem, result);
   result.time_ms =

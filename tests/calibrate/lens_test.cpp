@@ -244,6 +244,13 @@ TEST(Cropped, SeesTheSameDirectionsAtShiftedPixels) {
   }
 }
 
+TEST(Cropped, IsOffByNoMoreThanItsPicture) {
+  Lens lens{"pinhole", 640, 480, {500, 500, 319.5, 239.5}};
+  lens.error_px = 90;
+  EXPECT_EQ(cropped(lens, 300, 200, 200, 100).error_px, 90);
+  EXPECT_EQ(cropped(lens, 300, 200, 4, 3).error_px, 5);
+}
+
 TEST(Resized, KeepsPixelEdgesOnPixelEdges) {
   for (const auto& [lens, good_to_rad] : samples()) {
     const Lens half = resized(lens, lens.width / 2, lens.height / 2);
