@@ -282,8 +282,10 @@ void calibrate_rig(const RigOptions& options, Console& console) {
   }
   calibrate::write_rig(options.out, members,
                        fmt::format("by platelight calibrate rig, {:.2f} px off", fit.rms_px));
-  console.figures(
-      json_text(Json{{"rms_px", fit.rms_px}, {"cameras", cameras}, {"warnings", fit.warnings}}));
+  console.figures(json_text(Json{{"rms_px", fit.rms_px},
+                                 {"chi_squared", fit.chi_squared ? Json(*fit.chi_squared) : Json()},
+                                 {"cameras", cameras},
+                                 {"warnings", fit.warnings}}));
   for (std::size_t c = 0; c < sources.size(); ++c) {
     warn_of_unknown_error(lenses[c], sources[c].lens_file, console);
   }
