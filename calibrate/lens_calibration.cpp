@@ -257,7 +257,8 @@ void fill_reports(const LensProblem& problem, LensCalibration& result) {
 // The better of both projections; what it sees decides which forms are tried.
 Robust solve_first(const LensProblem& problem,
                    LensCalibrationOptions::Models models,
-                   std::vector<LensForm>& forms) {
+                   std::vector<LensForm>& forms,
+                   bool& of_fisheye) {
   using Models = LensCalibrationOptions::Models;
   const LensStarts starts = start_lens(problem);
   std::optional<Robust> angular, perspective;
@@ -281,6 +282,11 @@ Robust solve_first(const LensProblem& problem,
   const auto worth = [](const Robust& r) {  // corners explained, and how well
     return static_cast<double>(count_used(r.solve.used)) / std::max(r.solve.sigma_px, 0.05);
   };
+  if (models == Models::perspective && perspective && far_worse * angular_px < perspective_px) {
+    constexpr double clearly = 2;
+    const auto other = solve_angular(problem, starts.equidistant);
+    of_fisheye = other && worth(*other) > clearly * worth(*perspective);
+  }
   const bool by_angle = angular && (!perspective || worth(*angular) > 1.02 * worth(*perspective));
   forms = by_angle ? angular_forms() : perspective_forms();
   if (!by_angle && angular) {
@@ -299,7 +305,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   check(problem);
   leave_out(problem, result.views);
   std::vector<LensForm> forms;
-  Robust robust = solve_first(problem, options.models, forms);
+  Robust robust = solve_first(problem, options.models, forms, result.of_fisheye);
   if (!(robust.solve.sigma_px < hopeless * problem.width)) {
     throw std::runtime_error(
         "the corners miss the best lens by " + std::to_string(std::lround(robust.solve.sigma_px)) +

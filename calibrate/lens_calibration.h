@@ -47,6 +47,8 @@ struct LensCalibration {
   LensSelection selection;
   // Where the pictures disagree, all predicted errors are larger by its error_factor().
   FocalAgreement focal;
+  // Perspective forms were asked for, but the pictures are clearly a fish-eye's.
+  bool of_fisheye = false;
   std::vector<std::string> warnings;
   double time_ms = 0;
 

@@ -209,6 +209,13 @@ double agreement_of_neighbours(const LensProblem& problem,
 std::vector<std::string> warnings_of(const LensProblem& problem,
                                      const LensCalibration& calibration) {
   std::vector<std::string> warnings;
+  if (calibration.of_fisheye) {
+    // All else that is wrong with such a lens comes of it.
+    warnings.emplace_back(
+        "these are a fish-eye's pictures, which no perspective lens explains: let -o name a .toml, "
+        "without --model or with --model fisheye");
+    return warnings;
+  }
   warn_of_corners(problem, calibration, warnings);
   warn_of_views(calibration, warnings);
   warn_of_focal_lengths(calibration, warnings);

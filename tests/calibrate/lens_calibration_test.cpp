@@ -15,6 +15,7 @@ namespace {
 
 using ::testing::AnyOf;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -112,6 +113,19 @@ TEST(CalibrateLens, ChoosesWhatFitsIntoACameraModelIfItIsAskedTo) {
   EXPECT_THAT(c.lens.model, HasSubstr("LENSMODEL_OPENCV"));
   EXPECT_LE(ray_error_mrad(made_normal(), c.lens, 28), 0.4);
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("blind"))));
+}
+
+TEST(CalibrateLens, SaysThatAFishEyeFitsIntoNoCameraModel) {
+  MadeBoards boards;
+  boards.views = 12;
+  const LensCalibration c =
+      calibrate_lens(make_board_views(made_fisheye(), boards),
+                     {.models = LensCalibrationOptions::Models::perspective, .form = {}});
+  EXPECT_THAT(c.warnings, ElementsAre(HasSubstr("a fish-eye's pictures")));
+  const LensCalibration normal =
+      calibrate_lens(make_board_views(made_normal(), normal_boards()),
+                     {.models = LensCalibrationOptions::Models::perspective, .form = {}});
+  EXPECT_FALSE(normal.of_fisheye);
 }
 
 TEST(CalibrateLens, SaysWhereAPolynomialTurnsBackWithinThePicture) {
