@@ -519,15 +519,26 @@ TEST_F(CalibrateCommands, ProbeIsTurnedByLampsThatTheSceneCameraSeesToo) {
   const std::string command = "calibrate probe --lens " + path("light.toml") + " --light " +
                               path("light.exr") + " --plate " + path("plate.exr") +
                               " --plate-lens " + path("plate.toml") + " -o " + path("pose.toml");
-  const Outcome outcome =
-      run_with_figures(command + " --plate-pose " + path("plate_pose.toml") + " --position 0,0,1");
+  const Outcome outcome = run_with_figures(command + " --plate-pose " + path("plate_pose.toml") +
+                                           " --position 0,0,1 --lamp-distance 1e6");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_EQ(figures()["sources"].size(), 3U);
   const made::PoseError error = made::error_of(calibrate::read_pose(path("pose.toml")), truth);
   EXPECT_LT(error.turn_rad / made::degree, 0.3);
   EXPECT_LT(error.turn_rad / made::degree, 4 * double{figures()["sigma_deg"]});
+  EXPECT_LT(figures()["sigma_deg"], 0.3);
   EXPECT_EQ(run(command).status, 2);
+
+  // Lamps of a room are seen otherwise from 30 cm beside the plate's camera.
+  const Outcome near = run_with_figures(command + " --plate-pose " + path("plate_pose.toml") +
+                                        " --position 0.3,-4,1");
+  ASSERT_EQ(near.status, 0) << near.err;
+  EXPECT_THAT(near.err, HasSubstr("0.30 m from the plate's camera"));
+  EXPECT_NEAR(figures()["sigma_deg"], 3.4, 0.2);
+  const Outcome unknown = run_with_figures(command + " --plate-pose " + path("plate_pose.toml"));
+  EXPECT_THAT(unknown.err, HasSubstr("from one place"));
+  EXPECT_TRUE(figures()["parallax_deg"].is_null());
 }
 
 }  // namespace
