@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <stdexcept>
 
 #include <Eigen/Core>
@@ -14,6 +15,7 @@
 #include "calibrate/lens_seed.h"
 #include "calibrate/lens_warnings.h"
 #include "calibrate/mrcal_lens.h"
+#include "calibrate/view_groups.h"
 
 namespace calibrate {
 namespace {
@@ -190,7 +192,7 @@ std::vector<BelievedSolve> believed(const LensSelection& selection) {
   for (const LensCandidate& c : selection.candidates) {
     if (c.solve && (finest == nullptr || c.solve->sigma_px < finest->solve->sigma_px)) finest = &c;
   }
-  const double variance = finest->solve->sigma_px * finest->solve->sigma_px;
+  const double variance = selection.twins * finest->solve->sigma_px * finest->solve->sigma_px;
   std::vector<double> criterion;
   for (const LensCandidate& c : selection.candidates) {
     if (!c.solve) {
@@ -254,7 +256,8 @@ void fill_reports(const LensProblem& problem, LensCalibration& result) {
   }
 }
 
-// The better of both projections; what it sees decides which forms are tried.
+// The better of both projections; what it sees decides which forms are tried. Also says whether
+// perspective forms were asked for, but the pictures are clearly a fish-eye's.
 Robust solve_first(const LensProblem& problem,
                    LensCalibrationOptions::Models models,
                    std::vector<LensForm>& forms,
@@ -338,12 +341,20 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
     result.sigma_px = std::max(result.sigma_px, chosen.heldout_rms_px / std::numbers::sqrt2);
   }
   // A few views show less of what differs from view to view than there is.
-  double views = 0;
-  for (const ViewReport& view : result.views) views += view.rejected.empty() ? 1 : 0;
-  result.sigma_px *= std::sqrt(views > 1 ? views / (views - 1) : 4.0);
+  const std::vector<std::size_t> groups = view_groups(problem.board, problem.views);
+  std::set<std::size_t> places;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    if (result.views[i].rejected.empty()) places.insert(groups[i]);
+  }
+  result.places = places.size();
+  const auto n = static_cast<double>(result.places);
+  result.sigma_px *= std::sqrt(n > 1 ? n / (n - 1) : 4.0);
+  result.twin_factor = std::sqrt(twin_variance(
+      groups, problem.board.corner_count(), result.start.corners,
+      residuals(chosen.solve->bundle, problem.board, result.start.corners), chosen.solve->used));
   result.focal = focal_agreement(problem, result.start, *chosen.solve);
   result.overlay.emplace(problem, result.start, believed(result.selection),
-                         result.sigma_px * result.focal.error_factor());
+                         result.sigma_px * result.focal.error_factor() * result.twin_factor);
   result.coverage_deg = result.overlay->max_angle_rad() / degree;
   result.lens = chosen.solve->lens;
   if (!is_mrcal_model(result.lens.model)) {

@@ -88,6 +88,11 @@ void warn_of_views(const LensCalibration& c, std::vector<std::string>& warnings)
   if (used < few_views) {
     warnings.push_back(
         words("only %zu pictures could be used: take 10 or more, over the whole picture", used));
+  } else if (c.places < few_views) {
+    warnings.push_back(
+        words("%zu pictures show the board in %zu places only, where it was held still: move it "
+              "to 10 or more, over the whole picture",
+              used, c.places));
   }
   if (used > 1 && most_tilt < tilt_rad) {
     warnings.push_back(
