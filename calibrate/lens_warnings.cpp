@@ -163,11 +163,13 @@ void warn_of_coverage(const LensProblem& problem,
     }
   }
   if (blind > 0) {
-    warnings.push_back(words(
-        "the lens is blind in %.1f %% of the picture, for its polynomial turns back there: take "
-        "pictures with the board at the rim and in the corners, or let --model name a simpler "
-        "form",
-        100.0 * static_cast<double>(blind) / (columns * rows)));
+    warnings.push_back(
+        words("the lens is blind in %.1f %% of the picture, for its polynomial turns back there: "
+              "take pictures with the board at the rim and in the corners, or let --model name a "
+              "simpler form",
+              100.0 * static_cast<double>(blind) / (columns * rows)) +
+        (is_perspective(c.form) ? "; or, of a wide lens, let -o name a .toml and --model be fisheye"
+                                : ""));
   }
   seen += blind;
   unknown += blind;
