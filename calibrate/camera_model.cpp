@@ -246,6 +246,10 @@ CameraModel read_camera_model(const std::string& path) {
     if (model.lens.error_px < 0) {
       reader.fail_at(contents.error_px->line, std::string(error_key) + " must be 0 or above");
     }
+    if (!(model.lens.error_px <= most_error_px(model.lens))) {
+      reader.fail_at(contents.error_px->line,
+                     std::string(error_key) + " must be at most the picture's diagonal");
+    }
   }
   if (!is_mrcal_model(model.lens.model)) {
     reader.fail_at(contents.lens_model->line,

@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 #include <span>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "calibrate/rotation_vector.h"
+#include "calibrate/view_groups.h"
 
 namespace calibrate {
 namespace {
@@ -194,7 +196,12 @@ FocalAgreement focal_agreement(const LensProblem& problem,
     weights += 1 / (sigma * sigma);
     sum += told[view]->factor / (sigma * sigma);
   }
-  if (result.told < least_views) return result;
+  const std::vector<std::size_t> groups = view_groups(problem.board, problem.views);
+  std::set<std::size_t> places;
+  for (std::size_t view = 0; view < told.size(); ++view) {
+    if (result.views[view]) places.insert(groups[view]);
+  }
+  if (places.size() < least_views) return result;
   result.mean_factor = sum / weights;
   double spread = 0;
   for (std::size_t view = 0; view < told.size(); ++view) {
@@ -202,7 +209,8 @@ FocalAgreement focal_agreement(const LensProblem& problem,
   }
   const auto freedoms_of_spread = static_cast<double>(result.told - 1);
   result.chi_squared = spread / freedoms_of_spread;
-  result.most = most_of_noise(freedoms_of_spread);
+  // Views of a board that was held still differ from the mean together.
+  result.most = most_of_noise(static_cast<double>(places.size() - 1));
   return result;
 }
 

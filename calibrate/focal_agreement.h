@@ -21,7 +21,8 @@ struct FocalAgreement {
   double mean_factor = 1;  // weighted by their variances
   std::size_t told = 0;    // by so many pictures
   // Of the factors about their mean, over told - 1: 1 if they differ as the noise of the corners
-  // lets them. Nothing of fewer than three pictures: the solve fits its lens to what two differ by.
+  // lets them. Nothing of fewer than three pictures, not counting those of a board held still: the
+  // solve fits its lens to what two differ by.
   std::optional<double> chi_squared;
   // Up to where chi_squared is taken for noise.
   double most = 0;

@@ -72,10 +72,13 @@ void check(const Lens& lens) {
   if (!(lens.max_angle_rad > 0 && lens.max_angle_rad <= std::numbers::pi)) {
     throw std::invalid_argument("a lens's largest angle must be above 0 and at most 180 degrees");
   }
-  if (!(lens.error_px >= 0) || !std::isfinite(lens.error_px)) {
-    throw std::invalid_argument("a lens's error must be 0 or above, and finite");
+  if (!(lens.error_px >= 0 && lens.error_px <= most_error_px(lens))) {
+    throw std::invalid_argument(
+        "a lens's error must be 0 or above, and at most its picture's diagonal");
   }
 }
+
+double most_error_px(const Lens& lens) { return std::hypot(lens.width, lens.height); }
 
 std::optional<Vec2> project(const Lens& lens, Vec3 v_cam) {
   check(lens);
@@ -116,6 +119,7 @@ Lens cropped(const Lens& lens, int x, int y, int width, int height) {
   const std::size_t centre = has_one_focal_length(lens) ? 1 : 2;
   part.parameters.at(centre) -= x;
   part.parameters.at(centre + 1) -= y;
+  part.error_px = std::min(part.error_px, most_error_px(part));
   check(part);
   return part;
 }
@@ -144,7 +148,7 @@ Lens resized(const Lens& lens, int width, int height) {
   }
   p[centre] = (p[centre] + 0.5) * sx - 0.5;
   p[centre + 1] = (p[centre + 1] + 0.5) * sy - 0.5;
-  result.error_px *= std::sqrt(sx * sy);
+  result.error_px = std::min(result.error_px * std::sqrt(sx * sy), most_error_px(result));
   check(result);
   return result;
 }

@@ -32,8 +32,12 @@ struct Lens {
   friend bool operator==(const Lens&, const Lens&) = default;
 };
 
-// Throws std::invalid_argument: unknown model, wrong number of parameters, not finite, sizes < 1.
+// Throws std::invalid_argument: unknown model, wrong number of parameters, not finite, sizes < 1,
+// an error that is negative or above most_error_px().
 void check(const Lens& lens);
+
+// The picture's diagonal: no lens is known to be farther off.
+double most_error_px(const Lens& lens);
 
 // The pixel of a direction in the camera's frame (any length), or nothing: behind the lens, beyond
 // its angle, not finite. The pixel may lie outside the picture.

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <stdexcept>
 
 #include <Eigen/Core>
@@ -14,6 +15,7 @@
 #include "calibrate/lens_seed.h"
 #include "calibrate/lens_warnings.h"
 #include "calibrate/mrcal_lens.h"
+#include "calibrate/view_groups.h"
 
 namespace calibrate {
 namespace {
@@ -190,7 +192,7 @@ std::vector<BelievedSolve> believed(const LensSelection& selection) {
   for (const LensCandidate& c : selection.candidates) {
     if (c.solve && (finest == nullptr || c.solve->sigma_px < finest->solve->sigma_px)) finest = &c;
   }
-  const double variance = finest->solve->sigma_px * finest->solve->sigma_px;
+  const double variance = selection.twins * finest->solve->sigma_px * finest->solve->sigma_px;
   std::vector<double> criterion;
   for (const LensCandidate& c : selection.candidates) {
     if (!c.solve) {
@@ -254,10 +256,12 @@ void fill_reports(const LensProblem& problem, LensCalibration& result) {
   }
 }
 
-// The better of both projections; what it sees decides which forms are tried.
+// The better of both projections; what it sees decides which forms are tried. Also says whether
+// perspective forms were asked for, but the pictures are clearly a fish-eye's.
 Robust solve_first(const LensProblem& problem,
                    LensCalibrationOptions::Models models,
-                   std::vector<LensForm>& forms) {
+                   std::vector<LensForm>& forms,
+                   bool& of_fisheye) {
   using Models = LensCalibrationOptions::Models;
   const LensStarts starts = start_lens(problem);
   std::optional<Robust> angular, perspective;
@@ -281,6 +285,11 @@ Robust solve_first(const LensProblem& problem,
   const auto worth = [](const Robust& r) {  // corners explained, and how well
     return static_cast<double>(count_used(r.solve.used)) / std::max(r.solve.sigma_px, 0.05);
   };
+  if (models == Models::perspective && perspective && far_worse * angular_px < perspective_px) {
+    constexpr double clearly = 2;
+    const auto other = solve_angular(problem, starts.equidistant);
+    of_fisheye = other && worth(*other) > clearly * worth(*perspective);
+  }
   const bool by_angle = angular && (!perspective || worth(*angular) > 1.02 * worth(*perspective));
   forms = by_angle ? angular_forms() : perspective_forms();
   if (!by_angle && angular) {
@@ -299,7 +308,7 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
   check(problem);
   leave_out(problem, result.views);
   std::vector<LensForm> forms;
-  Robust robust = solve_first(problem, options.models, forms);
+  Robust robust = solve_first(problem, options.models, forms, result.of_fisheye);
   if (!(robust.solve.sigma_px < hopeless * problem.width)) {
     throw std::runtime_error(
         "the corners miss the best lens by " + std::to_string(std::lround(robust.solve.sigma_px)) +
@@ -332,19 +341,27 @@ LensCalibration calibrate_lens(const LensProblem& given, const LensCalibrationOp
     result.sigma_px = std::max(result.sigma_px, chosen.heldout_rms_px / std::numbers::sqrt2);
   }
   // A few views show less of what differs from view to view than there is.
-  double views = 0;
-  for (const ViewReport& view : result.views) views += view.rejected.empty() ? 1 : 0;
-  result.sigma_px *= std::sqrt(views > 1 ? views / (views - 1) : 4.0);
+  const std::vector<std::size_t> groups = view_groups(problem.board, problem.views);
+  std::set<std::size_t> places;
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    if (result.views[i].rejected.empty()) places.insert(groups[i]);
+  }
+  result.places = places.size();
+  const auto n = static_cast<double>(result.places);
+  result.sigma_px *= std::sqrt(n > 1 ? n / (n - 1) : 4.0);
+  result.twin_factor = std::sqrt(twin_variance(
+      groups, problem.board.corner_count(), result.start.corners,
+      residuals(chosen.solve->bundle, problem.board, result.start.corners), chosen.solve->used));
   result.focal = focal_agreement(problem, result.start, *chosen.solve);
   result.overlay.emplace(problem, result.start, believed(result.selection),
-                         result.sigma_px * result.focal.error_factor());
+                         result.sigma_px * result.focal.error_factor() * result.twin_factor);
   result.coverage_deg = result.overlay->max_angle_rad() / degree;
   result.lens = chosen.solve->lens;
   if (!is_mrcal_model(result.lens.model)) {
     result.lens.max_angle_rad =
         std::min(result.overlay->max_angle_rad() + guess_rad, std::numbers::pi);
   }
-  result.lens.error_px = result.overlay->rms_px();
+  result.lens.error_px = std::min(result.overlay->rms_px(), most_error_px(result.lens));
   fill_reports(problem, result);
   result.warnings = warnings_of(problem, result);
   result.time_ms =

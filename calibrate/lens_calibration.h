@@ -44,9 +44,14 @@ struct LensCalibration {
   double heldout_rms_px = 0;  // infinite: nothing could be left out
   double coverage_deg = 0;    // off the axis, of the farthest corner in use
   std::vector<ViewReport> views;
+  std::size_t places = 0;  // of the board in the views in use: see view_groups.h
+  // The square root of twin_variance(), by which all predicted errors are larger.
+  double twin_factor = 1;
   LensSelection selection;
   // Where the pictures disagree, all predicted errors are larger by its error_factor().
   FocalAgreement focal;
+  // Perspective forms were asked for, but the pictures are clearly a fish-eye's.
+  bool of_fisheye = false;
   std::vector<std::string> warnings;
   double time_ms = 0;
 

@@ -138,6 +138,9 @@ Lens read_toml_lens(const std::string& path) {
   if (table.has("error_px")) {
     lens.error_px = table.number("error_px");
     if (lens.error_px < 0) table.fail_at_key("error_px", "\"error_px\" must be 0 or above");
+    if (lens.error_px > most_error_px(lens)) {
+      table.fail_at_key("error_px", "\"error_px\" must be at most the picture's diagonal");
+    }
   }
   if (const auto kind = AxialLens::kind_of(lens.model)) {
     const ParameterNames expected = names_of(*kind);

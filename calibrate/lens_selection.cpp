@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "calibrate/view_groups.h"
 #include "capture/parallel_loop.h"
 
 namespace calibrate {
@@ -29,14 +30,15 @@ struct Folds {
   std::vector<std::size_t> group;  // per corner
 };
 
-// Whole views, dealt in an order that does not follow theirs; quarters of the board where there are
-// too few of them to do without one.
+// Whole views, those of a board held still together, dealt in an order that does not follow theirs;
+// quarters of the board where there are too few of them to do without one.
 Folds deal(const LensProblem& problem, const LensStart& start) {
+  const std::vector<std::size_t> groups = view_groups(problem.board, problem.views);
   std::vector<std::uint8_t> in_use(start.posed.size(), 0);
   for (std::size_t i = 0; i < start.corners.size(); ++i) {
-    if (start.used[i] != 0) in_use[start.corners[i].view] = 1;
+    if (start.used[i] != 0) in_use[groups[start.corners[i].view]] = 1;
   }
-  std::vector<std::size_t> views;
+  std::vector<std::size_t> views;  // the first of each group
   for (std::size_t view = 0; view < in_use.size(); ++view) {
     if (in_use[view] != 0) views.push_back(view);
   }
@@ -51,7 +53,7 @@ Folds deal(const LensProblem& problem, const LensStart& start) {
   for (const SeenCorner& corner : start.corners) {
     const bool right = 2 * (corner.index % columns) >= columns;
     const bool low = 2 * corner.index >= problem.board.corner_count();
-    folds.group.push_back(folds.whole_views ? group_of_view[corner.view]
+    folds.group.push_back(folds.whole_views ? group_of_view[groups[corner.view]]
                                             : (right ? 1U : 0U) + (low ? 2U : 0U));
   }
   return folds;
@@ -122,10 +124,11 @@ LensCandidate judge(const LensProblem& problem,
   return candidate;
 }
 
-// Against the best one, whose corners miss by noise alone.
-bool suffices(const LensCandidate& candidate, const LensCandidate& best) {
+// Against the best one, whose corners miss by noise alone, `twins` of them alike.
+bool suffices(const LensCandidate& candidate, const LensCandidate& best, double twins) {
   if (!(candidate.heldout_rms_px <= most_worse * best.heldout_rms_px)) return false;
-  const double variance = 0.5 * best.heldout_rms_px * best.heldout_rms_px;  // of a coordinate
+  // Of a coordinate.
+  const double variance = twins * 0.5 * best.heldout_rms_px * best.heldout_rms_px;
   return sum_of(candidate.heldout_squares) - sum_of(best.heldout_squares) <= tolerance * variance;
 }
 
@@ -149,7 +152,9 @@ void choose(LensSelection& selection) {
         "are not corners of this board");
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (i != selection.best && !(all[i].solve && suffices(all[i], all[selection.best]))) continue;
+    if (i != selection.best &&
+        !(all[i].solve && suffices(all[i], all[selection.best], selection.twins)))
+      continue;
     selection.chosen = i;
     break;
   }
@@ -192,6 +197,11 @@ LensSelection select_lens(const LensProblem& problem,
     selection.candidates[i] = judge(problem, start, forms[i], warp, folds);
   });
   choose(selection);
+  const LensSolve& best = *selection.candidates[selection.best].solve;
+  selection.twins =
+      twin_variance(view_groups(problem.board, problem.views), problem.board.corner_count(),
+                    start.corners, residuals(best.bundle, problem.board, start.corners), best.used);
+  if (selection.twins > 1) choose(selection);
   return selection;
 }
 

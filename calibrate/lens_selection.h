@@ -26,6 +26,7 @@ struct LensSelection {
   std::size_t chosen = 0;
   std::size_t best = 0;  // of the least held-out error
   std::size_t folds = 0;
+  double twins = 1;  // twin_variance() of the best one: what is off alike counts once
 
   // Takes one more, and chooses again. Throws std::runtime_error if none can be solved.
   void add(LensCandidate candidate);
@@ -39,7 +40,8 @@ std::vector<LensForm> angular_forms();
 std::vector<LensForm> perspective_forms();
 
 // Solves each form from `start` over the corners in use there, and judges it by cross-validation:
-// the views are dealt into five groups; each in turn is left out of the solve, its poses are found
+// the views are dealt into five groups, those of a board held still (view_groups.h) into one; each
+// in turn is left out of the solve, its poses are found
 // from every other of their corners, and the corners between them are compared. Of fewer than five
 // views, each quarter of the board is left out in turn. Chosen is the form with the fewest
 // parameters whose sum of squared distances is within nine variances of the best's, and within 5 %

@@ -88,6 +88,11 @@ void warn_of_views(const LensCalibration& c, std::vector<std::string>& warnings)
   if (used < few_views) {
     warnings.push_back(
         words("only %zu pictures could be used: take 10 or more, over the whole picture", used));
+  } else if (c.places < few_views) {
+    warnings.push_back(
+        words("%zu pictures show the board in %zu places only, where it was held still: move it "
+              "to 10 or more, over the whole picture",
+              used, c.places));
   }
   if (used > 1 && most_tilt < tilt_rad) {
     warnings.push_back(
@@ -158,11 +163,13 @@ void warn_of_coverage(const LensProblem& problem,
     }
   }
   if (blind > 0) {
-    warnings.push_back(words(
-        "the lens is blind in %.1f %% of the picture, for its polynomial turns back there: take "
-        "pictures with the board at the rim and in the corners, or let --model name a simpler "
-        "form",
-        100.0 * static_cast<double>(blind) / (columns * rows)));
+    warnings.push_back(
+        words("the lens is blind in %.1f %% of the picture, for its polynomial turns back there: "
+              "take pictures with the board at the rim and in the corners, or let --model name a "
+              "simpler form",
+              100.0 * static_cast<double>(blind) / (columns * rows)) +
+        (is_perspective(c.form) ? "; or, of a wide lens, let -o name a .toml and --model be fisheye"
+                                : ""));
   }
   seen += blind;
   unknown += blind;
@@ -209,6 +216,13 @@ double agreement_of_neighbours(const LensProblem& problem,
 std::vector<std::string> warnings_of(const LensProblem& problem,
                                      const LensCalibration& calibration) {
   std::vector<std::string> warnings;
+  if (calibration.of_fisheye) {
+    // All else that is wrong with such a lens comes of it.
+    warnings.emplace_back(
+        "these are a fish-eye's pictures, which no perspective lens explains: let -o name a .toml, "
+        "without --model or with --model fisheye");
+    return warnings;
+  }
   warn_of_corners(problem, calibration, warnings);
   warn_of_views(calibration, warnings);
   warn_of_focal_lengths(calibration, warnings);

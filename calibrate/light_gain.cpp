@@ -91,18 +91,25 @@ double error_of(const LightPair& pair, std::size_t c, const Logs& logs) {
   return log_ratio(pair, c) - logs.gain[c] - logs.exposure[pair.frame];
 }
 
-std::vector<double> errors_of(std::span<const LightPair> pairs,
-                              const Logs& logs,
-                              const Used& used) {
+// Of the things in use about the gains. Of two, neither is to be doubted for the other.
+double spread_of(std::span<const LightPair> pairs,
+                 const Things& things,
+                 const Logs& logs,
+                 const Used& used) {
   std::vector<double> errors;
+  std::unordered_set<std::size_t> different;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    for (std::size_t c = 0; used[i] && c < 3; ++c) errors.push_back(error_of(pairs[i], c, logs));
+    if (!used[i]) continue;
+    different.insert(things.of_pair[i]);
+    for (std::size_t c = 0; c < 3; ++c) errors.push_back(error_of(pairs[i], c, logs));
   }
-  return errors;
+  const auto n = static_cast<double>(different.size());
+  if (n == 2) return std::numeric_limits<double>::infinity();
+  return spread_of(errors) * (n > 2 ? std::sqrt(n / (n - 1)) : 1);
 }
 
 // Gains and exposures in turn, each the weighted mean of what the other leaves. Medians first.
-Logs solve_gains(std::span<const LightPair> pairs, const Used& used) {
+Logs solve_gains(std::span<const LightPair> pairs, const Things& things, const Used& used) {
   std::size_t frames = 0;
   for (const LightPair& pair : pairs) frames = std::max(frames, pair.frame + 1);
   Logs logs{{}, std::vector<double>(frames, 0.0)};
@@ -123,7 +130,7 @@ Logs solve_gains(std::span<const LightPair> pairs, const Used& used) {
     logs.gain[c] = capture::median_in_place(rest);
   }
   for (int round = 0; round < rounds; ++round) {
-    const double spread = spread_of(errors_of(pairs, logs, used));
+    const double spread = spread_of(pairs, things, logs, used);
     const Logs before = logs;
     std::array<double, 3> sum{};
     std::array<double, 3> weights{};
@@ -215,7 +222,7 @@ HeldOut hold_out(std::span<const LightPair> pairs, const Things& things, bool tr
   for (std::size_t fold = 0; fold < folds; ++fold) {
     Used used(pairs.size(), true);
     for (std::size_t i = 0; i < used.size(); ++i) used[i] = things.of_pair[i] % folds != fold;
-    const Logs logs = solve_gains(pairs, used);
+    const Logs logs = solve_gains(pairs, things, used);
     const auto matrix = solved ? solve_matrix(pairs, logs, used) : std::nullopt;
     solved = solved && matrix.has_value();
     // A frame without any pair left has no exposure to judge by.
@@ -266,6 +273,13 @@ void set_exposures(std::span<const LightPair> pairs, const Logs& logs, LightGain
   }
 }
 
+// What a standard deviation by so few freedoms is to be multiplied by to hold 68 %: Student's t.
+double student(double freedoms) {
+  constexpr std::array few{1.837, 1.321, 1.197, 1.142, 1.111};
+  const auto at = static_cast<std::size_t>(freedoms) - 1;
+  return at < few.size() ? few[at] : 1 + 0.56 / freedoms;
+}
+
 // Of the gains at the first frame's exposure: what each thing's errors do to them together, the
 // other frames' exposures eliminated.
 void set_sigmas(std::span<const LightPair> pairs,
@@ -273,7 +287,7 @@ void set_sigmas(std::span<const LightPair> pairs,
                 const Logs& logs,
                 LightGain& fit) {
   const Used all(pairs.size(), true);
-  const double spread = spread_of(errors_of(pairs, logs, all));
+  const double spread = spread_of(pairs, things, logs, all);
   std::size_t first = logs.exposure.size();
   for (const LightPair& pair : pairs) {
     first = std::min(first, pair.frame);
@@ -320,8 +334,12 @@ void set_sigmas(std::span<const LightPair> pairs,
   const Eigen::Matrix3d inverse = solver.solve(Eigen::Matrix3d::Identity());
   const auto n = static_cast<double>(in_first.size());
   const Eigen::Matrix3d covariance = n / (n - 1) * inverse * squares * inverse;
+  // The spread of a few things in one channel may be small by chance.
+  constexpr double few = 5;
+  const double pooled = covariance.trace() / 3;
   for (std::size_t c = 0; c < 3; ++c) {
-    fit.sigma[c] = std::sqrt(covariance(index(c), index(c)));
+    const double variance = covariance(index(c), index(c));
+    fit.sigma[c] = student(n - 1) * std::sqrt(n < few ? pooled : variance);
   }
 }
 
@@ -343,10 +361,10 @@ double largest_factor(std::span<const LightPair> pairs, const Logs& logs) {
 LightGain fit_light_gain(std::span<const LightPair> pairs, const LightGainOptions& options) {
   check(pairs);
   const Used all(pairs.size(), true);
-  const Logs logs = solve_gains(pairs, all);
+  const Things things = things_of(pairs);
+  const Logs logs = solve_gains(pairs, things, all);
   LightGain fit;
   set_exposures(pairs, logs, fit);
-  const Things things = things_of(pairs);
   set_sigmas(pairs, things, logs, fit);
   if (things.count < fewest_for_folds) {
     fit.warnings.push_back("the gains rest on " + std::to_string(things.count) +

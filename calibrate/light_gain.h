@@ -32,7 +32,9 @@ struct LightGainOptions {
 
 struct LightGain {
   std::array<double, 3> gain{1, 1, 1};  // plate = gain * probe * exposure of the frame
-  std::array<double, 3> sigma{};        // relative; 1 if the first frame has one thing only
+  // Relative, by Student's t; of fewer than five things one for all channels; 1 if the first frame
+  // has one thing only.
+  std::array<double, 3> sigma{};
   // Row by row, in place of the gains where held-out pairs ask for it.
   std::optional<std::array<double, 9>> matrix;
   // Relative RMS of the gains, of things that took no part; not a number if none could be judged.

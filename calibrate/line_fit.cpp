@@ -18,6 +18,7 @@
 
 #include "calibrate/keep_ceres_quiet.h"
 #include "calibrate/line_planes.h"
+#include "capture/median.h"
 
 namespace calibrate {
 namespace {
@@ -215,9 +216,40 @@ std::optional<Solved> refine(const std::vector<MarkedLine>& lines,
   const auto covariance = covariance_of(problem, state);
   if (!covariance) return std::nullopt;
   solved.covariance = *covariance;
-  const double larger = std::max(1.0, state.cost / std::max(freedoms, 1));
-  for (double& value : solved.covariance) value *= larger;
   return solved;
+}
+
+// Standard deviation by the median of what should be about 0, of which the fit takes `fitted` up.
+double sigma_of(std::vector<double> off, std::size_t fitted) {
+  if (off.size() <= fitted) return 0;
+  const auto count = static_cast<double>(off.size());
+  for (double& d : off) d = std::abs(d);
+  return capture::sigma_by_median * capture::median_in_place(off) *
+         std::sqrt(count / (count - static_cast<double>(fitted)));
+}
+
+// The options with what marks and parallels are off by, where that is more than they expect.
+LineFitOptions as_found(const std::vector<MarkedLine>& lines,
+                        const std::vector<Group>& groups,
+                        LineFitOptions options,
+                        const State& state) {
+  std::vector<double> marks, parallels;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const auto off = distances_px(options.law, state.lens, vec_of(state.normals[i]), lines[i]);
+    if (off) marks.insert(marks.end(), off->begin(), off->end());
+  }
+  std::size_t directions = 0;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    if (groups[g].lines.size() < 3) continue;  // two planes always meet
+    ++directions;
+    for (const std::size_t i : groups[g].lines) {
+      parallels.push_back(dot(vec_of(state.normals[i]), vec_of(state.directions[g])));
+    }
+  }
+  options.noise_px = std::max(options.noise_px, sigma_of(marks, 2 * lines.size() + 1));
+  options.parallel_noise_rad =
+      std::max(options.parallel_noise_rad, sigma_of(parallels, 2 * directions));
+  return options;
 }
 
 double farthest_mark(const LineMarks& marks, Vec2 centre) {
@@ -240,8 +272,8 @@ bool sees_too_far(const LineMarks& marks, const Block& lens, FisheyeLaw law) {
 
 struct Searched {
   State best;
-  // Of the longest focal length, through which every picture is nearly flat.
-  double flat_cost = HUGE_VAL;
+  // The longest focal length, through which every picture is nearly flat.
+  std::optional<Block> flat;
 };
 
 // The best of many focal lengths, with the centre where it is to be expected.
@@ -259,9 +291,9 @@ std::optional<Searched> search(const LineMarks& marks,
     const double f = least * std::pow(range, static_cast<double>(i) / steps);
     const auto state = state_of(marks.lines, groups, options, {f, centre.x, centre.y});
     if (!state) continue;
-    if (!found) found = Searched{*state};
+    if (!found) found = Searched{*state, {}};
     if (state->cost < found->best.cost) found->best = *state;
-    if (i == steps) found->flat_cost = state->cost;
+    if (i == steps) found->flat = state->lens;
   }
   return found;
 }
@@ -270,6 +302,108 @@ double rms(std::span<const double> values) {
   double sum = 0;
   for (const double v : values) sum += v * v;
   return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+// A lens, and the options that it was found with.
+struct Fitted {
+  LineFitOptions options;
+  Solved solved;
+  double flat_cost = HUGE_VAL;
+};
+
+// By the law of the options. Nothing if lens or lines stay open.
+std::optional<Fitted> fit_law(const LineMarks& marks,
+                              const std::vector<Group>& groups,
+                              const LineFitOptions& options) {
+  const auto start = search(marks, groups, options);
+  if (!start) return std::nullopt;
+  auto solved = refine(marks.lines, groups, options, start->best, true);
+  if (!solved) return std::nullopt;
+  Fitted fitted{options, *solved};
+  constexpr int rounds = 3;
+  constexpr double the_same = 1.05;
+  for (int round = 0; round < rounds; ++round) {
+    const LineFitOptions found = as_found(marks.lines, groups, options, fitted.solved.state);
+    if (found.noise_px < the_same * fitted.options.noise_px &&
+        found.parallel_noise_rad < the_same * fitted.options.parallel_noise_rad) {
+      break;
+    }
+    solved = refine(marks.lines, groups, found, fitted.solved.state, true);
+    if (!solved) return std::nullopt;
+    fitted = {found, *solved};
+  }
+  if (start->flat) {
+    const auto flat = state_of(marks.lines, groups, fitted.options, *start->flat);
+    if (flat) fitted.flat_cost = flat->cost;
+  }
+  return fitted;
+}
+
+// Pixels all over the picture, as far off the middle as marks are.
+std::vector<Vec2> marked_pixels(const LineMarks& marks, Vec2 centre) {
+  constexpr int across = 40;
+  const double farthest = farthest_mark(marks, centre);
+  std::vector<Vec2> pixels;
+  for (int y = 0; y < across; ++y) {
+    for (int x = 0; x < across; ++x) {
+      const Vec2 q{(x + 0.5) / across * marks.width - 0.5, (y + 0.5) / across * marks.height - 0.5};
+      if (hypotenuse(q.x - centre.x, q.y - centre.y) <= farthest) pixels.push_back(q);
+    }
+  }
+  return pixels;
+}
+
+// The other law's lens, judged by the noise that the better of both leaves.
+std::optional<OtherLaw> fit_other_law(const LineMarks& marks,
+                                      const std::vector<Group>& groups,
+                                      const LineFitOptions& options,
+                                      const Fitted& ours,
+                                      std::span<const Vec2> pixels) {
+  LineFitOptions theirs_options = options;
+  theirs_options.law =
+      options.law == FisheyeLaw::equisolid ? FisheyeLaw::equidistant : FisheyeLaw::equisolid;
+  const auto theirs = fit_law(marks, groups, theirs_options);
+  if (!theirs || sees_too_far(marks, theirs->solved.state.lens, theirs_options.law)) {
+    return std::nullopt;
+  }
+  const auto cost = [&](const Fitted& fitted) {
+    LineFitOptions judging = fitted.options;
+    judging.noise_px = std::min(ours.options.noise_px, theirs->options.noise_px);
+    judging.parallel_noise_rad =
+        std::min(ours.options.parallel_noise_rad, theirs->options.parallel_noise_rad);
+    const auto solved = refine(marks.lines, groups, judging, fitted.solved.state, false);
+    return solved ? solved->state.cost : HUGE_VAL;
+  };
+  OtherLaw other{lens_of(theirs_options.law, theirs->solved.state.lens, marks),
+                 0,
+                 cost(*theirs) - cost(ours),
+                 {}};
+  if (std::isnan(other.against)) return std::nullopt;
+  std::vector<double> off;
+  for (std::size_t i = 0; i < marks.lines.size(); ++i) {
+    const auto of_line = distances_px(theirs_options.law, theirs->solved.state.lens,
+                                      vec_of(theirs->solved.state.normals[i]), marks.lines[i]);
+    if (of_line) off.insert(off.end(), of_line->begin(), of_line->end());
+  }
+  other.rms_px = rms(off);
+  const auto distance =
+      distance_between(lens_of(options.law, ours.solved.state.lens, marks), other.lens, pixels);
+  if (!distance) return std::nullopt;
+  other.distance = *distance;
+  return other;
+}
+
+// Of a lens's pixels along each axis: by the focal length, and by a law between both, which the
+// lines hold the better to ours the more they are against the other.
+double error_of_lines(const LineFit& fit, std::span<const Vec2> pixels, Vec2 centre) {
+  double squares = 0;
+  for (const Vec2 q : pixels) squares += squared(Vec2{q.x - centre.x, q.y - centre.y});
+  const double radius_px = std::sqrt(squares / (2 * static_cast<double>(pixels.size())));
+  const double of_focal = fit.focal_sigma_px / fit.lens.parameters[0] * radius_px;
+  const double of_law =
+      fit.other ? fit.other->distance.axis_px / std::sqrt(1 + std::max(fit.other->against, 0.0))
+                : 0;
+  return std::min(std::hypot(of_focal, of_law), most_error_px(fit.lens));
 }
 
 // What a lens fitted to the other lines makes of line `i`.
@@ -371,34 +505,38 @@ std::optional<RectangleReport> rectangle_of(const std::array<Vec3, 4>& sides,
   return report;
 }
 
-LineFit fit_lens_to_lines(const LineMarks& marks, const LineFitOptions& options) {
+LineFit fit_lens_to_lines(const LineMarks& marks, const LineFitOptions& expected) {
   check(marks);
-  if (!(options.noise_px > 0 && options.parallel_noise_rad > 0)) {
+  if (!(expected.noise_px > 0 && expected.parallel_noise_rad > 0)) {
     throw std::invalid_argument("expected noise must be above 0");
   }
   const std::vector<Group> groups = groups_of(marks.lines);
-  const auto start = search(marks, groups, options);
-  const auto solved =
-      start ? refine(marks.lines, groups, options, start->best, true) : std::nullopt;
+  const auto fitted = fit_law(marks, groups, expected);
   constexpr double most_unknown = 0.1;  // of the focal length
-  const double sigma = solved ? std::sqrt(solved->covariance[0]) : 0;
+  const double sigma = fitted ? std::sqrt(fitted->solved.covariance[0]) : 0;
   constexpr double least_told = 9;  // three standard deviations
-  if (!solved || !(sigma < most_unknown * solved->state.lens[0]) ||
-      !(solved->state.cost + least_told < start->flat_cost) ||
-      sees_too_far(marks, solved->state.lens, options.law)) {
+  if (!fitted || !(sigma < most_unknown * fitted->solved.state.lens[0]) ||
+      !(fitted->solved.state.cost + least_told < fitted->flat_cost) ||
+      sees_too_far(marks, fitted->solved.state.lens, expected.law)) {
     throw std::runtime_error(
         "these lines do not tell the lens: mark more, long ones that pass far from the picture's "
         "middle, or parallel ones" +
-        std::string(options.free_centre ? ", or give the centre" : ""));
+        std::string(expected.free_centre ? ", or give the centre" : ""));
   }
-  const Block& lens = solved->state.lens;
+  const Block& lens = fitted->solved.state.lens;
+  const LineFitOptions& options = fitted->options;
+  const auto& covariance = fitted->solved.covariance;
   LineFit fit;
   fit.lens = lens_of(options.law, lens, marks);
   check(fit.lens);
   fit.focal_sigma_px = sigma;
   if (options.free_centre) {
-    fit.centre_sigma_px = {std::sqrt(solved->covariance[4]), std::sqrt(solved->covariance[8])};
+    fit.centre_sigma_px = {std::sqrt(covariance[4]), std::sqrt(covariance[8])};
   }
+  const Vec2 centre{lens[1], lens[2]};
+  const std::vector<Vec2> pixels = marked_pixels(marks, centre);
+  fit.other = fit_other_law(marks, groups, expected, *fitted, pixels);
+  fit.lens.error_px = error_of_lines(fit, pixels, centre);
   report_lines(marks, groups, options, lens, fit);
   for (std::size_t i = 0; i < marks.lines.size(); ++i) {
     hold_out(i, marks, options, lens, fit.lines[i]);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "calibrate/lens.h"
+#include "calibrate/lens_distance.h"
 #include "calibrate/line_marks.h"
 #include "calibrate/line_planes.h"
 
@@ -50,14 +52,30 @@ struct RectangleReport {
   Vec3 normal_cam;            // of its plane, unit, away from the camera
 };
 
+// What the same lines make of a lens of the other law.
+struct OtherLaw {
+  Lens lens;
+  double rms_px = 0;
+  // By how much the lines speak against it: its cost less ours, in variances of what is off by as
+  // much as expected; below 0 they are for it.
+  double against = 0;
+  LensDistance distance;  // between both lenses, up to the mark that is farthest from the middle
+
+  // Less than three standard deviations.
+  bool undecided() const { return std::abs(against) < 9; }
+};
+
 struct LineFit {
-  Lens lens;  // "equisolid", or "kannala_brandt" without terms
+  // "equisolid", or "kannala_brandt" without terms. Its error_px counts the uncertainty of the
+  // focal length, and how far the other law's lens is from it as far as the lines leave that open.
+  Lens lens;
   double focal_sigma_px = 0;
   Vec2 centre_sigma_px;  // 0 if it was given
   double rms_px = 0;     // of all marks
   std::vector<LineReport> lines;
   std::vector<ParallelReport> parallels;
   std::vector<RectangleReport> rectangles;
+  std::optional<OtherLaw> other;  // nothing: it fits no lens to these lines
 };
 
 // The lens under which marks of one line have bearings in one plane, and planes of parallel lines
@@ -66,7 +84,8 @@ struct LineFit {
 // 18(2), 1982) and of the angles. Lines instead of boards: Devernay and Faugeras, "Straight Lines
 // Have to Be Straight", MVA 13(1), 2001; ours lie in planes through the camera, so that angles
 // beyond 90 degrees are as good as others. Lines through the centre tell the focal length only by
-// being parallel to others.
+// being parallel to others. Where marks or parallels are off by more than expected, by the median
+// of their squares, the fit is repeated with what they are off by.
 //
 // Throws std::invalid_argument as check(), and for noise that is not above 0; std::runtime_error,
 // saying what to do, if the lines do not tell the focal length to a tenth.

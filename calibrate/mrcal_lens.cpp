@@ -93,19 +93,29 @@ bool finite(const mrcal_point2_t& q) { return std::isfinite(q.x) && std::isfinit
 
 Vec3 from_mrcal(const mrcal_point3_t& v) { return {v.x, v.y, v.z}; }
 
-// Where the radius in the picture of one of OpenCV's lenses first stops growing with the angle.
-// Farther out it may grow again, and would show what is not there.
+// Where the radius in the picture of one of OpenCV's lenses, or of CAHVOR, first stops growing with
+// the angle. Farther out it may grow again, and would show what is not there; or pass zero, from
+// where on the picture is turned by half, and looks right.
 class RadialFold {
  public:
   // Without its decentring and prism, which hardly move the fold. Other models have none here.
   explicit RadialFold(const Lens& lens) {
-    if (!lens.model.starts_with("LENSMODEL_OPENCV")) return;  // all zero: nowhere
+    const bool cahvor = lens.model == "LENSMODEL_CAHVOR";
+    if (!cahvor && !lens.model.starts_with("LENSMODEL_OPENCV")) return;  // all zero: nowhere
     const auto k = [&](std::size_t i) {
       return 4 + i < lens.parameters.size() ? lens.parameters[4 + i] : 0;
     };
     // In u, the squared tangent of the angle: radius^2 = u (above / below)^2.
-    const std::array above{1.0, k(0), k(1), k(4)};
+    std::array above{1.0, k(0), k(1), k(4)};
     below_ = {1, k(5), k(6), k(7)};
+    if (cahvor) {
+      // alpha, beta, r0, r1, r2, about an axis of its own. A constant factor has no fold.
+      axis_ = {std::sin(k(0)) * std::cos(k(1)), std::sin(k(1)), std::cos(k(0)) * std::cos(k(1))};
+      const double middle = 1 + k(2);
+      if (!(middle > 0)) return;  // turned by half everywhere
+      above = {1.0, k(3) / middle, k(4) / middle, 0.0};
+      below_ = {1, 0, 0, 0};
+    }
     for (std::size_t i = 0; i < 4; ++i) {
       for (std::size_t j = 0; j < 4; ++j) {
         const double power = 2 * static_cast<double>(i) + 1 - 2 * static_cast<double>(j);
@@ -116,7 +126,11 @@ class RadialFold {
 
   // Whether a direction with z above 0 lies beyond it.
   bool lies_before(Vec3 v) {
-    const double u = (v.x * v.x + v.y * v.y) / (v.z * v.z);
+    if (slope_[0] == 0) return false;
+    const double along = dot(v, axis_);
+    if (!(along > 0)) return true;
+    const Vec3 across = cross(v, axis_);
+    const double u = dot(across, across) / (along * along);
     // So far in that no term can turn it.
     if (least_within(slope_, u) > 0 && least_within(below_, u) > 0) return false;
     if (!first_) first_ = find();
@@ -150,6 +164,7 @@ class RadialFold {
     return std::numeric_limits<double>::infinity();
   }
 
+  Vec3 axis_{0, 0, 1};
   std::array<double, 7> slope_{};  // of the radius, times below^2
   std::array<double, 4> below_{};
   std::optional<double> first_;

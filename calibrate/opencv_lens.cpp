@@ -209,6 +209,9 @@ Lens lens_of(const OpencvStorage& file,
   if (const StoredValue* error = file.find("error_px")) {
     lens.error_px = number_of(file, *error);
     if (!(lens.error_px >= 0)) file.fail(error->line, "\"error_px\" must be 0 or above");
+    if (lens.error_px > most_error_px(lens)) {
+      file.fail(error->line, "\"error_px\" must be at most the picture's diagonal");
+    }
   }
   try {
     check(lens);

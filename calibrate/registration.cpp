@@ -288,6 +288,9 @@ void set_covariance(Registration& registration,
   const Matrix6 inverse = scale.asDiagonal() * balanced.inverse() * scale.asDiagonal();
   const Eigen::Map<const Matrix6> part(of_lens.data());
   const Matrix6 covariance = variance * inverse + inverse * part * inverse;
+  if (!covariance.allFinite()) {
+    throw std::runtime_error("the pose's uncertainty cannot be told: the numbers are too large");
+  }
   Eigen::Map<Matrix6>(registration.covariance.data()) = covariance;
   registration.turn_sigma_rad = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   registration.position_sigma_m = std::sqrt(covariance.bottomRightCorner<3, 3>().trace());

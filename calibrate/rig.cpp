@@ -10,6 +10,7 @@
 
 #include "calibrate/board_pose.h"
 #include "calibrate/rig_bundle.h"
+#include "calibrate/words.h"
 #include "capture/median.h"
 
 namespace calibrate {
@@ -269,6 +270,11 @@ struct Share {
   std::size_t all = 0;
 };
 
+std::string instant_name(const RigProblem& problem, std::size_t instant) {
+  const std::string& name = problem.cameras[0].views[instant].name;
+  return name.empty() ? "number " + std::to_string(instant) : name;
+}
+
 std::string words_of(const std::vector<std::string>& instants) {
   constexpr std::size_t most = 5;
   std::string words;
@@ -307,8 +313,7 @@ void judge(RigFit& fit,
       if (2 * share.used >= share.all) {
         ++camera.boards;
       } else {
-        const std::string& name = problem.cameras[c].views[start.instants[b]].name;
-        wrong.push_back(name.empty() ? "number " + std::to_string(start.instants[b]) : name);
+        wrong.push_back(instant_name(problem, start.instants[b]));
       }
     }
     const std::size_t all = camera.corners + camera.left_out;
@@ -352,6 +357,71 @@ void warn_of_countings(RigFit& fit, const RigProblem& problem, const Start& star
   }
 }
 
+// What boards' own relations of the cameras differ by.
+struct InstantSpread {
+  double squares = 0;    // px^2
+  double freedoms = 0;   // more than the cameras have
+  double of_lenses = 0;  // px^2
+  double variance = 0;   // px^2, of a coordinate, by each board's own residuals
+
+  // What of it noise of the corners has to explain.
+  double excess() const { return std::max(squares - of_lenses, 0.0) / freedoms; }
+};
+
+std::optional<InstantSpread> spread_of(std::span<const BoardPull> boards,
+                                       double squares,
+                                       double freedoms,
+                                       std::size_t cameras) {
+  InstantSpread spread;
+  for (const BoardPull& board : boards) {
+    spread.squares += board.squares;
+    spread.freedoms += board.freedoms;
+    spread.of_lenses += board.of_lenses;
+  }
+  spread.freedoms -= 6.0 * static_cast<double>(cameras - 1);
+  if (!(spread.freedoms > 0)) return std::nullopt;
+  spread.variance = (squares - spread.squares) / std::max(freedoms - spread.freedoms, 1.0);
+  return spread;
+}
+
+// Warns of instants that differ by more than chance lets them.
+void judge_spread(RigFit& fit,
+                  const RigProblem& problem,
+                  const Start& start,
+                  const InstantSpread& spread,
+                  std::span<const BoardPull> boards,
+                  double noise_px) {
+  constexpr double chance_sigmas = 3;
+  constexpr double least_doubt = 2;
+  const double variance = std::max(spread.variance, noise_px * noise_px);
+  fit.chi_squared = spread.squares / (variance * spread.freedoms + spread.of_lenses);
+  // Wilson and Hilferty, "The Distribution of Chi-Square", PNAS 17, 1931.
+  const double v = 2 / (9 * spread.freedoms);
+  const double most = std::max(least_doubt, std::pow(1 - v + chance_sigmas * std::sqrt(v), 3));
+  if (*fit.chi_squared <= most) return;
+  std::vector<std::size_t> order;
+  for (std::size_t b = 0; b < boards.size(); ++b) {
+    if (boards[b].squares > most * (variance * boards[b].freedoms + boards[b].of_lenses)) {
+      order.push_back(b);
+    }
+  }
+  std::ranges::stable_sort(order, std::ranges::greater{},
+                           [&](std::size_t b) { return boards[b].squares; });
+  constexpr std::size_t most_named = 3;
+  order.resize(std::min(order.size(), most_named));
+  std::string farthest;
+  for (const std::size_t b : order) {
+    farthest +=
+        (farthest.empty() ? "; farthest off: " : ", ") + instant_name(problem, start.instants[b]);
+  }
+  fit.warnings.push_back(
+      words("the instants do not agree on how the cameras stand, by %.1f times what noise lets "
+            "them: did the board move before cameras that are not in step, is it longer one way or "
+            "bent, or a lens off? The uncertainty told is as much larger",
+            std::sqrt(*fit.chi_squared)) +
+      farthest);
+}
+
 // The camera's own part of everything's covariance.
 void tell_uncertainty(RigCameraFit& fit,
                       const RigCovariance& all,
@@ -364,6 +434,9 @@ void tell_uncertainty(RigCameraFit& fit,
       const std::size_t at = n * (6 * (index - 1) + i) + 6 * (index - 1) + j;
       fit.covariance[6 * i + j] = sigma_px * sigma_px * all.of_noise[at] + all.of_lenses[at];
     }
+  }
+  if (!std::ranges::all_of(fit.covariance, [](double value) { return std::isfinite(value); })) {
+    throw std::runtime_error("the rig's uncertainty cannot be told: the numbers are too large");
   }
   const auto& m = fit.covariance;
   fit.turn_sigma_rad = std::sqrt(m[0] + m[7] + m[14]);
@@ -406,12 +479,16 @@ RigFit fit_rig(const RigProblem& problem, const RigOptions& options) {
   const double freedoms =
       2.0 * static_cast<double>(count) -
       6.0 * static_cast<double>(start.instants.size() + problem.cameras.size() - 1);
-  const double sigma_px = std::max(options.noise_px, std::sqrt(squares / std::max(freedoms, 1.0)));
+  double sigma_px = std::max(options.noise_px, std::sqrt(squares / std::max(freedoms, 1.0)));
   std::vector<LensError> errors;
   for (const RigCamera& camera : problem.cameras) errors.push_back(error_of(camera.lens));
   const RigCovariance all = covariance(start.bundle, start.corners, used, errors);
   if (all.of_noise.empty()) {
     throw std::runtime_error("the boards leave a camera's pose open: take more pictures of them");
+  }
+  if (const auto spread = spread_of(all.boards, squares, freedoms, problem.cameras.size())) {
+    judge_spread(fit, problem, start, *spread, all.boards, options.noise_px);
+    sigma_px = std::max(sigma_px, std::sqrt(spread->excess()));
   }
   for (std::size_t c = 0; c < fit.cameras.size(); ++c) {
     RigCameraFit& camera = fit.cameras[c];

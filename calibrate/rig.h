@@ -49,6 +49,9 @@ struct RigFit {
   // Per instant; nothing where fewer than two cameras saw the board.
   std::vector<std::optional<Pose>> rig_from_board;
   double rms_px = 0;
+  // How far each instant alone would put the cameras elsewhere, squared, over what noise and lenses
+  // make of that: 1 if instants differ by these. Nothing of one instant.
+  std::optional<double> chi_squared;
   std::vector<std::string> warnings;  // for people
 };
 
@@ -59,7 +62,9 @@ struct RigFit {
 // half a turn may be counted from either end, one of as many rows as columns, if they are even,
 // from any of its four corners: that is found out, or warned of where the instants do not tell it.
 // The uncertainty counts what lenses are off by where they tell it (Lens::error_px); a turn of all
-// of a lens's directions is none of it.
+// of a lens's directions is none of it. Where instants differ by more than that, as of a board that
+// moves before cameras that are not in step, or is longer one way, it is as much larger (Birge,
+// Phys. Rev. 40, 1932), and a warning tells so.
 //
 // Throws std::invalid_argument: a bad board or lens, fewer than two cameras, a name that is empty
 // or twice, views that are not as many as the first camera's or not of the board's corners, noise

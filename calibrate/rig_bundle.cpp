@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
+#include <vector>
 
 #include <ceres/autodiff_cost_function.h>
 #include <ceres/loss_function.h>
@@ -14,6 +16,7 @@
 #include <ceres/solver.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "calibrate/keep_ceres_quiet.h"
@@ -73,6 +76,7 @@ using Cost = ceres::AutoDiffCostFunction<CornerCost, 2, 6, 6>;
 // in any coordinates.
 struct Derivatives {
   Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_camera, by_board;
+  Eigen::Vector2d residual;
 };
 
 std::optional<Derivatives> derivatives(const RigCorner& corner, const RigBundle& bundle) {
@@ -82,10 +86,9 @@ std::optional<Derivatives> derivatives(const RigCorner& corner, const RigBundle&
   const Cost cost(new CornerCost{&corner.sight});
   Derivatives d;
   Eigen::Matrix<double, 2, 6, Eigen::RowMajor> by_block;
-  std::array<double, 2> residual{};
   const std::array<const double*, 2> at{camera.data(), board.data()};
   std::array<double*, 2> jacobians{by_block.data(), d.by_board.data()};
-  if (!cost.Evaluate(at.data(), residual.data(), jacobians.data())) return std::nullopt;
+  if (!cost.Evaluate(at.data(), d.residual.data(), jacobians.data())) return std::nullopt;
   // The block's rotation vector turns the camera by the left Jacobian; a turn about the camera's
   // own place, and a move of that, change the translation: t = -R p.
   const Mat3 L = left_jacobian({camera[0], camera[1], camera[2]});
@@ -138,6 +141,19 @@ class LensPull {
     return sum;
   }
 
+  // The trace of a matrix times part().
+  double trace_with(const Eigen::MatrixXd& matrix) const {
+    const double variance = error_.sigma_px * error_.sigma_px;
+    double sum = scale_variance(error_) * scaled_.dot(matrix * scaled_);
+    for (const Cell& a : cells_) {
+      const PullSlopes times = a.slopes * matrix;
+      for (const Cell& b : cells_) {
+        sum += variance * likeness(error_, a.v_cam, b.v_cam) * times.cwiseProduct(b.slopes).sum();
+      }
+    }
+    return sum;
+  }
+
  private:
   struct Cell {
     Vec3 v_cam;
@@ -147,6 +163,54 @@ class LensPull {
   Eigen::Index n_;
   Eigen::VectorXd scaled_;
   std::vector<Cell> cells_;
+};
+
+// One board's corners alone, its pose eliminated.
+class LoneBoard {
+ public:
+  LoneBoard(std::span<const LensError> errors, Eigen::Index n)
+      : information_(Eigen::MatrixXd::Zero(n, n)),
+        gradient_(Eigen::VectorXd::Zero(n)),
+        sees_(errors.size(), 0) {
+    for (const LensError& error : errors) pulls_.emplace_back(error, n);
+  }
+
+  void add(const RigCorner& corner, const PullSlopes& slopes, const Eigen::Vector2d& residual) {
+    information_.noalias() += slopes.transpose() * slopes;
+    gradient_.noalias() += slopes.transpose() * residual;
+    pulls_[corner.camera].add(corner.sight, slopes);
+    sees_[corner.camera] = 1;
+  }
+
+  BoardPull pull() const {
+    constexpr double open = 1e-11;
+    const Eigen::VectorXd scale =
+        information_.diagonal()
+            .unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0; })
+            .eval();
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(scale.asDiagonal() * information_ *
+                                                              scale.asDiagonal());
+    // It tells how its cameras stand to each other.
+    const auto most = 6 * (std::ranges::count(sees_, std::uint8_t{1}) - 1);
+    BoardPull result;
+    Eigen::MatrixXd inverse = Eigen::MatrixXd::Zero(gradient_.size(), gradient_.size());
+    for (Eigen::Index i = gradient_.size();
+         i-- > 0 && result.freedoms < static_cast<double>(most);) {
+      if (!(axes.eigenvalues()[i] > open * axes.eigenvalues()[gradient_.size() - 1])) break;
+      const Eigen::VectorXd axis = scale.asDiagonal() * axes.eigenvectors().col(i);
+      inverse.noalias() += axis * axis.transpose() / axes.eigenvalues()[i];
+      ++result.freedoms;
+    }
+    result.squares = gradient_.dot(inverse * gradient_);
+    for (const LensPull& pull : pulls_) result.of_lenses += pull.trace_with(inverse);
+    return result;
+  }
+
+ private:
+  Eigen::MatrixXd information_;
+  Eigen::VectorXd gradient_;
+  std::vector<std::uint8_t> sees_;
+  std::vector<LensPull> pulls_;
 };
 
 }  // namespace
@@ -233,6 +297,7 @@ RigCovariance covariance(const RigBundle& bundle,
 
   std::vector<LensPull> pulls;
   for (const LensError& error : errors) pulls.emplace_back(error, n);
+  std::vector<LoneBoard> alone(own.size(), LoneBoard(errors, n));
   for (std::size_t i = 0; i < corners.size(); ++i) {
     if (!slopes[i]) continue;
     const RigCorner& corner = corners[i];
@@ -242,6 +307,7 @@ RigCovariance covariance(const RigBundle& bundle,
           slopes[i]->by_camera;
     }
     pulls[corner.camera].add(corner.sight, by_cameras);
+    alone[corner.board].add(corner, by_cameras, slopes[i]->residual);
   }
   Eigen::MatrixXd part = Eigen::MatrixXd::Zero(n, n);
   for (const LensPull& pull : pulls) part += pull.part();
@@ -250,6 +316,7 @@ RigCovariance covariance(const RigBundle& bundle,
   result.of_lenses.resize(result.of_noise.size());
   Eigen::Map<Eigen::MatrixXd>(result.of_noise.data(), n, n) = inverse;
   Eigen::Map<Eigen::MatrixXd>(result.of_lenses.data(), n, n) = inverse * part * inverse;
+  for (const LoneBoard& board : alone) result.boards.push_back(board.pull());
   return result;
 }
 

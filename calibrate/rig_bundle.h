@@ -32,11 +32,19 @@ bool minimise(RigBundle& bundle,
               std::span<const std::uint8_t> used,
               double loss_px);
 
+// How far one board alone would put the cameras elsewhere than all boards do.
+struct BoardPull {
+  double squares = 0;    // px^2: by how much its own residuals would be less
+  double freedoms = 0;   // of the cameras, that it tells: what noise of 1 px makes of it
+  double of_lenses = 0;  // px^2: what the lenses' errors make of it
+};
+
 // Of turn and move of each camera but the first, one after the other: square matrices of 6 values
 // per camera, row by row.
 struct RigCovariance {
   std::vector<double> of_noise;   // if residuals have a standard deviation of 1 px
   std::vector<double> of_lenses;  // by what each is off by, to be added
+  std::vector<BoardPull> boards;
 };
 // `errors` are the cameras' lenses'. Empty matrices if a camera's pose is open.
 RigCovariance covariance(const RigBundle& bundle,

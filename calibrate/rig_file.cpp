@@ -59,7 +59,7 @@ class RigReader : public TomlReader {
   std::filesystem::path folder_;
 };
 
-std::string list_of(std::span<const double> numbers) {
+std::string array_of(std::span<const double> numbers) {
   std::string text;
   for (const double number : numbers) text += (text.empty() ? "" : ", ") + to_text(number);
   return "[" + text + "]";
@@ -121,8 +121,8 @@ void write_rig(const std::string& path,
     const Vec3 p = position_of(camera.cam_from_rig);
     text += "\n[[camera]]\nname = " + literal(camera.name) +
             "\nlens = " + literal(within(folder, camera.lens)) +
-            "\nposition = " + list_of(std::array{p.x, p.y, p.z}) +
-            "\nrotation = " + list_of(camera.cam_from_rig.R.m) + "\n";
+            "\nposition = " + array_of(std::array{p.x, p.y, p.z}) +
+            "\nrotation = " + array_of(camera.cam_from_rig.R.m) + "\n";
     if (camera.time_offset_s != 0) text += "time_offset = " + to_text(camera.time_offset_s) + "\n";
     if (!camera.response.empty()) {
       text += "response = " + literal(within(folder, camera.response)) + "\n";

@@ -169,8 +169,14 @@ std::vector<std::vector<double>> solve_all(const Places& places, const std::vect
   return all;
 }
 
+// What samples that took no part miss by.
+struct Heldout {
+  double squares = std::numeric_limits<double>::infinity();
+  double error = std::numeric_limits<double>::infinity();  // RMS
+};
+
 // Of each count of terms. Places are held out; samples, where there is one place.
-std::vector<double> heldout_errors(const Places& places) {
+std::vector<Heldout> heldout_errors(const Places& places) {
   const bool one_place = places.begins.size() == 2;
   std::vector<std::vector<double>> squares(most_terms + 1);
   for (int fold = 0; fold < folds; ++fold) {
@@ -187,10 +193,10 @@ std::vector<double> heldout_errors(const Places& places) {
       }
     }
   }
-  std::vector<double> errors;
+  std::vector<Heldout> errors;
   for (std::vector<double>& of_count : squares) {
     if (of_count.empty()) {
-      errors.push_back(std::numeric_limits<double>::infinity());
+      errors.push_back({});
       continue;
     }
     // Without the largest hundredth: what moved.
@@ -198,9 +204,21 @@ std::vector<double> heldout_errors(const Places& places) {
     of_count.resize(std::max<std::size_t>(1, of_count.size() - of_count.size() / 100));
     double sum = 0;
     for (const double square : of_count) sum += square;
-    errors.push_back(std::sqrt(sum / static_cast<double>(of_count.size())));
+    errors.push_back({sum, std::sqrt(sum / static_cast<double>(of_count.size()))});
   }
   return errors;
+}
+
+// The fewest terms that do as well as the best, but for chance: as lens_selection.h has it.
+std::size_t fewest_terms(std::span<const Heldout> counts) {
+  constexpr double as_good = 1.1;
+  constexpr double tolerance = 9;  // variances of a sample: three standard deviations
+  const Heldout best = *std::ranges::min_element(counts, {}, &Heldout::error);
+  const auto chosen = std::ranges::find_if(counts, [&](const Heldout& count) {
+    return count.error <= as_good * best.error &&
+           count.squares - best.squares <= tolerance * best.error * best.error;
+  });
+  return chosen == counts.end() ? 0 : static_cast<std::size_t>(chosen - counts.begin());
 }
 
 void check(std::span<const VignettingSample> samples, const Places& places) {
@@ -269,18 +287,13 @@ VignettingFit fit_vignetting(std::span<const VignettingSample> samples) {
   const Places places = by_place(samples);
   check(samples, places);
   VignettingFit fit;
-  double best = std::numeric_limits<double>::infinity();
-  for (const double error : heldout_errors(places)) {
-    fit.candidates.push_back({static_cast<int>(fit.candidates.size()), error});
-    best = std::min(best, error);
+  const std::vector<Heldout> counts = heldout_errors(places);
+  for (const Heldout& count : counts) {
+    fit.candidates.push_back({static_cast<int>(fit.candidates.size()), count.error});
   }
-  constexpr double as_good = 1.1;
-  const auto chosen =
-      std::find_if(fit.candidates.begin(), fit.candidates.end(),
-                   [&](const auto& c) { return c.heldout_error <= as_good * best; });
-  fit.terms = solve_all(places, std::vector<bool>(places.samples.size(),
-                                                  true))[static_cast<std::size_t>(chosen->terms)];
-  fit.heldout_error = chosen->heldout_error;
+  const std::size_t chosen = fewest_terms(counts);
+  fit.terms = solve_all(places, std::vector<bool>(places.samples.size(), true))[chosen];
+  fit.heldout_error = counts[chosen].error;
   constexpr double large = 0.1;
   if (!(fit.heldout_error < large)) {
     fit.warnings.emplace_back(

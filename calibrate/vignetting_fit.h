@@ -32,7 +32,9 @@ struct VignettingFit {
   std::vector<std::string> warnings;  // for people; held-out errors of 10 % and more have one
 };
 
-// The fewest terms, none to four, whose error on held-out places is within a tenth of the best.
+// The fewest terms, none to four, whose squared errors on held-out places are within nine variances
+// of a sample of the best's, and within a tenth: a term that moves all of them together by three
+// standard deviations is kept.
 // The light of each place is eliminated; Cauchy's loss, so that what moved hardly pulls; each count
 // of terms starts from the one before, and its steps are halved while the loss rises. An even
 // field is a single place (then angles are held out). Differences of logarithms between samples of

@@ -6,6 +6,8 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -84,9 +86,19 @@ Json figures_of(const calibrate::LineMarks& marks, const calibrate::LineFit& fit
                {"centre_px", {p[p.size() - 2], p[p.size() - 1]}},
                {"centre_sigma_px", {fit.centre_sigma_px.x, fit.centre_sigma_px.y}},
                {"rms_px", fit.rms_px},
+               {"error_px", fit.lens.error_px},
                {"lines", lines},
                {"parallels", parallels},
                {"rectangles", rectangles}};
+  if (fit.other) {
+    const auto& q = fit.other->lens.parameters;
+    figures["other_law"] = {{"model", fit.other->lens.model},
+                            {"focal_px", q[0]},
+                            {"rms_px", fit.other->rms_px},
+                            {"against", fit.other->against},
+                            {"distance_deg", fit.other->distance.angle_rad / degree},
+                            {"distance_px", fit.other->distance.axis_px}};
+  }
   if (const auto level = level_of(fit)) {
     figures["roll_deg"] = level->roll_deg;
     figures["rise_deg"] = level->rise_deg;
@@ -122,6 +134,31 @@ void say(const calibrate::LineMarks& marks, const calibrate::LineFit& fit, Conso
   }
 }
 
+std::string law_of(const calibrate::Lens& lens) {
+  return lens.model == "equisolid" ? "equisolid" : "equidistant";
+}
+
+// Of the law that the lens is taken to have, where the lines do not bear it out.
+std::optional<std::string> doubt_of_law(const calibrate::LineFit& fit) {
+  if (!fit.other) return std::nullopt;
+  const calibrate::OtherLaw& other = *fit.other;
+  const std::string ours = law_of(fit.lens), theirs = law_of(other.lens);
+  const std::string apart =
+      fmt::format("{:.1f} degrees (RMS) in direction", other.distance.angle_rad / degree);
+  if (other.undecided()) {
+    return fmt::format(
+        "the lines do not tell an {} lens ({:.2f} px off) from an {} one ({:.2f} px), which are {} "
+        "apart: the lens's error_px counts that; mark longer lines near the picture's rim, or "
+        "calibrate by a board",
+        ours, fit.rms_px, theirs, other.rms_px, apart);
+  }
+  if (other.against > 0) return std::nullopt;
+  return fmt::format(
+      "an {0} lens explains the lines better ({1:.2f} px off, not {2:.2f}), and is "
+      "{3} from this one: is it one? --model {0}",
+      theirs, other.rms_px, fit.rms_px, apart);
+}
+
 std::vector<std::string> warnings_of(const calibrate::LineMarks& marks,
                                      const calibrate::LineFit& fit,
                                      double noise_px) {
@@ -141,6 +178,7 @@ std::vector<std::string> warnings_of(const calibrate::LineMarks& marks,
                     "one of them belong elsewhere?",
                     parallel.name, parallel.rms_rad / degree));
   }
+  if (auto doubt = doubt_of_law(fit)) warnings.push_back(std::move(*doubt));
   return warnings;
 }
 
@@ -170,6 +208,11 @@ void calibrate_lines(const LinesOptions& options, Console& console) {
   console.say(fmt::format("{}: {}, f = {:.1f} +- {:.1f} px, from {} lines, {:.2f} px off",
                           options.out, options.model, fit.lens.parameters[0], fit.focal_sigma_px,
                           marks.lines.size(), fit.rms_px));
+  if (fit.other) {
+    console.say(fmt::format("the other law: {}, f = {:.1f} px, {:.2f} px off, {:.2f} degrees apart",
+                            law_of(fit.other->lens), fit.other->lens.parameters[0],
+                            fit.other->rms_px, fit.other->distance.angle_rad / degree));
+  }
 }
 
 }  // namespace

@@ -48,6 +48,7 @@ struct ProbeOptions {
   std::string plate_lens;
   std::string plate_pose;
   std::optional<double> tolerance_deg;
+  std::optional<double> lamp_distance_m;
 };
 
 struct Found {
@@ -182,9 +183,21 @@ Found find_by_sources(const ProbeOptions& options, const calibrate::Lens& lens) 
   if (!position) {
     found.warnings.emplace_back(
         "the probe is put where the scene camera stands: bright sources only tell how it is "
-        "turned; --position says otherwise");
+        "turned, and both are taken to see them from one place; --position says otherwise, and by "
+        "how much +- grows");
   }
-  found.sigma_deg = match.fit.turn_sigma_rad / degree;
+  const double apart_m = position ? length(*position - position_of(plate_pose)) : 0;
+  const double lamp_distance_m = options.lamp_distance_m.value_or(5);
+  const double parallax_deg = std::atan2(apart_m, lamp_distance_m) / degree;
+  const double matched_deg = match.fit.turn_sigma_rad / degree;
+  found.sigma_deg = std::hypot(matched_deg, parallax_deg);
+  if (constexpr double clear_deg = 0.1; parallax_deg > std::max(clear_deg, matched_deg)) {
+    found.warnings.push_back(fmt::format(
+        "the probe stands {:.2f} m from the plate's camera: lamps {:.3g} m away are seen up to "
+        "{:.1f} degrees apart, which +- counts; put them farther off and say --lamp-distance, or "
+        "use markers",
+        apart_m, lamp_distance_m, parallax_deg));
+  }
   found.warnings.insert(found.warnings.end(), match.warnings.begin(), match.warnings.end());
   Json list = Json::array();
   for (std::size_t i = 0; i < match.probe_sources.size(); ++i) {
@@ -194,8 +207,10 @@ Found find_by_sources(const ProbeOptions& options, const calibrate::Lens& lens) 
                     {"light_px", {b.x, b.y}},
                     {"residual_deg", match.fit.residuals_rad[i] / degree}});
   }
-  found.details = {
-      {"rms_deg", match.fit.rms_rad / degree}, {"likeness", match.likeness}, {"sources", list}};
+  found.details = {{"rms_deg", match.fit.rms_rad / degree},
+                   {"parallax_deg", position ? Json(parallax_deg) : Json()},
+                   {"likeness", match.likeness},
+                   {"sources", list}};
   found.from = fmt::format("{} bright sources", match.probe_sources.size());
   return found;
 }
@@ -268,6 +283,9 @@ Command calibrate_probe_command() {
                          "its pose: a .toml or .cameramodel file of calibrate pose");
         arguments.option("--tolerance", o->tolerance_deg, 0.01, 30,
                          "degrees that directions to one source may differ by; 2 if not said");
+        arguments.option("--lamp-distance", o->lamp_distance_m, 0.1, 1e9,
+                         "metres to the nearest of the bright sources: what a probe at --position "
+                         "sees otherwise than the plate's camera goes into +-; 5 if not said");
         return [o](Console& console) { calibrate_probe(*o, console); };
       }};
 }

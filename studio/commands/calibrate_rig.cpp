@@ -134,13 +134,47 @@ std::vector<Source> sources_of(const RigOptions& options) {
 }
 
 // Boards that one camera saw, by the word that its instant goes by: a picture's name without its
-// ending, a video's frame number.
+// ending; of a video, the number of the frame of the rig's clock.
 using Instants = std::map<std::string, calibrate::BoardView>;
 
 struct Pictures {
   std::vector<std::string> instants;
   std::vector<calibrate::GreyPicture> grey;
 };
+
+// A video's frames are of the rig's clock by their number, less how much later they are stamped: to
+// half a frame at most.
+std::int64_t frames_later(const Source& source, capture::Rational rate) {
+  if (source.time_offset_s == 0) return 0;
+  if (rate.num <= 0) {
+    throw std::runtime_error(fmt::format(
+        "{}: does not tell its frame rate, so --offset {}={} says no frame: cut the videos to one "
+        "start, or take pictures of one name each instant",
+        source.pictures, source.name, source.time_offset_s));
+  }
+  return std::llround(source.time_offset_s * rate.value());
+}
+
+// The frames of videos are paired by number, which is their instant at one rate only.
+void check_rates(const std::vector<Source>& sources) {
+  constexpr double same = 1e-4;
+  const Source* first = nullptr;
+  capture::Rational rate;
+  for (const Source& source : sources) {
+    if (fs::is_directory(source.pictures)) continue;
+    const capture::Rational its = open_recorded(source.pictures)->info().rate;
+    if (its.num <= 0) continue;
+    if (first == nullptr) {
+      first = &source;
+      rate = its;
+    } else if (std::abs(its.value() / rate.value() - 1) > same) {
+      throw std::runtime_error(fmt::format(
+          "{} has {:.6g} frames a second and {} has {:.6g}: of two rates, frames of one number are "
+          "not of one instant; convert one of them, or take pictures of one name each instant",
+          first->pictures, rate.value(), source.pictures, its.value()));
+    }
+  }
+}
 
 Pictures read_pictures(const Source& source, std::int64_t every) {
   Pictures pictures;
@@ -154,8 +188,11 @@ Pictures read_pictures(const Source& source, std::int64_t every) {
   };
   if (!fs::is_directory(source.pictures)) {
     const auto camera = open_recorded(source.pictures);
-    for (std::int64_t number = 0; const auto frame = camera->next(); ++number) {
-      if (frame->image != nullptr && number % every == 0) {
+    const std::int64_t later = frames_later(source, camera->info().rate);
+    for (std::int64_t number = -later; const auto frame = camera->next(); ++number) {
+      // In place of a lost one comes the one before.
+      if (frame->image == nullptr || frame->status == capture::FrameStatus::lost) continue;
+      if (number >= 0 && number % every == 0) {
         add(fmt::format("frame {:09}", number), *frame->image);
       }
     }
@@ -247,6 +284,7 @@ void calibrate_rig(const RigOptions& options, Console& console) {
   spare_files(read, options.out);
   check_directory_of(options.out);
   const calibrate::Board board = board_of(options.board);
+  check_rates(sources);
   std::vector<calibrate::Lens> lenses;
   for (const Source& source : sources) lenses.push_back(calibrate::read_lens(source.lens_file));
   std::vector<Instants> seen;
@@ -282,8 +320,10 @@ void calibrate_rig(const RigOptions& options, Console& console) {
   }
   calibrate::write_rig(options.out, members,
                        fmt::format("by platelight calibrate rig, {:.2f} px off", fit.rms_px));
-  console.figures(
-      json_text(Json{{"rms_px", fit.rms_px}, {"cameras", cameras}, {"warnings", fit.warnings}}));
+  console.figures(json_text(Json{{"rms_px", fit.rms_px},
+                                 {"chi_squared", fit.chi_squared ? Json(*fit.chi_squared) : Json()},
+                                 {"cameras", cameras},
+                                 {"warnings", fit.warnings}}));
   for (std::size_t c = 0; c < sources.size(); ++c) {
     warn_of_unknown_error(lenses[c], sources[c].lens_file, console);
   }
@@ -302,12 +342,14 @@ Command calibrate_rig_command() {
             auto o = std::make_shared<RigOptions>();
             arguments.positionals("CAMERAS", o->sources,
                                   "NAME=DIRECTORY of pictures, those of one name taken at one "
-                                  "instant, or NAME=VIDEO, all of one start and rate");
+                                  "instant, or NAME=VIDEO, all of one rate and, but for "
+                                  "--offset, of one start");
             arguments.repeated("--lens", o->lenses, "NAME=FILE: a camera's lens; once for each");
             arguments.required("--lens");
             arguments.repeated("--offset", o->offsets,
                                "NAME=SECONDS that a camera stamps its frames later than the first "
-                               "one does, as calibrate offset FIRST CAMERA tells; 0 if not said");
+                               "one does, as calibrate offset FIRST CAMERA tells; 0 if not said. "
+                               "Videos' frames are paired by it, to the nearest");
             arguments.repeated("--response", o->responses,
                                "NAME=FILE of calibrate response, where there is one");
             declare(arguments, o->board);

@@ -156,6 +156,7 @@ TEST(ReadCameraModel, RefusesEveryBadFileWithLineAndReason) {
        {"five_extrinsics.cameramodel", ":4: 'extrinsics' must be 6 numbers"},
        {"extrinsics_in_degrees.cameramodel", ":4: 'extrinsics' turn by more than a full turn"},
        {"negative_error.cameramodel", ":5: platelight_error_px must be 0 or above"},
+       {"too_large_error.cameramodel", ":5: platelight_error_px must be at most"},
        {"open_quote.cameramodel", ":2: a string has no closing quote"},
        {"key_twice.cameramodel", ":4: 'intrinsics' stands here for the second time"},
        {"text_after_the_end.cameramodel", ":7: something follows"},

@@ -1,13 +1,19 @@
 // Lenses from made boards, against their truth.
 #include "calibrate/lens_calibration.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "calibrate/angles.h"
+#include "calibrate/lens_distance.h"
 #include "calibrate/made_boards.h"
 
 namespace calibrate::lens_calibration_test {
@@ -15,6 +21,7 @@ namespace {
 
 using ::testing::AnyOf;
 using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -112,6 +119,73 @@ TEST(CalibrateLens, ChoosesWhatFitsIntoACameraModelIfItIsAskedTo) {
   EXPECT_THAT(c.lens.model, HasSubstr("LENSMODEL_OPENCV"));
   EXPECT_LE(ray_error_mrad(made_normal(), c.lens, 28), 0.4);
   EXPECT_THAT(c.warnings, Not(Contains(HasSubstr("blind"))));
+}
+
+TEST(CalibrateLens, SaysThatAFishEyeFitsIntoNoCameraModel) {
+  MadeBoards boards;
+  boards.views = 12;
+  const LensCalibration c =
+      calibrate_lens(make_board_views(made_fisheye(), boards),
+                     {.models = LensCalibrationOptions::Models::perspective, .form = {}});
+  EXPECT_THAT(c.warnings, ElementsAre(HasSubstr("a fish-eye's pictures")));
+  const LensCalibration normal =
+      calibrate_lens(make_board_views(made_normal(), normal_boards()),
+                     {.models = LensCalibrationOptions::Models::perspective, .form = {}});
+  EXPECT_FALSE(normal.of_fisheye);
+}
+
+// Each board stands still for some frames, whose corners are off alike by more than by noise.
+TEST(CalibrateLens, TakesABoardHeldStillForOnePlace) {
+  MadeBoards boards = normal_boards();
+  boards.views = 8;
+  boards.noise_px = 0;
+  constexpr unsigned frames = 6;
+  const LensCalibrationOptions options{.models = LensCalibrationOptions::Models::perspective,
+                                       .form = {}};
+  std::vector<double> shares;
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    boards.seed = seed;
+    const LensProblem still = make_board_views(made_normal(), boards);
+    LensProblem problem = still;
+    problem.views.clear();
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    for (const BoardView& view : still.views) {
+      std::array<double, 6> bend{};
+      for (double& b : bend) b = 0.3 * normal(random);
+      for (unsigned frame = 0; frame < frames; ++frame) {
+        BoardView& shot = problem.views.emplace_back(view);
+        shot.name += " " + std::to_string(frame);
+        for (std::size_t i = 0; i < shot.corners.size(); ++i) {
+          if (!shot.corners[i]) continue;
+          const double a = static_cast<double>(i % 10) / 4.5 - 1;
+          const double b = static_cast<double>(i / 10) / 4.5 - 1;
+          shot.corners[i]->x +=
+              0.15 * normal(random) + bend[0] * a * a + bend[1] * a * b + bend[2] * b * b;
+          shot.corners[i]->y +=
+              0.15 * normal(random) + bend[3] * a * a + bend[4] * a * b + bend[5] * b * b;
+        }
+      }
+    }
+    const LensCalibration c = calibrate_lens(problem, options);
+    EXPECT_EQ(c.places, still.views.size());
+    EXPECT_GT(c.twin_factor, 1.5);
+    const std::vector<MadeRay> rays = even_rays(made_normal(), 24);
+    std::vector<Vec2> pixels;
+    for (const MadeRay& ray : rays) pixels.push_back(ray.q);
+    shares.push_back(distance_between(c.lens, made_normal().lens, pixels).value().axis_px /
+                     c.lens.error_px);
+    // As few views, each once, have no twins.
+    LensProblem once = problem;
+    once.views.clear();
+    for (std::size_t i = 0; i < problem.views.size(); i += frames) {
+      once.views.push_back(problem.views[i]);
+    }
+    EXPECT_EQ(calibrate_lens(once, options).twin_factor, 1);
+  }
+  std::ranges::sort(shares);
+  EXPECT_LT(shares[0], 1.8);
+  EXPECT_LT(shares[1], 3);
 }
 
 TEST(CalibrateLens, SaysWhereAPolynomialTurnsBackWithinThePicture) {

@@ -63,6 +63,7 @@ TEST(ReadLens, RefusesEveryBadTomlFileWithLineColumnAndReason) {
        {"lens_size_with_fraction.toml", ":2:9: \"width\" must be a whole number"},
        {"lens_size_negative.toml", ":3:10: \"height\" must be a whole number"},
        {"lens_error_negative.toml", ":7:12: \"error_px\" must be 0 or above"},
+       {"lens_error_too_large.toml", ":7:12: \"error_px\" must be at most the picture's diagonal"},
        {"lens_angle_too_large.toml", ":7:13: \"max_angle\" must be above 0 and at most 180"},
        {"lens_not_finite.toml", ":4:5: \"f\" must be finite"},
        {"lens_focal_length_negative.toml", ":1:9: a focal length must be above 0"},

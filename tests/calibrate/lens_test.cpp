@@ -159,6 +159,25 @@ TEST(Project, SeesNothingWhereTheDistortionTurnsBack) {
   EXPECT_FALSE(unproject(opencv, {319.5 + 300 * .8, 319.5}));
 }
 
+// The radius x (1 - .5 x^2) turns back at .816, 39 degrees off an axis of its own, and passes zero
+// at 1.414, from where on the picture is turned by half.
+TEST(Project, SeesNothingBeyondTheFoldOfCahvor) {
+  const double alpha = 0.1;
+  const Lens lens{"LENSMODEL_CAHVOR", 640, 640, {300, 300, 319.5, 319.5, alpha, 0, 0, -.5, 0}};
+  const auto off_axis = [&](double angle) {
+    return Vec3{std::sin(angle + alpha), 0, std::cos(angle + alpha)};
+  };
+  for (const double angle_deg : {0.0, 20.0, 38.0, -38.0}) {
+    const auto q = project(lens, off_axis(angle_deg * degree));
+    ASSERT_TRUE(q) << angle_deg;
+    EXPECT_LT(length(unproject(lens, *q).value() - off_axis(angle_deg * degree)), 1e-6);
+  }
+  for (double angle_deg = 41; angle_deg < 83; ++angle_deg) {
+    EXPECT_FALSE(project(lens, off_axis(angle_deg * degree))) << angle_deg;
+    EXPECT_FALSE(project(lens, off_axis(-angle_deg * degree))) << angle_deg;
+  }
+}
+
 // Fields of 120 degrees; rows reach as far as columns of the same size would.
 TEST(Project, SeesNothingBeyondTheKnotsOfASpline) {
   for (const auto& [order, rows_reach] : {std::pair{2, 0.5}, std::pair{3, 0.4}}) {
@@ -242,6 +261,13 @@ TEST(Cropped, SeesTheSameDirectionsAtShiftedPixels) {
     EXPECT_NEAR(q_part->y, q->y - 50, 1e-9) << lens.model;
     EXPECT_EQ(part.width, 200);
   }
+}
+
+TEST(Cropped, IsOffByNoMoreThanItsPicture) {
+  Lens lens{"pinhole", 640, 480, {500, 500, 319.5, 239.5}};
+  lens.error_px = 90;
+  EXPECT_EQ(cropped(lens, 300, 200, 200, 100).error_px, 90);
+  EXPECT_EQ(cropped(lens, 300, 200, 4, 3).error_px, 5);
 }
 
 TEST(Resized, KeepsPixelEdgesOnPixelEdges) {

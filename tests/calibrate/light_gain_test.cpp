@@ -95,6 +95,26 @@ TEST(FitLightGain, TellsThatFewThingsContradictEachOther) {
               ElementsAre(HasSubstr("2 things only"), HasSubstr("differ by a factor of 17.0")));
 }
 
+TEST(FitLightGain, KnowsHowRightItIsFromAFewThings) {
+  for (const std::size_t things : {2U, 3U, 4U}) {
+    made::Random random(5);
+    int within = 0, far = 0, count = 0;
+    for (int i = 0; i < 150; ++i) {
+      const LightGain fit = fit_light_gain(made_pairs(things, diagonal(made_gain), 0.05, random));
+      EXPECT_EQ(fit.sigma[0], fit.sigma[1]);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double off = std::abs(std::log(fit.gain[c] / made_gain[c])) / fit.sigma[c];
+        within += off < 1 ? 1 : 0;
+        far += off > 3 ? 1 : 0;
+        ++count;
+      }
+    }
+    EXPECT_GT(within, 0.6 * count) << things;
+    EXPECT_LT(within, 0.92 * count) << things;
+    EXPECT_LT(far, 0.05 * count) << things;
+  }
+}
+
 TEST(FitLightGain, TakesManyFramesOfOneGreyCardForOneThing) {
   made::Random random(3);
   auto pairs = made_pairs(25, diagonal(made_gain), 0.01, random);

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <numbers>
 #include <stdexcept>
+#include <vector>
 
 #include "calibrate/grey_picture.h"
 #include "calibrate/pose.h"
@@ -90,6 +91,51 @@ TEST(FitLensToLines, FindsTheFocalLengthWithinItsUncertainty) {
   }
   EXPECT_GT(squares / rooms, 0.3);
   EXPECT_LT(squares / rooms, 2.0);
+}
+
+TEST(FitLensToLines, KnowsHowRightItIsFromMarksWorseThanExpected) {
+  double squares = 0;
+  constexpr unsigned rooms = 16;
+  for (unsigned seed = 0; seed < rooms; ++seed) {
+    const LineMarks marks = made_room(made_equisolid(), {0, 1, 0}, 4, 8, 2, 0.2 * degree, seed);
+    const LineFit fit = fit_lens_to_lines(marks);
+    const double off = fit.lens.parameters[0] - 310;
+    squares += off * off / (fit.focal_sigma_px * fit.focal_sigma_px);
+    EXPECT_LT(fit.focal_sigma_px, 12) << seed;
+  }
+  EXPECT_GT(squares / rooms, 0.3);
+  EXPECT_LT(squares / rooms, 2.2);
+}
+
+TEST(FitLensToLines, TellsWhatTheOtherLawMakesOfTheLines) {
+  // Of many long lines the law is told; of one that is not the lens's it is said.
+  const LineMarks many = made_room(made_equidistant(), {0, 1, 0}, 6, 12, 0.2, 0.1 * degree, 2);
+  LineFitOptions options;
+  options.noise_px = 0.2;
+  const LineFit wrong = fit_lens_to_lines(many, options);
+  ASSERT_TRUE(wrong.other);
+  EXPECT_EQ(wrong.other->lens.model, "kannala_brandt");
+  EXPECT_LT(wrong.other->against, -9);
+  EXPECT_LT(wrong.other->rms_px, wrong.rms_px);
+  const auto truth = distance_between(
+      wrong.lens, made_equidistant(),
+      std::vector<Vec2>{
+          {300, 300}, {700, 500}, {1100, 300}, {1100, 700}, {300, 700}, {700, 150}, {700, 850}});
+  EXPECT_GT(wrong.lens.error_px, 0.5 * truth.value().axis_px);
+  options.law = FisheyeLaw::equidistant;
+  const LineFit right = fit_lens_to_lines(many, options);
+  ASSERT_TRUE(right.other);
+  EXPECT_FALSE(right.other->undecided());
+  EXPECT_GT(right.other->against, 9);
+  EXPECT_LT(right.lens.error_px, 0.5 * wrong.lens.error_px);
+  // Of short ones near the middle it is not, and the lens may be off by as much as both differ.
+  Lens narrow = made_equidistant();
+  narrow.max_angle_rad = 50 * degree;
+  const LineMarks few = made_room(narrow, {0, 1, 0}, 4, 4, 0.5, 0.1 * degree, 4);
+  const LineFit open = fit_lens_to_lines(few);
+  ASSERT_TRUE(open.other);
+  EXPECT_TRUE(open.other->undecided());
+  EXPECT_GT(open.lens.error_px, 0.3 * open.other->distance.axis_px);
 }
 
 // Straight whatever the lens: all lie in planes through the axis.

@@ -222,6 +222,7 @@ TEST(ReadOpencvLens, RefusesEveryBadFileWithPlaceAndReason) {
        {"opencv_matrix_of_words.yml", ":9: \"camera_matrix/data\" must hold finite numbers"},
        {"opencv_nan.yml", ":9: \"camera_matrix/data\" must hold finite numbers, not \".Nan\""},
        {"opencv_skew.yml", ":9: \"camera_matrix\" has skew"},
+       {"opencv_error_too_large.yml", ":10: \"error_px\" must be at most the picture's diagonal"},
        {"opencv_focal_negative.yml", ":9: a focal length must be above 0"},
        {"opencv_camera_matrix_twice.yml", ":14: \"camera_matrix/data\" is here for the second"},
        {"opencv_list_without_end.yml", ":9: a list begins here and does not end"},

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "tests/calibrate/made_markers.h"
 
@@ -70,6 +72,35 @@ MadeRig made_rig(std::size_t instants,
   return rig;
 }
 
+// As of cameras that are not in step: the second one sees each board moved, by so much along each
+// axis.
+void move_boards(MadeRig& rig, double by_m, double noise_px, unsigned seed) {
+  made::Random random(seed);
+  RigCamera& first = rig.problem.cameras[0];
+  RigCamera& second = rig.problem.cameras[1];
+  const Board& board = rig.problem.board;
+  const RigFit truth = fit_rig(rig.problem);
+  for (std::size_t i = 0; i < second.views.size(); ++i) {
+    const auto& rig_from_board = truth.rig_from_board[i];
+    if (!rig_from_board) continue;
+    Pose moved = *rig_from_board;
+    moved.t += Vec3{by_m * random.normal(), by_m * random.normal(), by_m * random.normal()};
+    for (std::size_t k = 0; k < board.corner_count(); ++k) {
+      for (RigCamera* camera : {&first, &second}) {
+        auto& corner = camera->views[i].corners[k];
+        const Pose& pose = camera == &first ? *rig_from_board : moved;
+        const Pose& cam = rig.cam_from_rig[camera == &first ? 0 : 1];
+        const auto q = project(camera->lens, cam * (pose * corner_of(board, k)));
+        if (corner && q) {
+          corner = Vec2{q->x + noise_px * random.normal(), q->y + noise_px * random.normal()};
+        }
+      }
+    }
+  }
+}
+
+constexpr const char* disagreement = "the instants do not agree on how the cameras stand";
+
 std::string reason_of(const RigProblem& problem) {
   try {
     fit_rig(problem);
@@ -105,6 +136,33 @@ TEST(FitRig, FindsTheCamerasWithinTheirUncertainty) {
   }
   EXPECT_GT(squares / count, 0.5);
   EXPECT_LT(squares / count, 1.7);
+}
+
+TEST(FitRig, KnowsThatInstantsDifferByMoreThanNoise) {
+  // The median of the error over what is told: of cameras in step and not.
+  for (const double by_m : {0.0, 0.001, 0.003}) {
+    std::vector<double> shares;
+    int warned = 0;
+    constexpr unsigned seeds = 8;
+    for (unsigned seed = 0; seed < seeds; ++seed) {
+      MadeRig rig = made_rig(20, 0.3, seed);
+      rig.problem.cameras.pop_back();
+      move_boards(rig, by_m, 0.3, seed + 100);
+      const RigFit fit = fit_rig(rig.problem);
+      const made::PoseError error =
+          made::error_of(fit.cameras[1].cam_from_rig, rig.cam_from_rig[1]);
+      shares.push_back(error.position_m / fit.cameras[1].position_sigma_m);
+      const bool told = std::ranges::any_of(fit.warnings, [](const std::string& warning) {
+        return warning.find(disagreement) != std::string::npos;
+      });
+      EXPECT_EQ(told, fit.chi_squared.value() > 2) << by_m << " " << seed;
+      warned += told ? 1 : 0;
+    }
+    std::ranges::sort(shares);
+    EXPECT_LT(shares[seeds / 2], 1.8) << by_m;
+    EXPECT_GT(shares[seeds / 2], 0.3) << by_m;
+    EXPECT_EQ(warned, by_m > 0 ? static_cast<int>(seeds) : 0) << by_m;
+  }
 }
 
 TEST(FitRig, PassesOverWrongCornersAndMissingViews) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <fstream>
 #include <numbers>
 #include <random>
 #include <string>
@@ -104,6 +105,59 @@ TEST_F(CalibrateCommands, RigComesFromPicturesOfTheSameNames) {
   const Outcome no_response = run(command + " --response right=" + path("none.rsp"));
   EXPECT_EQ(no_response.status, 1);
   expect_one_line(no_response.err);
+}
+
+TEST_F(CalibrateCommands, RigPairsFramesByTheirOffsetAndRefusesTwoRates) {
+  const calibrate::Board board{calibrate::Board::Kind::chessboard, 8, 5, 0.04, 0, ""};
+  const calibrate::Lens lens{"pinhole", 480, 360, {400, 400, 239.5, 179.5}};
+  const calibrate::Pose right_from_left = calibrate::look_at({0.25, 0, 0}, {0.1, 0.8, 0}, 0.05) *
+                                          inverse(calibrate::look_at({0, 0, 0}, {0.1, 0.8, 0}, 0));
+  calibrate::write_lens(path("lens.toml"), lens);
+  // A recording of 25 frames a second that begins so many frames early.
+  constexpr int instants = 9;  // a recording of fewer tells no rate
+  const auto record = [&](const std::string& name, const calibrate::Pose& cam_from_left, int early,
+                          double rate) {
+    fs::create_directories(dir_ / name);
+    std::ofstream list(dir_ / name / "frames.csv");
+    list << "file,time_s,exposure_s,status\n";
+    for (int i = 0; i < instants + early; ++i) {
+      const int instant = std::max(0, i - early);
+      std::mt19937 of_instant(static_cast<unsigned>(instant));
+      const calibrate::Pose left_from_board =
+          made::make_board_pose(board, {0.01 * instant - 0.04, 0.005 * instant - 0.02, 1},
+                                0.7 + 0.03 * instant, 0.5, 0.3, of_instant);
+      const calibrate::GreyPicture picture =
+          made::render_board(board, cam_from_left * left_from_board, lens);
+      const std::string file = std::to_string(i) + ".png";
+      capture::write_png(dir_ / name / file, picture.width, picture.height, 1, picture.pixels);
+      list << fmt::format("{},{:.9f},0.01,good\n", file, i / rate);
+    }
+  };
+  record("left", {}, 0, 25);
+  record("right", right_from_left, 2, 25);
+  record("faster", right_from_left, 0, 50);
+  const auto command = [&](const std::string& right, const std::string& more) {
+    return "calibrate rig left=replay:" + path("left") + " right=replay:" + path(right) +
+           " --lens left=" + path("lens.toml") + " --lens right=" + path("lens.toml") +
+           " --board 8x5 --square 0.04 --every 1 -o " + path("rig.toml") + more;
+  };
+  const Outcome paired = run_with_figures(command("right", " --offset right=0.085"));
+  ASSERT_EQ(paired.status, 0) << paired.err;
+  const made::PoseError error =
+      made::error_of(calibrate::read_rig(path("rig.toml"))[1].cam_from_rig, right_from_left);
+  EXPECT_LT(error.turn_rad / made::degree, 0.1);
+  EXPECT_LT(error.position_m, 0.002);
+  EXPECT_EQ(figures()["cameras"][1]["views"], instants);
+  EXPECT_LT(figures()["chi_squared"], 2);
+
+  const Outcome unpaired = run(command("right", ""));
+  EXPECT_TRUE(unpaired.status == 1 || unpaired.err.find("do not agree") != std::string::npos)
+      << unpaired.err;
+  const Outcome rates = run(command("faster", ""));
+  EXPECT_EQ(rates.status, 1);
+  expect_one_line(rates.err);
+  EXPECT_THAT(rates.err, HasSubstr("25 frames a second"));
+  EXPECT_THAT(rates.err, HasSubstr("50"));
 }
 
 TEST_F(CalibrateCommands, LensOfTheDeskComesFromItsLinesWithoutBoards) {
@@ -465,15 +519,26 @@ TEST_F(CalibrateCommands, ProbeIsTurnedByLampsThatTheSceneCameraSeesToo) {
   const std::string command = "calibrate probe --lens " + path("light.toml") + " --light " +
                               path("light.exr") + " --plate " + path("plate.exr") +
                               " --plate-lens " + path("plate.toml") + " -o " + path("pose.toml");
-  const Outcome outcome =
-      run_with_figures(command + " --plate-pose " + path("plate_pose.toml") + " --position 0,0,1");
+  const Outcome outcome = run_with_figures(command + " --plate-pose " + path("plate_pose.toml") +
+                                           " --position 0,0,1 --lamp-distance 1e6");
   ASSERT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
   EXPECT_EQ(figures()["sources"].size(), 3U);
   const made::PoseError error = made::error_of(calibrate::read_pose(path("pose.toml")), truth);
   EXPECT_LT(error.turn_rad / made::degree, 0.3);
   EXPECT_LT(error.turn_rad / made::degree, 4 * double{figures()["sigma_deg"]});
+  EXPECT_LT(figures()["sigma_deg"], 0.3);
   EXPECT_EQ(run(command).status, 2);
+
+  // Lamps of a room are seen otherwise from 30 cm beside the plate's camera.
+  const Outcome near = run_with_figures(command + " --plate-pose " + path("plate_pose.toml") +
+                                        " --position 0.3,-4,1");
+  ASSERT_EQ(near.status, 0) << near.err;
+  EXPECT_THAT(near.err, HasSubstr("0.30 m from the plate's camera"));
+  EXPECT_NEAR(figures()["sigma_deg"], 3.4, 0.2);
+  const Outcome unknown = run_with_figures(command + " --plate-pose " + path("plate_pose.toml"));
+  EXPECT_THAT(unknown.err, HasSubstr("from one place"));
+  EXPECT_TRUE(figures()["parallax_deg"].is_null());
 }
 
 }  // namespace
