@@ -48,11 +48,11 @@ struct LoadedModel {
 //
 // glTF materials: base colour, metallic-roughness, normal, clear coat, transmission (as a thin
 // wall; a volume of it as solid glass, glass.h, if it is hardly rough), emission, alpha cut out or
-// blended, vertex colours without their alpha. Not handled, and noted in
-// the report: occlusion maps (the light is traced) and every other map that is not taken, sheen,
-// volumes that are not clear, the roughness of transmission, animation. Morph targets and skins of
-// glTF show as they rest (models.md); those of FBX are noted. Materials of other formats: colour,
-// opacity, shininess, emission.
+// blended, vertex colours without their alpha. Not handled, and noted in the report: occlusion maps
+// (the light is traced) and every other map that is not taken, sheen, volumes that are not clear,
+// the roughness of transmission, animation. Morph targets and skins of glTF show as they rest
+// (models.md); those of FBX are noted. Materials of other formats: colour, opacity, shininess,
+// emission.
 //
 // A texture that is not there or cannot be decoded is told in the notes and replaced: base colour
 // by magenta, linear (1, 0, 1), emission and transmission by 0; other maps are left out. Normals

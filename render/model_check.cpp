@@ -334,6 +334,21 @@ bool stl_has_paint(std::span<const std::byte> file_bytes) {
   return text_of(file_bytes).substr(0, stl_header).find("COLOR=") != std::string_view::npos;
 }
 
+bool obj_colours_some(std::span<const std::byte> file_bytes) {
+  constexpr int with_colour = 7;  // words: "v", three of the place, three of the colour
+  bool coloured = false, plain = false;
+  for (std::string_view text = text_of(file_bytes); !text.empty();) {
+    std::string_view line = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    if (take_word(line) != "v") continue;
+    int words = 1;
+    while (words < with_colour && !take_word(line).empty()) ++words;
+    (words == with_colour ? coloured : plain) = true;
+    if (coloured && plain) return true;
+  }
+  return false;
+}
+
 std::optional<std::vector<std::byte>> mend_stl(std::span<const std::byte> file_bytes) {
   const std::string_view text = text_of(file_bytes), words = words_of_stl(text);
   if (text.starts_with("solid") || !begins_as_words(words) || is_binary_stl(text)) {

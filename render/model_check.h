@@ -32,6 +32,10 @@ bool stl_has_paint(std::span<const std::byte> file_bytes);
 std::optional<std::vector<std::byte>> mend_ply(std::span<const std::byte> file_bytes);
 std::optional<std::vector<std::byte>> mend_stl(std::span<const std::byte> file_bytes);
 
+// Whether an OBJ file gives colours to some of its vertices and not to others, which assimp then
+// gives to the wrong ones.
+bool obj_colours_some(std::span<const std::byte> file_bytes);
+
 // Whether an FBX file, binary or ascii, hides anything by a Visibility of 0, which assimp does not
 // tell. Anything may stand in the file.
 bool hides_by_visibility(std::span<const std::byte> file_bytes);

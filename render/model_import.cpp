@@ -273,15 +273,17 @@ Axes stated_axes(const aiScene& scene, const Axes& otherwise) {
 // Walks the nodes and gathers what is shown.
 class ModelBuilder {
  public:
-  // Not `painted`: nothing in the file tells a colour of its materials.
+  // `painted`: the file tells colours of its materials. `takes_colours`: those of vertices count.
   ModelBuilder(const aiScene& source,
                const LoadOptions& options,
                const ModelFormat& format,
-               bool painted)
+               bool painted,
+               bool takes_colours)
       : source_(source),
         options_(options),
         format_(format),
         painted_(painted),
+        takes_colours_(takes_colours),
         materials_(source, format, model_.report.notes),
         meshes_(source.mNumMeshes, -1),
         material_of_(source.mNumMaterials, -1),
@@ -410,12 +412,13 @@ class ModelBuilder {
       add_note("points and lines are left out");
       return -1;
     }
-    const std::uint32_t material = material_for(source.mMaterialIndex, source.HasVertexColors(0));
-    if (source.HasVertexColors(0) && imported_[source.mMaterialIndex].glass)
-      add_note("vertex colours of solid glass are left out");
+    const bool coloured = takes_colours_ && source.HasVertexColors(0);
+    if (!takes_colours_) add_note("vertex colours are left out: not all of its vertices have one");
+    const std::uint32_t material = material_for(source.mMaterialIndex, coloured);
+    const ImportedMaterial& imported = imported_[source.mMaterialIndex];
     if (source.HasBones()) add_note("skins are left out: parts stand as the file stores them");
     if (source.mNumAnimMeshes > 0) add_note("morph targets are left out");
-    Mesh mesh = convert_mesh(source, imported_[source.mMaterialIndex], format_,
+    Mesh mesh = convert_mesh(source, imported, format_, coloured && shows_colours(source, imported),
                              corner_normals_[index], left_out_);
     corner_normals_[index] = {};
     if (mesh.triangles.empty()) return -1;
@@ -426,13 +429,27 @@ class ModelBuilder {
     return meshes_[index];
   }
 
-  // Vertex colours take the place of the grey of what has no material, and tint all others.
+  // Notes what of a mesh's colours is not shown.
+  bool shows_colours(const aiMesh& source, const ImportedMaterial& material) {
+    const StandardParameters& p = material.parameters;
+    if (material.glass) add_note("vertex colours of solid glass are left out");
+    // A picture takes the place of X3D's.
+    if (material.glass || (format_.x3d && p.base_color_texture >= 0)) return false;
+    const ColourRange range = colour_range(source);
+    if (range.least_alpha < 1 && range.most_alpha > 0 && (p.alpha_blend != 0 || p.alpha_cutoff > 0))
+      add_note("alpha of vertex colours is left out");
+    if (!(range.brightest > 0)) add_note("vertex colours that are all black are left out");
+    return range.brightest > 0;
+  }
+
+  // Vertex colours take the place of the grey of what has no material, and of X3D's colours of
+  // materials; they tint all others.
   std::uint32_t material_for(unsigned index, bool coloured) {
     if (index >= source_.mNumMaterials) throw std::runtime_error("a mesh has no material");
     const aiMaterial& source = *source_.mMaterials[index];
     aiString name;
     source.Get(AI_MATKEY_NAME, name);
-    const bool bare = !painted_ || name == aiString(AI_DEFAULT_MATERIAL_NAME);
+    const bool bare = !painted_ || format_.x3d || name == aiString(AI_DEFAULT_MATERIAL_NAME);
     const bool white = coloured && bare;
     std::int64_t& known = (white ? white_material_of_ : material_of_)[index];
     if (known < 0) {
@@ -460,7 +477,7 @@ class ModelBuilder {
   const aiScene& source_;
   const LoadOptions& options_;
   const ModelFormat& format_;
-  bool painted_;
+  bool painted_, takes_colours_;
   RawModel model_;
   MaterialImport materials_;
   std::vector<std::int64_t> meshes_;
@@ -526,10 +543,11 @@ void translate(const std::exception_ptr& error) {
 RawModel import_model(ModelFiles& files, const std::string& file, const LoadOptions& options) {
   const ModelFormat format = model_format(file).value();
   std::optional<MendedGltf> mended;
-  bool painted = true;
+  bool painted = true, colours_some = false;
   const GltfFacts facts = [&] {
     const std::vector<std::byte> bytes = files.read(file).value_or(std::vector<std::byte>{});
     const GltfFacts checked = check_first(bytes, format, file);
+    colours_some = format.obj && obj_colours_some(bytes);
     painted = (!format.ply || ply_has_paint(bytes)) && (!format.stl || stl_has_paint(bytes));
     if (format.gltf)
       mended = mend_gltf(bytes, [&](const std::string& name) { return files.read(name); });
@@ -564,7 +582,8 @@ RawModel import_model(ModelFiles& files, const std::string& file, const LoadOpti
   if (format.gltf) check_faces(*scene, facts);
   apply_libraries(*scene, libraries);
   if (mended) apply_materials(*scene, mended->materials);
-  RawModel model = ModelBuilder(*scene, options, format, painted).build(set_from_root);
+  RawModel model =
+      ModelBuilder(*scene, options, format, painted, !colours_some).build(set_from_root);
   auto& notes = model.report.notes;
   std::vector<std::string> more = facts.notes;
   if (mended) more.insert(more.end(), mended->notes.begin(), mended->notes.end());

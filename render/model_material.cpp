@@ -332,7 +332,7 @@ void MaterialImport::take_volume(const aiMaterial& material,
     if (has) lost += (lost.empty() ? "" : ", ") + std::string(what);
   };
   lose(p.base_color_texture >= 0, "base colour map");
-  lose(p.alpha_cutoff > 0 || p.alpha_blend != 0, "cut-outs");
+  lose(p.alpha_cutoff > 0 || p.alpha_blend != 0, "alpha");
   lose(p.metallic_roughness_texture >= 0, "roughness map");
   lose(p.normal_texture >= 0, "normal map");
   lose(p.clearcoat > 0, "clear coat");

@@ -206,6 +206,19 @@ void copy_tangents(const aiMesh& source, Mesh& mesh) {
 
 }  // namespace
 
+ColourRange colour_range(const aiMesh& source) {
+  ColourRange range;
+  for (unsigned i = 0; i < source.mNumVertices; ++i) {
+    const aiColor4D& c = source.mColors[0][i];
+    for (const float value : {c.r, c.g, c.b}) {
+      if (value > range.brightest) range.brightest = value;
+    }
+    if (c.a < range.least_alpha) range.least_alpha = c.a;
+    if (c.a > range.most_alpha) range.most_alpha = c.a;
+  }
+  return range;
+}
+
 Mesh convert_shape(const aiMesh& source, std::size_t& left_out) {
   Mesh mesh;
   mesh.positions.reserve(source.mNumVertices);
@@ -235,6 +248,7 @@ Mesh convert_shape(const aiMesh& source, std::size_t& left_out) {
 Mesh convert_mesh(const aiMesh& source,
                   const ImportedMaterial& material,
                   const ModelFormat& format,
+                  bool coloured,
                   std::span<const Vec3f> corner_normals,
                   std::size_t& left_out) {
   Mesh mesh = convert_shape(source, left_out);
@@ -247,7 +261,7 @@ Mesh convert_mesh(const aiMesh& source,
   if (has(set)) mesh.uvs = uvs_of(source, set);
   if (const auto second = material.second_uv_set; second && has(*second) && !mesh.uvs.empty())
     mesh.second_uvs = uvs_of(source, *second);
-  if (source.HasVertexColors(0) && !material.glass) copy_colours(source, format, mesh);
+  if (coloured) copy_colours(source, format, mesh);
   const bool join = format.smooth_normals;
   if (join) join_vertices(mesh, corner_normals);
   if (material.parameters.normal_texture >= 0) {

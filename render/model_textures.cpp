@@ -110,7 +110,7 @@ class Substitution {
       constexpr float magenta[3] = {1, 0, 1};
       std::copy_n(magenta, 3, p.base_color);
       p.base_color_alpha = 1;
-      p.alpha_blend = 0;
+      if (p.alpha_texture < 0) p.alpha_blend = 0;
     }
     if (lost(p.emission_texture, "nothing glows in its place")) {
       std::fill_n(p.emission, 3, 0.0F);

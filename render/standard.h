@@ -89,7 +89,7 @@ Material make_standard_material(std::string name, const StandardParameters& para
 
 // What a point of a standard surface does with light, textures looked up.
 struct StandardSurface {
-  Vec3f base;
+  Vec3f base;  // with the vertex colour
   float metallic, roughness, clearcoat, clearcoat_roughness, transmission;
   Vec3f emission;     // without the light of a video
   Vec3f normal;       // with the normal map, unit, on the viewer's side of the surface

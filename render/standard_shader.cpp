@@ -92,6 +92,9 @@ class StandardShader final : public Shader {
       return {1, 1, 1};
     }
     if (kind != RayKind::shadow || !passes(parameters)) return {};
+    if (parameters.alpha_blend != 0 && !(standard_alpha(parameters, *context.scene, hit) > 0)) {
+      return {1, 1, 1};  // quickly told, and often so
+    }
     const StandardSurface surface = standard_surface(parameters, *context.scene, hit);
     return standard_weights(surface, -incoming).transmission;
   }

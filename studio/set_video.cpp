@@ -91,6 +91,11 @@ bool cover(SceneDescription& scene,
     }
     material = found->second;
   }
+  // Of a lit video, its own colours are those of the surface.
+  for (std::size_t t = 0; video.lit && !mesh.colours.empty() && t < mesh.triangles.size(); ++t) {
+    if (!is_covered(scene.materials[material_of(before, t)], video)) continue;
+    for (const std::uint32_t corner : mesh.triangles[t]) mesh.colours[corner] = {255, 255, 255};
+  }
   scene.meshes.push_back(std::make_shared<const Mesh>(std::move(mesh)));
   instance.mesh = static_cast<std::uint32_t>(scene.meshes.size() - 1);
   return true;

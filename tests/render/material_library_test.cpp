@@ -32,6 +32,7 @@ TEST(MaterialLibrary, BlendsByTheOpacityMapOfObj) {
   EXPECT_NE(p.alpha_texture, p.base_color_texture);
   EXPECT_EQ(p.alpha_blend, 1);
   EXPECT_THAT(notes_of(model), testing::IsEmpty());
+  EXPECT_EQ(parameters_of(load_obj("newmtl m\nmap_Kd lost.png\nmap_d b.png\n")).alpha_blend, 1);
   const LoadedModel without = load_obj("newmtl m\nmap_d lost.png\n");
   EXPECT_EQ(parameters_of(without).alpha_blend, 0);
 }

@@ -408,7 +408,7 @@ TEST(ModelMaterial, NotesWhatSolidGlassGoesWithout) {
   EXPECT_THAT(
       lost(R"(,"alphaMode":"MASK","pbrMetallicRoughness":{"metallicFactor":0,"roughnessFactor":0,
 "baseColorFactor":[1,0.5,1,1],"baseColorTexture":{"index":0}})"),
-      HasSubstr("without its base colour map, cut-outs"));
+      HasSubstr("without its base colour map, alpha"));
   const LoadedModel by_map = load_clear(R"(+,"transmissionTexture":{"index":0})", 0, true);
   EXPECT_EQ(by_map.scene.materials.at(0).shader, "standard");
   EXPECT_THAT(notes_of(by_map), Contains(HasSubstr("the volume (thickness")));

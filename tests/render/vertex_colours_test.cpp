@@ -124,14 +124,33 @@ TEST(VertexColours, OfObjStandBehindThePlaces) {
               IsEmpty());
 }
 
-TEST(VertexColours, OfX3dAreLinearAsItsColoursOfMaterials) {
+// assimp gives them to the vertices that come first.
+TEST(VertexColours, OfSomeVerticesOfAnObjAreLeftOut) {
+  const LoadedModel model = load("a.obj",
+                                 "o plain\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+                                 "o red\nv 0 0 1 1 0 0\nv 1 0 1 1 0 0\nv 0 1 1 1 0 0\nf 4 5 6\n");
+  for (const auto& mesh : model.scene.meshes) EXPECT_THAT(mesh->colours, IsEmpty());
+  EXPECT_THAT(parameters_of(model).base_color, testing::Each(0.6F));
+  EXPECT_THAT(notes_of(model), Contains(HasSubstr("not all of its vertices have one")));
+}
+
+TEST(VertexColours, ThatAreAllBlackAreLeftOut) {
   const LoadedModel model =
-      load("a.x3d", made::x3d("<Shape><IndexedFaceSet coordIndex=\"0 1 2 -1\" "
+      load("a.glb", gltf(5126, "VEC3", 12, made::bytes_of(std::vector<float>(9, 0))));
+  EXPECT_THAT(model.scene.meshes.at(0)->colours, IsEmpty());
+  EXPECT_THAT(notes_of(model), ElementsAre(HasSubstr("all black")));
+}
+
+TEST(VertexColours, OfX3dAreLinearAndTakeThePlaceOfTheMaterials) {
+  const LoadedModel model =
+      load("a.x3d", made::x3d("<Shape><Appearance><Material diffuseColor=\".1 .2 .3\"/>"
+                              "</Appearance><IndexedFaceSet coordIndex=\"0 1 2 -1\" "
                               "colorPerVertex=\"true\"><Coordinate point=\"0 0 0 1 0 0 0 1 0\"/>"
                               "<Color color=\"1 0 0 0 1 0 0 0.214041 1\"/>"
                               "</IndexedFaceSet></Shape>"));
   EXPECT_THAT(by_corners(model),
               ElementsAre(Codes{255, 0, 0}, Codes{0, 255, 0}, Codes{0, 128, 255}));
+  EXPECT_THAT(parameters_of(model).base_color, ElementsAre(1, 1, 1));
 }
 
 Mesh coloured_triangle() {
@@ -172,25 +191,40 @@ TEST(VertexColours, OfStlAreThoseOfItsFacets) {
   }
 }
 
+// And second texture coordinates, where a mesh without normals becomes flat, and at the seam of
+// what a normal map has mirrored.
 TEST(VertexColours, StayWhereVerticesAreParted) {
-  // Flat, and with a normal map that one of two triangles mirrors.
   const std::string square =
       made::bytes_of(std::vector<float>{0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}) +
-      made::bytes_of(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 1}) +
+      made::bytes_of(std::vector<float>{0, 0, 1, 0, 1, 1, 2, 0}) +  // the second one is mirrored
       made::bytes_of(std::vector<float>{1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1}) +
-      made::bytes_of(std::vector<std::uint32_t>{0, 1, 2, 0, 2, 3});
-  const LoadedModel model = load("a.glb", made::glb(R"({"asset":{"version":"2.0"},"scene":0,
-"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":
-{"POSITION":0,"TEXCOORD_0":1,"COLOR_0":2},"indices":3,"material":0}]}],
-"materials":[{"normalTexture":{"index":0}}],"images":[{"uri":"a.png"}],"textures":[{"source":0}],
+      made::bytes_of(std::vector<std::uint32_t>{0, 1, 2, 0, 2, 3}) +
+      made::bytes_of(std::vector<float>{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1});
+  const auto file = [&](const std::string& normals) {
+    return made::glb(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+"nodes":[{"mesh":0}],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1,
+"TEXCOORD_1":1,"COLOR_0":2)" +
+                         normals + R"(},"indices":3,"material":0}]}],
+"materials":[{"normalTexture":{"index":0},
+"pbrMetallicRoughness":{"baseColorTexture":{"index":0,"texCoord":1}}}],
+"images":[{"uri":"a.png"}],"textures":[{"source":0}],
 "accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],
 "max":[1,1,0]},{"bufferView":0,"byteOffset":48,"componentType":5126,"count":4,"type":"VEC2"},
 {"bufferView":0,"byteOffset":80,"componentType":5126,"count":4,"type":"VEC3"},
-{"bufferView":0,"byteOffset":128,"componentType":5125,"count":6,"type":"SCALAR"}],
-"bufferViews":[{"buffer":0,"byteLength":152}],"buffers":[{"byteLength":152}]})",
-                                                    square));
+{"bufferView":0,"byteOffset":128,"componentType":5125,"count":6,"type":"SCALAR"},
+{"bufferView":0,"byteOffset":152,"componentType":5126,"count":4,"type":"VEC3"}],
+"bufferViews":[{"buffer":0,"byteLength":200}],"buffers":[{"byteLength":200}]})",
+                     square);
+  };
   const Codes r{255, 0, 0}, g{0, 255, 0}, b{0, 0, 255}, white{255, 255, 255};
-  EXPECT_THAT(by_corners(model), ElementsAre(r, g, b, r, b, white));
+  for (const bool smooth : {false, true}) {
+    const LoadedModel model = load("a.glb", file(smooth ? R"(,"NORMAL":4)" : ""));
+    EXPECT_THAT(by_corners(model), ElementsAre(r, g, b, r, b, white));
+    const Mesh& mesh = *model.scene.meshes.at(0);
+    EXPECT_EQ(mesh.positions.size(), 6U) << "two of them have twins, or all are apart";
+    EXPECT_EQ(mesh.colours.size(), 6U);
+    EXPECT_EQ(mesh.second_uvs, mesh.uvs);
+  }
 }
 
 TEST(VertexColours, KeepApartWhatIsNotOfOneColour) {
@@ -209,11 +243,14 @@ TEST(VertexColours, KeepApartWhatIsNotOfOneColour) {
   EXPECT_EQ(mesh.colours[mesh.triangles[1][2]], blue);
 }
 
+// ... and second coordinates grow as their corners say.
 TEST(VertexColours, TintTheBaseColourByTheirLight) {
   StandardParameters parameters;
   parameters.base_color[1] = 0.5F;
   SceneDescription description;
-  description.meshes.push_back(std::make_shared<Mesh>(coloured_triangle()));
+  auto mesh = std::make_shared<Mesh>(coloured_triangle());
+  mesh->second_uvs = {{0, 0}, {2, 0}, {0, 4}};
+  description.meshes.push_back(mesh);
   description.materials.push_back(make_standard_material("m", parameters));
   description.instances.emplace_back().mesh = 0;
   const Scene scene(parse_scene(serialize(description)));
@@ -222,6 +259,11 @@ TEST(VertexColours, TintTheBaseColourByTheirLight) {
     ASSERT_TRUE(hit);
     const HitPoint point =
         scene.hit_point(hit->geom_id, hit->prim_id, hit->inst_id, hit->u, hit->v, {0, 0, -1});
+    ASSERT_TRUE(point.has_second_uvs);
+    EXPECT_NEAR(point.second_uv[0], 2 * x, 1e-5F);
+    EXPECT_NEAR(point.second_uv[1], 4 * y, 1e-5F);
+    EXPECT_NEAR(length(point.second_u_slope - Vec3f{2, 0, 0}), 0, 1e-5F);
+    EXPECT_NEAR(length(point.second_v_slope - Vec3f{0, 4, 0}), 0, 1e-5F);
     const Vec3f base = standard_surface(parameters, description, point).base;
     const auto wanted = [&](std::size_t c) {
       const auto light = [&](const Codes& codes) {
