@@ -127,8 +127,6 @@ void join_vertices(Mesh& mesh, std::span<const Vec3f> made) {
   joined.positions.reserve(places.count);
   joined.normals.reserve(places.count);
   if (has_uvs) joined.uvs.reserve(places.count);
-  if (has_second) joined.second_uvs.reserve(places.count);
-  if (has_colours) joined.colours.reserve(places.count);
   std::vector<Wedge> wedges;
   std::vector<Vec3f> normals;
   for (std::uint32_t place = 0; place < places.count; ++place) {
@@ -156,11 +154,8 @@ void join_vertices(Mesh& mesh, std::span<const Vec3f> made) {
         ++same;
       }
       if (same == made) {
-        joined.positions.push_back(mesh.positions[vertex]);
-        joined.normals.push_back(normals[k]);
-        if (has_uvs) joined.uvs.push_back(mesh.uvs[vertex]);
-        if (has_second) joined.second_uvs.push_back(mesh.second_uvs[vertex]);
-        if (has_colours) joined.colours.push_back(mesh.colours[vertex]);
+        append_vertex(joined, mesh, vertex);
+        if (!has_normals) joined.normals.push_back(normals[k]);
       }
       joined.triangles[corners[k] / 3][corners[k] % 3] = static_cast<std::uint32_t>(same);
     }

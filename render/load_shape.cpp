@@ -138,12 +138,10 @@ std::shared_ptr<const Mesh> in_shape(const Mesh& mesh, MeshShape shape) {
 }
 
 std::size_t bytes_of(const Mesh& mesh) {
-  return sizeof(Vec3f) * (mesh.positions.size() + mesh.normals.size()) +
-         sizeof(mesh.uvs[0]) * (mesh.uvs.size() + mesh.second_uvs.size()) +
-         sizeof(mesh.tangents[0]) * mesh.tangents.size() +
-         sizeof(mesh.colours[0]) * mesh.colours.size() +
-         sizeof(mesh.triangles[0]) * mesh.triangles.size() +
-         sizeof(mesh.materials[0]) * mesh.materials.size();
+  std::size_t bytes =
+      std::span(mesh.triangles).size_bytes() + std::span(mesh.materials).size_bytes();
+  for_each_vertex_array(mesh, [&](const auto& v) { bytes += std::span(v).size_bytes(); });
+  return bytes;
 }
 
 }  // namespace render

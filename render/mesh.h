@@ -29,6 +29,26 @@ struct Mesh {
   std::shared_ptr<const std::vector<Vec3f>> rest;
 };
 
+// Visits the arrays that have a value for each vertex, positions first.
+inline constexpr std::size_t vertex_arrays = 6;
+template <class AnyMesh, class Visit>
+void for_each_vertex_array(AnyMesh& mesh, const Visit& visit) {
+  visit(mesh.positions), visit(mesh.normals), visit(mesh.uvs);
+  visit(mesh.second_uvs), visit(mesh.tangents), visit(mesh.colours);
+}
+
+// Appends what a mesh, which may be the same, has of a vertex.
+inline void append_vertex(Mesh& mesh, const Mesh& from, std::uint32_t vertex) {
+  const auto append = [vertex](auto& to, const auto& values) {
+    if (values.empty()) return;
+    const auto value = values[vertex];
+    to.push_back(value);
+  };
+  append(mesh.positions, from.positions), append(mesh.normals, from.normals);
+  append(mesh.uvs, from.uvs), append(mesh.second_uvs, from.second_uvs);
+  append(mesh.tangents, from.tangents), append(mesh.colours, from.colours);
+}
+
 // How a texture goes on beyond its edges: again, its last texels drawn out, or again mirrored.
 enum class Wrap : std::uint8_t { repeat, clamp, mirror };
 

@@ -55,12 +55,8 @@ void send(const render::RawModel& model) {
   if (head.size() > wire::max_head) throw std::runtime_error("it has too many parts");
   send(wire::Kind::head, head);
   for (const render::Mesh& mesh : model.meshes) {
-    write_all(std::as_bytes(std::span(mesh.positions)));
-    write_all(std::as_bytes(std::span(mesh.normals)));
-    write_all(std::as_bytes(std::span(mesh.uvs)));
-    write_all(std::as_bytes(std::span(mesh.second_uvs)));
-    write_all(std::as_bytes(std::span(mesh.tangents)));
-    write_all(std::as_bytes(std::span(mesh.colours)));
+    for_each_vertex_array(mesh,
+                          [](const auto& values) { write_all(std::as_bytes(std::span(values))); });
     write_all(std::as_bytes(std::span(mesh.triangles)));
   }
   for (const render::RawTexture& texture : model.textures) write_all(texture.bytes);

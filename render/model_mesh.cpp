@@ -88,12 +88,7 @@ void part_mirrored(Mesh& mesh, const std::vector<std::array<float, 2>>& uvs) {
       if (!upright[corner]) continue;
       if (twin[corner] == none) {
         twin[corner] = static_cast<std::uint32_t>(mesh.positions.size());
-        mesh.positions.push_back(Vec3f(mesh.positions[corner]));
-        mesh.normals.push_back(Vec3f(mesh.normals[corner]));
-        mesh.uvs.push_back(std::array(mesh.uvs[corner]));
-        if (!mesh.second_uvs.empty())
-          mesh.second_uvs.push_back(std::array(mesh.second_uvs[corner]));
-        if (!mesh.colours.empty()) mesh.colours.push_back(std::array(mesh.colours[corner]));
+        append_vertex(mesh, mesh, corner);
       }
       corner = twin[corner];
     }
@@ -151,11 +146,8 @@ void make_flat(Mesh& mesh) {
     const Vec3f p = mesh.positions[a];
     const Vec3f face = normalize(cross(mesh.positions[b] - p, mesh.positions[c] - p));
     for (const std::uint32_t corner : {a, b, c}) {
-      flat.positions.push_back(mesh.positions[corner]);
+      append_vertex(flat, mesh, corner);
       flat.normals.push_back(dot(face, face) > 0.5F ? face : Vec3f{0, 0, 1});
-      flat.uvs.push_back(mesh.uvs[corner]);
-      if (!mesh.second_uvs.empty()) flat.second_uvs.push_back(mesh.second_uvs[corner]);
-      if (!mesh.colours.empty()) flat.colours.push_back(mesh.colours[corner]);
     }
     flat.triangles.push_back({first, first + 1, first + 2});
   }

@@ -164,12 +164,8 @@ class Conversation {
     const RawSizes sizes = parse_head(head, model);
     for (std::size_t i = 0; i < model.meshes.size(); ++i) {
       Mesh& mesh = model.meshes[i];
-      hear_all(mesh.positions, sizes.meshes[i].positions);
-      hear_all(mesh.normals, sizes.meshes[i].normals);
-      hear_all(mesh.uvs, sizes.meshes[i].uvs);
-      hear_all(mesh.second_uvs, sizes.meshes[i].second_uvs);
-      hear_all(mesh.tangents, sizes.meshes[i].tangents);
-      hear_all(mesh.colours, sizes.meshes[i].colours);
+      const std::uint64_t* count = sizes.meshes[i].of_vertices.data();
+      for_each_vertex_array(mesh, [&](auto& values) { hear_all(values, *count++); });
       hear_all(mesh.triangles, sizes.meshes[i].triangles);
       check_arrays(mesh);
     }

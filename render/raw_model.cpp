@@ -66,13 +66,13 @@ void check(const RawModel& model, const RawSizes& sizes, const ByteReader& in) {
   }
   std::uint64_t vertices = 0, triangles = 0, embedded = 0;
   for (const RawSizes::OfMesh& mesh : sizes.meshes) {
-    const auto fits = [&](std::uint64_t count) { return count == 0 || count == mesh.positions; };
-    if (mesh.positions > max_vertices || mesh.triangles > max_model_triangles ||
-        !fits(mesh.normals) || !fits(mesh.uvs) || !fits(mesh.second_uvs) || !fits(mesh.tangents) ||
-        !fits(mesh.colours)) {
+    const std::uint64_t own = mesh.of_vertices[0];
+    const auto fits = [own](std::uint64_t count) { return count == 0 || count == own; };
+    if (own > max_vertices || mesh.triangles > max_model_triangles ||
+        !std::ranges::all_of(mesh.of_vertices, fits)) {
       in.fail("has arrays of wrong lengths");
     }
-    vertices += mesh.positions;
+    vertices += own;
     triangles += mesh.triangles;
     if (vertices > max_vertices || triangles > max_model_triangles) in.fail("is too large");
   }
@@ -99,9 +99,10 @@ std::vector<std::byte> write_head(const RawModel& model) {
   put_report(out, model.report);
   out.put(static_cast<std::uint64_t>(model.meshes.size()));
   for (const Mesh& mesh : model.meshes) {
-    put_block(out, RawSizes::OfMesh{mesh.positions.size(), mesh.normals.size(), mesh.uvs.size(),
-                                    mesh.second_uvs.size(), mesh.tangents.size(),
-                                    mesh.colours.size(), mesh.triangles.size()});
+    RawSizes::OfMesh sizes{{}, mesh.triangles.size()};
+    std::uint64_t* count = sizes.of_vertices.data();
+    for_each_vertex_array(mesh, [&](const auto& values) { *count++ = values.size(); });
+    put_block(out, sizes);
     out.put(mesh.materials.at(0));
   }
   out.put(static_cast<std::uint64_t>(model.materials.size()));

@@ -42,8 +42,8 @@ struct RawModel {
 // How many elements the arrays of a model have that are sent apart from all else.
 struct RawSizes {
   struct OfMesh {
-    std::uint64_t positions = 0, normals = 0, uvs = 0, second_uvs = 0, tangents = 0, colours = 0,
-                  triangles = 0;
+    std::array<std::uint64_t, vertex_arrays> of_vertices{};  // as for_each_vertex_array has them
+    std::uint64_t triangles = 0;
   };
   std::vector<OfMesh> meshes;
   std::vector<std::uint64_t> textures;

@@ -23,10 +23,10 @@ void check(const SceneDescription& scene) {
     if (!scene.meshes[i]) fail("mesh " + std::to_string(i) + " is missing");
     const Mesh& mesh = *scene.meshes[i];
     const std::size_t n = mesh.positions.size();
-    const auto bad_size = [n](std::size_t size) { return size != 0 && size != n; };
-    if (bad_size(mesh.normals.size()) || bad_size(mesh.uvs.size()) ||
-        bad_size(mesh.second_uvs.size()) || bad_size(mesh.colours.size()) ||
-        bad_size(mesh.tangents.size())) {
+    bool fits = true;
+    for_each_vertex_array(
+        mesh, [&](const auto& values) { fits = fits && (values.empty() || values.size() == n); });
+    if (!fits) {
       fail("mesh " + std::to_string(i) + ": per-vertex arrays differ in length");
     }
     if (mesh.rest && mesh.rest->size() != n) {

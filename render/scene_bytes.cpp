@@ -8,12 +8,7 @@ namespace {
 constexpr std::uint32_t scene_magic = 0x41435350;  // "PSCA"
 
 void put(ByteWriter& out, const Mesh& mesh) {
-  out.put_all(mesh.positions);
-  out.put_all(mesh.normals);
-  out.put_all(mesh.uvs);
-  out.put_all(mesh.second_uvs);
-  out.put_all(mesh.tangents);
-  out.put_all(mesh.colours);
+  for_each_vertex_array(mesh, [&](const auto& values) { out.put_all(values); });
   out.put_all(mesh.triangles);
   out.put_all(mesh.materials);
   out.put(static_cast<std::uint8_t>(mesh.rest != nullptr));
@@ -22,12 +17,7 @@ void put(ByteWriter& out, const Mesh& mesh) {
 
 Mesh get_mesh(ByteReader& in) {
   Mesh mesh;
-  in.get_all(mesh.positions);
-  in.get_all(mesh.normals);
-  in.get_all(mesh.uvs);
-  in.get_all(mesh.second_uvs);
-  in.get_all(mesh.tangents);
-  in.get_all(mesh.colours);
+  for_each_vertex_array(mesh, [&](auto& values) { in.get_all(values); });
   in.get_all(mesh.triangles);
   in.get_all(mesh.materials);
   if (in.get<std::uint8_t>() != 0) {

@@ -92,8 +92,10 @@ class StandardShader final : public Shader {
       return {1, 1, 1};
     }
     if (kind != RayKind::shadow || !passes(parameters)) return {};
-    if (parameters.alpha_blend != 0 && !(standard_alpha(parameters, *context.scene, hit) > 0)) {
-      return {1, 1, 1};  // quickly told, and often so
+    if (parameters.alpha_blend != 0 && parameters.transmission == 0 && parameters.opacity == 1) {
+      const float open =
+          1 - std::clamp(standard_alpha(parameters, *context.scene, hit), 0.0F, 1.0F);
+      return {open, open, open};  // as below, without the other maps
     }
     const StandardSurface surface = standard_surface(parameters, *context.scene, hit);
     return standard_weights(surface, -incoming).transmission;

@@ -33,6 +33,7 @@ void halve(const std::uint8_t* source,
            int target_width,
            int target_height) {
   const SrgbTables& tables = srgb_tables();
+  const std::array<float, 256>& units = unit_of_code();
   const int colour_channels = !srgb ? 0 : channels >= 3 ? 3 : 1;
   std::vector<AreaCover> columns;
   for (int x = 0; x < target_width; ++x) columns.emplace_back(x, width, target_width);
@@ -49,7 +50,7 @@ void halve(const std::uint8_t* source,
           const std::uint8_t* texel = source + (row + static_cast<std::size_t>(column.first + i)) *
                                                    static_cast<std::size_t>(channels);
           for (int c = 0; c < channels; ++c) {
-            const auto& table = c < colour_channels ? tables.light_of_code : unit_of_code();
+            const auto& table = c < colour_channels ? tables.light_of_code : units;
             sum[static_cast<std::size_t>(c)] += weight * table[texel[c]];
           }
         }

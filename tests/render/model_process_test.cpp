@@ -39,7 +39,7 @@ RawModel made_model() {
 TEST(ParseHead, GivesBackWhatWasWritten) {
   RawModel back;
   const RawSizes sizes = parse_head(write_head(made_model()), back);
-  EXPECT_EQ(sizes.meshes.at(0).positions, 3U);
+  EXPECT_EQ(sizes.meshes.at(0).of_vertices[0], 3U);
   EXPECT_EQ(sizes.meshes.at(0).triangles, 1U);
   EXPECT_EQ(back.materials.at(0).name, "paint");
   EXPECT_EQ(back.textures.at(0).name, "paint.png");
@@ -64,6 +64,7 @@ TEST(ParseHead, RefusesWhatIsCutShortOrRefersToNothing) {
   expect_refused([](RawModel& m) { m.instances[0].mesh = 1; });
   expect_refused([](RawModel& m) { m.instances[0].set_from_object[3] = std::nanf(""); });
   expect_refused([](RawModel& m) { m.meshes[0].normals.resize(2); });
+  expect_refused([](RawModel& m) { m.meshes[0].colours.resize(2); });
 }
 
 TEST(ParseHead, SurvivesDamageAnywhere) {
