@@ -128,13 +128,18 @@ def standard_material(part):
 
 
 def glass_material(part):
-    """Solid glass; straight through for shadows, as GlassParameters::shadow has it."""
+    """Solid glass; straight through for shadows, as GlassParameters::shadow has it.
+
+    Cycles gathers the sky's light on dull surfaces by shadow rays and by rays of the surface's own directions, each
+    weighed so that both together are all of it: what lets one kind through has to let the other through as well.
+    """
     nodes = Nodes(part['name'])
     glass = nodes.add('BsdfGlass', (('Color', (1, 1, 1, 1)), ('Roughness', 0.0), ('IOR', part['index'])),
                       distribution='SHARP')
     clear = nodes.add('BsdfTransparent', (('Color', (*part['shadow'], 1)),))
-    shadow = nodes.add('LightPath').node.outputs['Is Shadow Ray']
-    return nodes.finish(nodes.mix(shadow, glass, clear))
+    path = nodes.add('LightPath').node.outputs
+    for_light = nodes.maths('MAXIMUM', path['Is Shadow Ray'], path['Is Diffuse Ray'])
+    return nodes.finish(nodes.mix(for_light, glass, clear))
 
 
 for part in made['parts']:
