@@ -10,16 +10,17 @@
 #include <vector>
 
 #include "capture/turn.h"
+#include "compositing/matte_parts.h"
 
 namespace compositing {
 
 namespace {
 
-constexpr float solid = 0.5F;          // alpha of what counts as the person
-constexpr float faint = 0.1F;          // alpha of what the box holds
-constexpr int margin = 8;              // pixels round the person
-constexpr int least_area = 24;         // pixels; smaller things are specks
-constexpr double second_person = 0.4;  // of the largest thing's area
+constexpr float solid = 0.5F;           // alpha of what counts as the person
+constexpr float faint = 0.1F;           // alpha of what the box holds
+constexpr int margin = 8;               // pixels round the person
+constexpr std::size_t least_area = 24;  // pixels; smaller things are specks
+constexpr double second_person = 0.4;   // of the largest thing's area
 // Shares of the silhouette's height H, and of the torso's half width R. Ankles are 0.04 H thick.
 constexpr double thin_h = 0.012, thin_r = 0.22;  // half of what legs are thicker than
 constexpr double end_h = 0.04;                   // a foot sticks out by more than that
@@ -32,58 +33,6 @@ constexpr double ankle_h = 0.06;   // above it a foot does not turn the leg asid
 constexpr double straight = 0.14;  // how far a leg's middle leaves the line, as part of its length
 constexpr double deep = 0.6;       // of the lowest end's depth under the torso: hands end higher
 
-// A number for each pixel of the matte.
-struct Field {
-  int height = 0, width = 0;
-  std::vector<float> of;
-
-  float& at(int y, int x) { return of[index(y, x)]; }
-  float at(int y, int x) const { return of[index(y, x)]; }
-  std::size_t index(int y, int x) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(x);
-  }
-};
-
-struct Part {
-  int left = 0, top = 0, right = 0, bottom = 0;
-  std::vector<int> places;  // indices
-  std::size_t area() const { return places.size(); }
-};
-
-// Connected parts (by sides and corners) of what is at least `level`.
-std::vector<Part> parts_of(const Field& field, float level) {
-  std::vector<Part> parts;
-  std::vector<bool> taken(field.of.size());
-  for (std::size_t first = 0; first < field.of.size(); ++first) {
-    if (taken[first] || field.of[first] < level) continue;
-    Part part{field.width, field.height, -1, -1, {static_cast<int>(first)}};
-    taken[first] = true;
-    for (std::size_t next = 0; next < part.places.size(); ++next) {
-      const int x = part.places[next] % field.width, y = part.places[next] / field.width;
-      part.left = std::min(part.left, x);
-      part.right = std::max(part.right, x);
-      part.top = std::min(part.top, y);
-      part.bottom = std::max(part.bottom, y);
-      for (int v = std::max(0, y - 1); v <= std::min(field.height - 1, y + 1); ++v) {
-        for (int u = std::max(0, x - 1); u <= std::min(field.width - 1, x + 1); ++u) {
-          const std::size_t i = field.index(v, u);
-          if (taken[i] || field.of[i] < level) continue;
-          taken[i] = true;
-          part.places.push_back(static_cast<int>(i));
-        }
-      }
-    }
-    parts.push_back(std::move(part));
-  }
-  return parts;
-}
-
-const Part* largest(const std::vector<Part>& parts) {
-  const auto it = std::ranges::max_element(parts, {}, &Part::area);
-  return it == parts.end() ? nullptr : &*it;
-}
-
 // Rows and columns from the first ones given to before the last ones.
 Field cut(const Field& field, int from_y, int from_x, int to_y, int to_x) {
   Field part{to_y - from_y, to_x - from_x, {}};
@@ -94,42 +43,12 @@ Field cut(const Field& field, int from_y, int from_x, int to_y, int to_x) {
   return part;
 }
 
-Field only(const Part& part, int height, int width) {
-  Field field{
-      height, width,
-      std::vector<float>(static_cast<std::size_t>(height) * static_cast<std::size_t>(width))};
-  for (const int i : part.places) field.of[static_cast<std::size_t>(i)] = 1;
-  return field;
-}
-
-// Distance in pixels to the nearest pixel that is `of` (0 or 1). Beyond the picture is nothing, so
-// that what its edges cut does not get thinner there. Chamfers of 3 and 4: Borgefors, "Distance
-// Transformations in Digital Images", CVGIP 34, 1986, section 3.
-Field distance_to(const Field& field, float of) {
-  Field d = field;
-  for (float& v : d.of) v = v == of ? 0.0F : 1e6F;
-  const auto relax = [&](int y, int x, int v, int u, float step) {
-    if (v >= 0 && v < d.height && u >= 0 && u < d.width)
-      d.at(y, x) = std::min(d.at(y, x), d.at(v, u) + step);
-  };
-  constexpr float diagonal = 4.0F / 3;
-  for (int y = 0; y < d.height; ++y) {
-    for (int x = 0; x < d.width; ++x) {
-      relax(y, x, y, x - 1, 1);
-      relax(y, x, y - 1, x - 1, diagonal);
-      relax(y, x, y - 1, x, 1);
-      relax(y, x, y - 1, x + 1, diagonal);
-    }
+Part moved_by(Part part, int rows, int columns) {
+  part.top += rows, part.bottom += rows, part.left += columns, part.right += columns;
+  for (PixelRun& run : part.runs) {
+    run.y += rows, run.left += columns, run.right += columns;
   }
-  for (int y = d.height - 1; y >= 0; --y) {
-    for (int x = d.width - 1; x >= 0; --x) {
-      relax(y, x, y, x + 1, 1);
-      relax(y, x, y + 1, x + 1, diagonal);
-      relax(y, x, y + 1, x, 1);
-      relax(y, x, y + 1, x - 1, diagonal);
-    }
-  }
-  return d;
+  return part;
 }
 
 // One of the places where the body ends downwards.
@@ -326,8 +245,12 @@ bool ends_at(const Field& mask, int y, int left, int right) {
 std::array<float, 4> box_of(const Field& alpha, std::size_t person) {
   std::array<float, 4> box{1e9F, 1e9F, -1, -1};
   for (const Part& part : parts_of(alpha, faint)) {
-    const auto full = static_cast<double>(std::ranges::count_if(
-        part.places, [&](int i) { return alpha.of[static_cast<std::size_t>(i)] >= solid; }));
+    double full = 0;
+    for (const auto& [y, left, right] : part.runs) {
+      const float* const row = &alpha.of[alpha.index(y, 0)];
+      full += static_cast<double>(
+          std::count_if(row + left, row + right + 1, [](float a) { return a >= solid; }));
+    }
     if (full < 3 || full < 0.005 * static_cast<double>(person)) continue;
     box[0] = std::min(box[0], static_cast<float>(part.left) - 1.5F);
     box[1] = std::min(box[1], static_cast<float>(part.top) - 1.5F);
@@ -348,24 +271,26 @@ struct Body {
 Body body_of(const Part& person, int height, int width) {
   const double tall = person.bottom - person.top + 1;
   Body body{only(person, height, width)};
-  const Field inside = distance_to(body.mask, 0);
-  const float thickest = *std::ranges::max_element(inside.of);
-  const auto thin = static_cast<float>(std::min(thin_h * tall, thin_r * thickest));
-  Field core = inside;
-  for (float& v : core.of) v = v > thin ? 1.0F : 0.0F;
+  const Grid<int> inside = thirds_to(body.mask, 0);
+  const int thickest = *std::ranges::max_element(inside.of);
+  const double thin = std::min(3 * thin_h * tall, thin_r * thickest);  // thirds, too
+  Field core{height, width, {}};
+  core.of.reserve(inside.of.size());
+  for (const int thirds : inside.of) core.of.push_back(thirds > thin ? 1.0F : 0.0F);
   const auto cores = parts_of(core, solid);
   const Part& trunk = *largest(cores);
-  const Field from_trunk = distance_to(only(trunk, height, width), 1);
+  const Grid<int> from_trunk = thirds_to(only(trunk, height, width), 1);
   for (std::size_t i = 0; i < body.mask.of.size(); ++i)
-    if (from_trunk.of[i] > thin + 1) body.mask.of[i] = 0;
+    if (from_trunk.of[i] > thin + 3) body.mask.of[i] = 0;
   double weight = 0;
-  for (const int i : trunk.places) {
-    const int y = i / width;
-    if (y > 0.5 * (trunk.top + trunk.bottom)) continue;
-    const double d = inside.of[static_cast<std::size_t>(i)], w = d * d;
-    weight += w;
-    body.axis_x += w * (i % width);
-    body.torso_y += w * y;
+  for (const auto& [y, left, right] : trunk.runs) {
+    if (y > 0.5 * (trunk.top + trunk.bottom)) break;
+    for (int x = left; x <= right; ++x) {
+      const double d = inside.at(y, x), w = d * d;
+      weight += w;
+      body.axis_x += w * x;
+      body.torso_y += w * y;
+    }
   }
   body.axis_x /= weight;
   body.torso_y /= weight;
@@ -394,21 +319,20 @@ Feet find_upright(const Field& whole, const Field& mask) {
   const auto parts = parts_of(whole, solid);
   const Part* found = largest(parts);
   Feet feet;
-  if (found == nullptr || found->area() < least_area) return feet;
-  feet.box = box_of(whole, found->area());
+  if (found == nullptr || found->area < least_area) return feet;
+  feet.box = box_of(whole, found->area);
   const auto persons = std::ranges::count_if(parts, [&](const Part& part) {
-    return static_cast<double>(part.area()) >= second_person * static_cast<double>(found->area());
+    return static_cast<double>(part.area) >= second_person * static_cast<double>(found->area);
   });
 
   // What follows looks at no more than the person.
   const int from_x = std::max(0, found->left - margin), from_y = std::max(0, found->top - margin);
   const Field alpha = cut(whole, from_y, from_x, std::min(whole.height, found->bottom + 1 + margin),
                           std::min(whole.width, found->right + 1 + margin));
-  const auto near_parts = parts_of(alpha, solid);
-  const Part* person = largest(near_parts);
-  const double tall = person->bottom - person->top + 1;
+  const Part person = moved_by(*found, -from_y, -from_x);
+  const double tall = person.bottom - person.top + 1;
 
-  Body body = body_of(*person, alpha.height, alpha.width);
+  Body body = body_of(person, alpha.height, alpha.width);
   std::vector<End> ends = ends_of(body.mask, end_h * tall);
   feet.status = FeetStatus::uncertain;
   feet.q = {0.5 * (found->left + found->right), found->bottom + 0.5};
