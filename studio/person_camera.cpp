@@ -37,9 +37,13 @@ capture::Image matte_of(const compositing::KeyedFrame& keyed, int shrink) {
   for (int y = 0; y < height; ++y) {
     for (int first = 0; first < width; first += run) {
       if (!keyed.has_any(y, first)) continue;
+      float* to = &matte.at(y / shrink, first / shrink);
+      int left = shrink - first % shrink;  // pixels of the row that still belong there
       for (int x = first; x < std::min(first + run, width); ++x) {
-        matte.at(y / shrink, x / shrink) +=
-            part * capture::float_from_half(rgba.pixels[rgba.index(y, x, 3)]);
+        *to += part * capture::float_from_half(rgba.pixels[rgba.index(y, x, 3)]);
+        if (--left > 0) continue;
+        ++to;
+        left = shrink;
       }
     }
   }
