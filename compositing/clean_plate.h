@@ -40,8 +40,8 @@ struct CleanPlate {
 };
 
 // The mean of frames of the empty screen, of one size, at least one. Noise is measured if there are
-// two or more. Values that are not finite, or below 0, count as 0. The screen's colour is the most
-// saturated large one of the mean; it need not fill the picture. Throws std::invalid_argument if
+// two or more. Values that are not finite, or below 0, count as 0. The screen's colour is that of
+// the mean (find_screen_colour); it need not fill the picture. Throws std::invalid_argument if
 // there are no frames, sizes differ, or a frame is not (height, width, 3).
 CleanPlate average_plate(std::span<const capture::Image> frames);
 

@@ -98,7 +98,7 @@ CleanPlate PlateShots::average() const {
   std::ranges::transform(sum_, plate.light.pixels.begin(), [&](double sum) {
     return static_cast<float>(sum / static_cast<double>(count_));
   });
-  plate.colour = most_saturated(spread_pixels(plate.light)).value_or(mean_colour(plate.light));
+  plate.colour = find_screen_colour(spread_pixels(plate.light)).value_or(mean_colour(plate.light));
   if (count_ < 2) return plate;
   // Variance of one frame against its neighbour, as a line over light. That is blurred: its own
   // noise would make the line flatter.
@@ -150,7 +150,7 @@ std::vector<Light3> PlateFootage::spread_pixels() const {
 
 CleanPlate PlateFootage::screen() const {
   const std::vector<Light3> pixels = spread_pixels();
-  const ScreenColour colour = most_saturated(pixels).value_or(ScreenColour::green);
+  const ScreenColour colour = find_screen_colour(pixels).value_or(ScreenColour::green);
   return screen(colour, find_key(pixels, colour));
 }
 
@@ -217,7 +217,7 @@ CleanPlate PlateFootage::screen(ScreenColour colour, const ScreenLight& key) con
 
 CleanPlate PlateFootage::background() const {
   CleanPlate plate;
-  plate.colour = most_saturated(spread_pixels()).value_or(ScreenColour::green);
+  plate.colour = find_screen_colour(spread_pixels()).value_or(ScreenColour::green);
   Image& light = plate.light = capture::make_image(frames_.front().height, frames_.front().width);
   const auto values = static_cast<std::size_t>(light.width) * 3;
   std::vector<std::size_t> known(static_cast<std::size_t>(light.height));

@@ -42,8 +42,8 @@ class PlateFootage {
   std::size_t count() const { return count_; }
 
   // For each pixel the upper quartile of those frames that show the screen there, and where none
-  // does, what surrounds it. `known` tells the share that was seen. The colour is the footage's
-  // most saturated large one if not given. Noise is measured where the screen is in sight (see
+  // does, what surrounds it. `known` tells the share that was seen. The colour is
+  // find_screen_colour()'s if not given. Noise is measured where the screen is in sight (see
   // plate_noise.h), of one picture by its grain, and is never less than what is taken for it
   // untold. Throws std::invalid_argument if there was no frame.
   CleanPlate screen() const;

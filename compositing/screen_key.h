@@ -42,21 +42,28 @@ inline ScreenLight screen_light(const Light3& light, ScreenColour colour) {
           has_two_primaries(colour) ? screen_excess<true>(a, b, c) : screen_excess<false>(a, b, c)};
 }
 
-// The most saturated large colour: the median of what has most of the screen's excess. Of at least
-// one pixel, clean.
+// Of the chromaticity of which most is saturated most, whatever its light: the median of what has
+// most of the screen's excess. Without excess, and black, if nothing has any. Of at least one
+// pixel, clean.
 ScreenLight find_key(std::span<const Light3> pixels, ScreenColour colour);
 
-// The colour whose key has the greatest excess: a screen's also where it is the lesser part of the
-// picture. Nothing if none has any.
-std::optional<ScreenColour> most_saturated(std::span<const Light3> pixels);
+// The colour of the screen, which may be the lesser part of the picture, but not below a twentieth:
+// the one of which most is saturated most. Nothing if none has any.
+std::optional<ScreenColour> find_screen_colour(std::span<const Light3> pixels);
+
+// By how much two chromaticities differ: of the other channels as shares of the first, together. Of
+// light that is not black.
+inline float chroma_off(const ScreenLight& light, const ScreenLight& key) {
+  return (std::abs(light.second * key.first - key.second * light.first) +
+          std::abs(light.third * key.first - key.third * light.first)) /
+         (key.first * light.first);
+}
 
 // Whether that is the screen, somewhat brighter or darker.
 inline bool is_screen(const ScreenLight& light, const ScreenLight& key) {
   constexpr float darkest = 0.35F, brightest = 3, chroma_tolerance = 0.12F;
-  const bool near = light.excess >= darkest * key.excess && light.excess <= brightest * key.excess;
-  const float off = std::abs(light.second * key.first - key.second * light.first) +
-                    std::abs(light.third * key.first - key.third * light.first);
-  return near && off < chroma_tolerance * key.first * light.first;
+  return light.excess >= darkest * key.excess && light.excess <= brightest * key.excess &&
+         chroma_off(light, key) < chroma_tolerance;
 }
 
 }  // namespace compositing
