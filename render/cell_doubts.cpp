@@ -21,11 +21,7 @@ Vec3f CellBaker::compact_at(std::size_t c, std::size_t centre) const {
 // The same of a lamp that reaches the cell, as irradiance per intensity.
 Vec3f CellBaker::lamp_at(std::size_t place, std::size_t centre) const {
   const CellLamps& lamps = transport_->lamps;
-  Vec3f passed{1, 1, 1};
-  for (const TintedLight& tint : lamps.tints) {
-    if (tint.light == place && tint.centre == centre) passed -= tint.lost_share;
-  }
-  return passed * lamps.factors[place].at[centre];
+  return lamps.passed(place, centre) * lamps.factors[place].at[centre];
 }
 
 // Whether a lamp that one of two centres sees shows enough there to be worth rays: it may be one of

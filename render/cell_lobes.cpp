@@ -476,12 +476,10 @@ bool CellBaker::glows_by_lamps(const ShadePoint& p) const {
 void CellBaker::add_lamps_of_centre(const Lobe& lobe, std::size_t centre) {
   const CellLamps& cell = transport_->lamps;
   for (std::size_t i = 0; i < cell.numbers.size(); ++i) {
-    if (!(cell.factors[i].at[centre] > 0) || shadow_rays_.is_caustic(cell.numbers[i])) continue;
-    Vec3f passed{1, 1, 1};
-    for (const TintedLight& tint : cell.tints) {
-      if (tint.light == i && tint.centre == centre) passed -= tint.lost_share;
-    }
-    add_lamp(lobe, cell.numbers[i], passed);
+    const std::size_t number = cell.numbers[i];
+    if (!(cell.factors[i].at[centre] > 0) || shadow_rays_.is_caustic(number)) continue;
+    if (frame_->job->lights.lamps[number].instance == no_instance) continue;
+    add_lamp(lobe, number, cell.passed(i, centre));
   }
 }
 

@@ -23,8 +23,6 @@ namespace {
 // While a cell has few of them, there is room for more.
 constexpr float rays_of_pixel = 48, many_rays_of_pixel = 384, lights_of_pixel = 256;
 
-std::uint32_t key_of(const TintedLight& tint) { return tint.light * 256U + tint.centre; }
-
 }  // namespace
 
 // Whether what a camera ray met hides pictures behind it.

@@ -36,6 +36,9 @@ struct TintedLight {
   Vec3f lost_share;
 };
 
+// By light, then by centre.
+inline std::uint32_t key_of(const TintedLight& tint) { return tint.light * 256U + tint.centre; }
+
 // A pixel of soft shadow, and those of the 4x4 about it, within the cell, that show the same
 // surface.
 struct ShadowWindow {

@@ -467,6 +467,20 @@ void gather_cell_lamps(const LightContext& context,
           {place[tint.light - first], static_cast<std::uint16_t>(tint.point), tint.lost_share});
     }
   }
+  std::ranges::sort(cell.tints, {}, key_of);
+}
+
+std::span<const TintedLight> CellLamps::tints_of(std::size_t place) const {
+  return std::ranges::equal_range(tints, place, {}, &TintedLight::light);
+}
+
+Vec3f CellLamps::passed(std::size_t place, std::size_t centre) const {
+  Vec3f passed{1, 1, 1};
+  for (const TintedLight& tint :
+       std::ranges::equal_range(tints_of(place), centre, {}, &TintedLight::centre)) {
+    passed -= tint.lost_share;
+  }
+  return passed;
 }
 
 void gather_point_lamps(const LightContext& context,

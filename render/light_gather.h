@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "render/cell_visibility.h"
@@ -206,7 +207,11 @@ struct CellLamps {
   };
   std::vector<std::uint16_t> numbers;  // of the lamps
   std::vector<Factors> factors;        // of each of them
-  std::vector<TintedLight> tints;      // `light` is a place in `numbers`
+  std::vector<TintedLight> tints;      // `light` is a place in `numbers`; sorted by key_of
+
+  // Of the lamp at a place in `numbers`; and what passes of it to a centre that it reaches.
+  std::span<const TintedLight> tints_of(std::size_t place) const;
+  Vec3f passed(std::size_t place, std::size_t centre) const;
 };
 
 // Finds that, for the points of Receivers::by_lamps, with shadow rays as in gather_cell. Whatever

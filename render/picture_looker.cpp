@@ -434,8 +434,7 @@ bool PictureLooker::shade_lamps(const CellTransport::Shadowed& centres,
     }
     shoot();
     if (!hides) continue;
-    for (const TintedLight& tint : lamps.tints) {
-      if (tint.light != i) continue;
+    for (const TintedLight& tint : lamps.tints_of(i)) {
       const Vec3f own = hidden_.at(tint.centre);
       hidden_.put(tint.centre, own - own * tint.lost_share);
     }

@@ -320,9 +320,14 @@ TEST_F(LightGather, OfLampsIsThatOfEveryPointsOwnRays) {
         got[cell.numbers[place] * cell_pixels + k] = Vec3f{1, 1, 1} * cell.factors[place].at[k];
       }
     }
-    for (const TintedLight& tint : cell.tints) {
-      Vec3f& of = got[cell.numbers[tint.light] * cell_pixels + tint.centre];
-      of -= of * tint.lost_share;
+    EXPECT_TRUE(std::ranges::is_sorted(cell.tints, {}, key_of));
+    EXPECT_EQ(cell.tints.empty(), !glass);
+    for (std::size_t place = 0; place < cell.numbers.size(); ++place) {
+      for (std::size_t k = 0; k < cell_pixels; ++k) {
+        Vec3f& of = got[cell.numbers[place] * cell_pixels + k];
+        of = of * cell.passed(place, k);
+      }
+      for (const TintedLight& tint : cell.tints_of(place)) EXPECT_EQ(tint.light, place);
     }
     receivers_->count = cell_pixels;
     std::vector<PointLamp> reached;
