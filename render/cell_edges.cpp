@@ -11,8 +11,7 @@
 namespace render {
 namespace {
 
-constexpr float display_limit = 4;  // brighter light than this, in display white, looks alike
-constexpr float darkest = 0.01F;    // below, eyes do not tell more: steps up to 1 by their root
+constexpr float darkest = 0.01F;  // below, eyes do not tell more: steps up to 1 by their root
 // Where each sample sends on so many rays, as behind ribbed glass, a pixel takes no more samples.
 constexpr int many_rays = 10, most_samples_of_many_rays = 256;
 constexpr float alike_mirrors = 0.99F;  // cosine between normals: what they mirror is alike

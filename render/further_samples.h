@@ -16,6 +16,8 @@ using calibrate::Vec3f;
 // A sample's light counts up to so many times display white: a sixteenth of a pixel is then as
 // bright as a display shows.
 inline constexpr float sample_limit = 64;
+// Brighter light than this, in display white, looks alike.
+inline constexpr float display_limit = 4;
 // By which virtual things are taken to differ from the plate, whatever it shows: decisions hold
 // from frame to frame.
 inline constexpr float plate_contrast = 0.4F;
@@ -52,7 +54,9 @@ class FurtherSamples {
   void count_as_batch(std::size_t pixel) { ++of_pixel_[pixel].batches; }
 
   int count(std::size_t pixel) const { return counts_[pixel]; }
-  // The squares of what samples differ from their mean by, added up.
+  // The squares of what samples differ from their mean by, added up. Light of a mean above
+  // display_limit counts the less, by the fourth power: a display shows white there, and a tone
+  // curve, steps the smaller the brighter it is.
   float spread(std::size_t pixel) const { return spread(pixel, of_pixel_[pixel].squares); }
   // The variance that independent samples would have whose mean is as far off as theirs.
   float variance(std::size_t pixel) const;

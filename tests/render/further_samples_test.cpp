@@ -79,6 +79,23 @@ TEST(FurtherSamples, CountNothingBeyondTheLimit) {
   EXPECT_EQ(spark(std::numeric_limits<float>::infinity()).variance(pixel), at_limit);
 }
 
+// Noise of light that is white on any display may be as much as its square is above that.
+TEST(FurtherSamples, AreSurerOfLightThatIsBrighterThanDisplaysShow) {
+  const auto variance = [](float mean, float off) {
+    return samples_of(16, [=](int i) { return mean + (i % 2 == 0 ? off : -off); }).variance(pixel);
+  };
+  const float dim = variance(1, 0.5F);
+  EXPECT_GT(dim, 0.01F);
+  EXPECT_NEAR(variance(3.9F, 0.5F), dim, 1e-3F * dim);
+  EXPECT_NEAR(variance(8, 0.5F), dim / 16, 1e-3F * dim);
+  EXPECT_NEAR(variance(16, 0.5F), dim / 256, 1e-3F * dim);
+  // Little of something bright counts as it did: the pixel may show all of it.
+  const auto glint = [](float light) {
+    return samples_of(16, [=](int i) { return i == 5 ? light : 0.1F; }).variance(pixel);
+  };
+  EXPECT_NEAR(glint(60) / glint(30), 4, 0.1);
+}
+
 TEST(FurtherSamples, BeginAnew) {
   FurtherSamples samples = samples_of(16, [](int i) { return static_cast<float>(i); });
   samples.begin(pixel);
