@@ -79,8 +79,9 @@ Vec3f offset_origin(const HitPoint& hit, Vec3f direction) {
   const Vec3f p = hit.position;
   const float size = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z), 1e-3F});
   const float side = dot(direction, hit.geometric_normal) < 0 ? -1.0F : 1.0F;
-  // Near the origin, a large triangle is as coarse as its corners.
-  const float off = std::max(size * 2e-5F, hit.largest_coordinate * 1e-6F);
+  // Some floats' steps, for more would begin inside of what stands there: 2 mm at a kilometre. Near
+  // the origin, a large triangle is as coarse as its corners.
+  const float off = std::max(size * 2e-6F, hit.largest_coordinate * 1e-6F);
   return p + hit.geometric_normal * (side * off);
 }
 

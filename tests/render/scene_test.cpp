@@ -238,6 +238,51 @@ TEST(OffsetOrigin, LeavesALeaningTriangleAlsoNearTheOrigin) {
   EXPECT_EQ(met, 0);
 }
 
+// What stands on a floor far from the set's origin is still met by rays that begin on the floor.
+TEST(OffsetOrigin, IsSmallAndEnoughFarAway) {
+  std::mt19937 engine(11);
+  std::normal_distribution<float> random;
+  int met = 0;
+  for (const float far_m : {100.0F, 1000.0F, 10000.0F}) {
+    for (int trial = 0; trial < 40; ++trial) {
+      SceneDescription description = one_square();
+      const Vec3f z = normalize(Vec3f{random(engine), random(engine), random(engine)});
+      const Vec3f x = normalize(cross(z, Vec3f{random(engine), random(engine), random(engine)}));
+      const Vec3f y = cross(z, x);
+      const Vec3f at = normalize(Vec3f{random(engine), random(engine), random(engine)}) * far_m;
+      const float size = trial % 2 == 0 ? 1.0F : 30.0F;
+      auto mesh = std::make_shared<Mesh>(*description.meshes[0]);
+      const bool placed = trial % 4 < 2;
+      for (Vec3f& p : mesh->positions) p = (x * p.x + y * p.y) * size + (placed ? Vec3f{} : at);
+      description.meshes[0] = mesh;
+      if (placed) {
+        description.instances[0].set_from_object = {1, 0, 0, at.x, 0, 1, 0, at.y, 0, 0, 1, at.z};
+      }
+      const Scene scene(description);
+      for (int i = 0; i < 40; ++i) {
+        const Vec3f to = at + (x * random(engine) + y * random(engine)) * (0.2F * size);
+        const Vec3f from = at + (z * 2 + x * random(engine)) * size;
+        const Vec3f direction = normalize(to - from);
+        const auto hit = closest_hit(scene, from, direction, 0, ~0U, RayKind::camera);
+        if (!hit) continue;
+        const HitPoint point =
+            scene.hit_point(hit->geom_id, hit->prim_id, hit->inst_id, hit->u, hit->v, direction);
+        Vec3f away = normalize(Vec3f{random(engine), random(engine), random(engine)});
+        if (dot(away, point.geometric_normal) < 0) away = -away;
+        // Half of them graze.
+        if (i % 2 == 0) {
+          away = normalize(away -
+                           point.geometric_normal * (0.98F * dot(away, point.geometric_normal)));
+        }
+        const Vec3f origin = offset_origin(point, away);
+        met += closest_hit(scene, origin, away, 0, ~0U, RayKind::reflection).has_value();
+        EXPECT_LT(length(origin - point.position), 3e-6F * far_m + 4e-5F);
+      }
+    }
+  }
+  EXPECT_EQ(met, 0);
+}
+
 TEST(Scene, RefusesWhatDoesNotFitTogether) {
   const auto refuse = [](auto&& change) {
     SceneDescription scene = one_square();
