@@ -94,6 +94,15 @@ bool is_too_deep(std::string_view text) {
   return false;
 }
 
+// Of a text that may quote all of a buffer: as much as one reads.
+std::string beginning_of(std::string_view text) {
+  constexpr std::size_t most = 200;
+  if (text.size() <= most) return std::string(text);
+  std::size_t end = most;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80) --end;  // of UTF-8
+  return std::string(text.substr(0, end)) + " ...";
+}
+
 class Checker {
  public:
   explicit Checker(std::span<const std::byte> bytes) {
@@ -104,7 +113,7 @@ class Checker {
     } catch (const json::exception& error) {
       // Without the library's name for the error, in brackets.
       const std::string_view what = error.what();
-      refuse("its JSON is damaged: " + std::string(what.substr(what.find(']') + 2)));
+      refuse("its JSON is damaged: " + beginning_of(what.substr(what.find(']') + 2)));
     }
     if (!document_.is_object()) refuse("it is not a glTF file");
   }

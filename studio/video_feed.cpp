@@ -109,8 +109,9 @@ void VideoFeed::place(const Set& set, const SetScene& scene) {
       for (const render::AreaLight& light : lights[i]) lamps += light.samples.size() + 1;
       if (lamps > static_cast<std::size_t>(render::most_lights)) {
         faults.add(video.object_place,
-                   fmt::format("{} lamps so far, but a set holds at most {}: fewer samples", lamps,
-                               render::most_lights));
+                   fmt::format("{} lamps so far, a video light's samples and one more, but a set "
+                               "holds at most {}: fewer samples",
+                               lamps, render::most_lights));
         break;
       }
     } catch (const std::invalid_argument& error) {

@@ -264,6 +264,22 @@ TEST(ModelFaults, RefusesNestingAndCycles) {
        {"a.fbx", "; FBX 7.4.0 project file\n" + repeated("A: {\n", 100000), made::crashed_helper}});
 }
 
+// A buffer inside of it may be megabytes: what is wrong is told in a line.
+TEST(ModelFaults, TellsOfATruncatedGltfShortly) {
+  const fs::path folder = made::make_temporary_directory();
+  const std::string path =
+      write(folder, {"a.gltf", R"({"asset":{"version":"2.0"},"buffers":[{"uri":"data:,)" +
+                                   repeated("\u00e4\u00c4", 20000)});
+  try {
+    load_model(path);
+    FAIL() << "read";
+  } catch (const std::exception& error) {
+    const std::string why = error.what();
+    EXPECT_NE(why.find("a.gltf: its JSON is damaged"), std::string::npos) << why;
+    EXPECT_LT(why.size(), path.size() + 300);
+  }
+}
+
 // One instance of `material`, with texture `uri` in each of its maps.
 LoadedModel with_texture(const fs::path& folder, const std::string& uri) {
   GlbParts parts;
