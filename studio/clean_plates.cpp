@@ -119,6 +119,16 @@ std::string words_for_shift(float right_px, float down_px) {
       tenths(right_px), tenths(down_px));
 }
 
+std::string words_for_ghost(float share) {
+  return fmt::format(
+      "{:.1f} % of the picture is screen where the clean plate shows something else, as of "
+      "somebody "
+      "who stood there: it is taken for the person. Take the plate anew, or cut it away by a "
+      "garbage "
+      "mask",
+      100 * share);
+}
+
 compositing::CleanPlate read_clean_plate(const std::string& path,
                                          const VideoSource& source,
                                          compositing::KeyMethod method,

@@ -39,6 +39,10 @@ std::string needs_plate(const std::string& uri);
 // How far a camera's picture has gone from its clean plate.
 std::string words_for_shift(float right_px, float down_px);
 
+// What it means that so much of a frame (share of the picture) shows the screen where the clean
+// plate shows something else, and what to do.
+std::string words_for_ghost(float share);
+
 // The plate in a file, with the noise that it tells (EXR of `platelight key plate`); with no path,
 // from the source's own frames from first to last, of which some that are spread over them are
 // looked at, as the method asks. Throws std::runtime_error if it cannot be read, was taken by

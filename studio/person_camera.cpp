@@ -357,6 +357,7 @@ void PersonCameraFeed::key_frame() {
       by_texel_ ? keyer_->follow(image) : keyer_->key(image, texture->frame());
   confidence_ = report.confidence;
   key_ = compositing::name_of(report.status);
+  ghost_ = report.ghost;
   moved_px_.reset();
   if (report.moved) moved_px_ = {report.shift.right_px, report.shift.down_px};
   if (by_texel_) {

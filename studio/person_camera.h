@@ -86,6 +86,8 @@ class PersonCameraFeed {
   std::string_view key() const { return key_; }
   // How far the picture has gone from its plate, if the camera was moved: right and down, pixels.
   std::optional<std::array<float, 2>> moved_px() const { return moved_px_; }
+  // Share of the picture in which the screen is where the plate shows something else.
+  float ghost() const { return ghost_; }
   const compositing::Feet& feet() const { return feet_; }
   bool sees_nobody() const { return has_matte_ && feet_.status == compositing::FeetStatus::absent; }
   // Edges of the person, and of all that may be its, in pixels: left, top, right, bottom. The whole
@@ -133,6 +135,7 @@ class PersonCameraFeed {
   float confidence_ = 1;
   std::string_view key_ = "none";
   std::optional<std::array<float, 2>> moved_px_;
+  float ghost_ = 0;
   compositing::Feet feet_;
   bool has_matte_ = false;
   std::optional<std::array<float, 4>> outline_;

@@ -182,6 +182,7 @@ struct KeyedClip {
   // The camera, if it was: the first frame that shows it, and the farthest.
   std::optional<std::int64_t> moved_from;
   compositing::PlateShift shift;
+  float ghost = 0;    // the largest share of the picture
   double key_ms = 0;  // in all
   Json rows = Json::array();
   double confidence() const { return confidence_sum / static_cast<double>(keyed); }
@@ -197,6 +198,7 @@ Json row_of(std::int64_t frame, const compositing::KeyReport& report) {
            {"gain", report.sight.gain},
            {"mismatch", report.sight.mismatch},
            {"clipped", report.sight.clipped},
+           {"ghost", report.ghost},
            {"soft", report.soft}};
   if (report.moved) row["moved_px"] = {report.shift.right_px, report.shift.down_px};
   return row;
@@ -212,6 +214,8 @@ void add(const compositing::KeyReport& report, std::int64_t frame, KeyedClip& cl
     if (!clip.moved_from) clip.moved_from = frame - report.moved_for + 1;
     if (report.shift.size_px() > clip.shift.size_px()) clip.shift = report.shift;
   }
+  if (report.status == compositing::KeyStatus::ghost)
+    clip.ghost = std::max(clip.ghost, report.ghost);
   clip.rows.push_back(row_of(frame, report));
 }
 
@@ -293,6 +297,7 @@ void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Co
         fmt::format("the key is unsure ({}) in {} of {} frames: look at it before it is used",
                     clip.why, clip.unsure, clip.keyed));
   }
+  if (clip.ghost > 0) console.warn(words_for_ghost(clip.ghost));
   if (clip.moved_from) {
     console.warn(
         fmt::format("the camera was moved, from frame {} on or up to 3 before: {}. Key what is "
@@ -321,8 +326,11 @@ void key_clip(const KeyOptions& options, Console& console) {
         fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", options.plate,
                     plate.light.width, plate.light.height, source.uri, width, height));
   }
-  compositing::Keyer keyer(std::move(plate), settings,
-                           read_key_masks(options.masks, width, height));
+  compositing::KeyMasks masks = read_key_masks(options.masks, width, height);
+  if (clip.by_screen && !options.plate.empty()) {
+    if (const auto doubts = doubts_of_plate(plate, masks.garbage)) console.warn(*doubts);
+  }
+  compositing::Keyer keyer(std::move(plate), settings, std::move(masks));
   compositing::ExrSequenceSettings take;
   take.dir = options.out;
   take.rate = camera->info().rate.num > 0 ? camera->info().rate : capture::Rational{25, 1};
