@@ -121,10 +121,12 @@ constexpr Fall screen_unlike_plate{0.06F, 0.16F};
 // Share of pixels that are neither screen nor person: .08 in "plain", .16 in "glass", .25 under
 // such noise.
 constexpr Fall neither_share{0.15F, 0.45F};
-// Of a camera that was pushed, in pixels: a look is right to a quarter of one, and found up to five
-// (PlateWatch tests).
+// Of a camera that was pushed, in pixels where it shows most: a look is right to a quarter of one,
+// and found up to five (PlateWatch tests).
 constexpr Fall camera_shift_px{shift_still_px, 4};
 constexpr float least_if_moved = 0.5F, more_if_hardly_moved = 0.4F;
+// What stands around is not where it was, and no camera's movement tells where it is.
+constexpr float confidence_if_scattered = 0.55F;
 // Share of the picture that shows the screen where the plate shows something else: none in the made
 // scenes. What has gone stays as large a ghost, which is whole.
 constexpr Fall screen_in_gaps{0.001F, 0.01F};
@@ -243,9 +245,10 @@ void Keyer::watch(const Rows& rows, float gain) {
   until_look_ = frames_between_looks;
   ghost_ = gaps_->look(rows, gain);
   const PlateShift seen = watch_.look(rows);
+  looks_scattered_ = seen.scattered ? looks_scattered_ + 1 : 0;
   if (!seen.known) return;
   shift_ = seen;
-  const bool off = shift_.size_px() > shift_still_px + 4 * shift_.sigma_px;
+  const bool off = shift_.farthest_px > shift_still_px + 4 * shift_.farthest_sigma_px;
   looks_moved_ = off ? looks_moved_ + 1 : 0;
   if (looks_moved_ < 2) moved_for_ = looks_moved_;
 }
@@ -307,6 +310,7 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   report.shift = shift_;
   report.moved = looks_moved_ > 1;
   report.moved_for = report.moved ? moved_for_ : 0;
+  report.scattered = !report.moved && looks_scattered_ > 1;
   report.ghost = ghost_;
   report.soft = soft;
   const auto lower = [&](float by, KeyStatus status) {
@@ -327,9 +331,10 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   lower(screen_unlike_plate.of(sight.mismatch), KeyStatus::misfit);
   lower(neither_share.of(soft), KeyStatus::misfit);
   if (report.moved) {
-    lower(least_if_moved + more_if_hardly_moved * camera_shift_px.of(shift_.size_px()),
+    lower(least_if_moved + more_if_hardly_moved * camera_shift_px.of(shift_.farthest_px),
           KeyStatus::moved);
   }
+  if (report.scattered) lower(confidence_if_scattered, KeyStatus::misfit);
   // Where a pushed camera shows the screen beside itself, that is why.
   lower(screen_in_gaps.of(ghost_), report.moved ? KeyStatus::moved : KeyStatus::ghost);
   lower(gain_above_plate.of(sight.gain) * gain_below_plate.of(-sight.gain), KeyStatus::unlit);

@@ -358,8 +358,8 @@ void PersonCameraFeed::key_frame() {
   confidence_ = report.confidence;
   key_ = compositing::name_of(report.status);
   ghost_ = report.ghost;
-  moved_px_.reset();
-  if (report.moved) moved_px_ = {report.shift.right_px, report.shift.down_px};
+  moved_.reset();
+  if (report.moved) moved_ = report.shift;
   if (by_texel_) {
     texture->take(image);
     picture_ = std::make_shared<compositing::TexelKeyedPicture>(

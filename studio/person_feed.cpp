@@ -259,12 +259,12 @@ void PersonFeed::show(Person& person, std::size_t index) {
   }
   camera.unsure_for = why;
   camera.told_clipped |= clipped;
-  const auto moved = camera.feed.moved_px();
+  const auto& moved = camera.feed.moved();
   if (moved && !camera.moved) {
     person.notes.push_back(fmt::format(
         "{}: its camera was moved: {}. Take the plate anew (platelight key plate, or plate = "
         "\"take\" and another number of `take`), and its pose",
-        person.name_of(index), words_for_shift((*moved)[0], (*moved)[1])));
+        person.name_of(index), words_for_shift(*moved)));
   }
   camera.moved = moved.has_value();
   if (index == 0) stand(person);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -180,8 +181,10 @@ struct KeyedClip {
   double confidence_sum = 0, least_confidence = 1;
   std::string_view why = "good";  // of the least
   // The camera, if it was: the first frame that shows it, and the farthest.
+  std::int64_t first = 0;  // frame that is keyed
   std::optional<std::int64_t> moved_from;
   compositing::PlateShift shift;
+  bool scattered = false;
   float ghost = 0;    // the largest share of the picture
   double key_ms = 0;  // in all
   Json rows = Json::array();
@@ -189,6 +192,10 @@ struct KeyedClip {
 };
 
 Json lost_row(std::int64_t frame) { return {{"frame", frame}, {"status", "lost"}}; }
+
+float degrees_of(const compositing::PlateShift& shift) {
+  return shift.roll_rad * 180 / std::numbers::pi_v<float>;
+}
 
 Json row_of(std::int64_t frame, const compositing::KeyReport& report) {
   Json row{{"frame", frame},
@@ -200,7 +207,11 @@ Json row_of(std::int64_t frame, const compositing::KeyReport& report) {
            {"clipped", report.sight.clipped},
            {"ghost", report.ghost},
            {"soft", report.soft}};
-  if (report.moved) row["moved_px"] = {report.shift.right_px, report.shift.down_px};
+  if (report.moved) {
+    row["moved_px"] = {report.shift.right_px, report.shift.down_px};
+    row["roll_deg"] = degrees_of(report.shift);
+    row["scale"] = report.shift.scale;
+  }
   return row;
 }
 
@@ -212,8 +223,9 @@ void add(const compositing::KeyReport& report, std::int64_t frame, KeyedClip& cl
   clip.unsure += compositing::is_unsure(report.confidence);
   if (report.moved) {
     if (!clip.moved_from) clip.moved_from = frame - report.moved_for + 1;
-    if (report.shift.size_px() > clip.shift.size_px()) clip.shift = report.shift;
+    if (report.shift.farthest_px > clip.shift.farthest_px) clip.shift = report.shift;
   }
+  clip.scattered |= report.scattered;
   if (report.status == compositing::KeyStatus::ghost)
     clip.ghost = std::max(clip.ghost, report.ghost);
   clip.rows.push_back(row_of(frame, report));
@@ -260,7 +272,9 @@ Json json_of(const KeyedClip& clip) {
   if (clip.moved_from) {
     moved = {{"frame", *clip.moved_from},
              {"right_px", clip.shift.right_px},
-             {"down_px", clip.shift.down_px}};
+             {"down_px", clip.shift.down_px},
+             {"roll_deg", degrees_of(clip.shift)},
+             {"scale", clip.shift.scale}};
   }
   return {{"frames", clip.frames},
           {"lost", clip.lost},
@@ -298,12 +312,19 @@ void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Co
                     clip.why, clip.unsure, clip.keyed));
   }
   if (clip.ghost > 0) console.warn(words_for_ghost(clip.ghost));
-  if (clip.moved_from) {
-    console.warn(
-        fmt::format("the camera was moved, from frame {} on or up to 3 before: {}. Key what is "
-                    "before and after by themselves (--frames, --first), each with its own plate",
-                    *clip.moved_from, words_for_shift(clip.shift.right_px, clip.shift.down_px)));
+  if (clip.scattered) console.warn(words_for_scattered());
+  if (!clip.moved_from) return;
+  const std::string how = words_for_shift(clip.shift);
+  // Two looks tell, of which the second is at the fifth frame.
+  if (compositing::is_of_another_lens(clip.shift) && *clip.moved_from <= clip.first) {
+    console.warn(fmt::format(
+        "the plate seems to be of another lens: {}. Take it anew with the lens of the clip", how));
+    return;
   }
+  console.warn(
+      fmt::format("the camera was moved, from frame {} on or up to 3 before: {}. Key what is "
+                  "before and after by themselves (--frames, --first), each with its own plate",
+                  *clip.moved_from, how));
 }
 
 void key_clip(const KeyOptions& options, Console& console) {
@@ -318,6 +339,7 @@ void key_clip(const KeyOptions& options, Console& console) {
   if (clip.by_screen && compositing::screen_share(plate.light, plate.colour) > 0)
     clip.colour = compositing::name_of(plate.colour);
   clip.known = plate.known;
+  clip.first = first;
   const auto camera = open_video(source);
   // Before the masks, which are for the video too.
   const auto [width, height] = std::pair(camera->info().width, camera->info().height);
