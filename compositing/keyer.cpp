@@ -121,10 +121,15 @@ constexpr Fall screen_unlike_plate{0.06F, 0.16F};
 // Share of pixels that are neither screen nor person: .08 in "plain", .16 in "glass", .25 under
 // such noise.
 constexpr Fall neither_share{0.15F, 0.45F};
-// Of a camera that was pushed, in pixels: a look is right to a quarter of one, and found up to five
-// (PlateWatch tests).
+// Of a camera that was pushed, in pixels where it shows most: a look is right to a quarter of one,
+// and found up to five (PlateWatch tests).
 constexpr Fall camera_shift_px{shift_still_px, 4};
 constexpr float least_if_moved = 0.5F, more_if_hardly_moved = 0.4F;
+// What stands around is not where it was, and no camera's movement tells where it is.
+constexpr float confidence_if_scattered = 0.55F;
+// Share of the picture that shows the screen where the plate shows something else: none in the made
+// scenes. What has gone stays as large a ghost, which is whole.
+constexpr Fall screen_in_gaps{0.001F, 0.01F};
 // Light over the plate's, and, with its sign changed, under it: .88 to 1.07 in the made scenes, .45
 // before a plate too bright by 1.2, which changes nothing.
 constexpr Fall gain_above_plate{1.7F, 2.3F}, gain_below_plate{-0.45F, -0.2F};
@@ -132,8 +137,9 @@ constexpr Fall gain_above_plate{1.7F, 2.3F}, gain_below_plate{-0.45F, -0.2F};
 }  // namespace
 
 std::string_view name_of(KeyStatus status) {
-  constexpr std::array<std::string_view, 9> names{
-      "good", "hidden", "clipped", "shadowed", "noisy", "misfit", "moved", "unlit", "no screen"};
+  constexpr std::array<std::string_view, 10> names{"good",  "hidden",   "clipped", "shadowed",
+                                                   "noisy", "misfit",   "moved",   "ghost",
+                                                   "unlit", "no screen"};
   return names[static_cast<std::size_t>(status)];
 }
 
@@ -153,6 +159,8 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
                                 " pixels, the clean plate " + std::to_string(lit.width) + "x" +
                                 std::to_string(lit.height));
   }
+  masked_ = masked_blocks(masks_, lit.height, lit.width);
+  gaps_.emplace(light_.bare(), masked_);
   dials_ = {settings.learned ? &shipped_table() : nullptr,
             settings.screen,
             1 / (settings.core - settings.screen),
@@ -162,7 +170,6 @@ Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
   if (settings.effort == KeyEffort::quick && settings.method == KeyMethod::screen &&
       settings.learned && !has_two_primaries(lit.colour)) {
     quick_.emplace(light_.bare(), light_.tolerance(), light_.spread());
-    masked_ = masked_blocks(masks_, lit.height, lit.width);
   }
 }
 
@@ -202,12 +209,12 @@ KeyReport Keyer::key_light(const capture::Image& frame, const Target& target) {
   const LightRows rows(frame, channels_of(light_.plate().colour));
   if (quick_) {
     const PlateSight sight = quick_->update(rows, settings_.follows_light);
-    watch(rows);
+    watch(rows, sight.gain);
     return report(sight,
                   key_quickly(rows, std::span(quick_->light_bounds()), sigma(sight), target));
   }
   const PlateSight sight = light_.update(frame, settings_.follows_light);
-  watch(rows);
+  watch(rows, sight.gain);
   scratch_.bare_light.clear();
   if (glances()) bound_screen(light_.lit(), scratch_.bare_light);
   return report(sight, key_rows(rows, scratch_.bare_light, target));
@@ -219,12 +226,12 @@ KeyReport Keyer::key_codes(const CodedFrame& frame, const Target& target) {
   const CodeRows rows(frame.rgba.data(), frame.width, order, light_polynomial(frame.transfer));
   if (quick_) {
     const PlateSight sight = quick_->update(rows, settings_.follows_light);
-    watch(rows);
+    watch(rows, sight.gain);
     const std::span bare(quick_->code_bounds(frame.transfer));
     return report(sight, key_quickly(rows, bare, sigma(sight), target));
   }
   const PlateSight sight = light_.update(frame, settings_.follows_light);
-  watch(rows);
+  watch(rows, sight.gain);
   scratch_.bare_codes.clear();
   if (glances()) bound_screen(light_.lit(), frame.transfer, order, scratch_.bare_codes);
   return report(sight, key_rows(rows, scratch_.bare_codes, target));
@@ -232,14 +239,16 @@ KeyReport Keyer::key_codes(const CodedFrame& frame, const Target& target) {
 
 // One frame may be shaken; a camera that was pushed stays where it is, also while nothing tells.
 template <class Rows>
-void Keyer::watch(const Rows& rows) {
+void Keyer::watch(const Rows& rows, float gain) {
   if (looks_moved_ > 0) ++moved_for_;
   if (until_look_-- > 0) return;
   until_look_ = frames_between_looks;
+  ghost_ = gaps_->look(rows, gain);
   const PlateShift seen = watch_.look(rows);
+  looks_scattered_ = seen.scattered ? looks_scattered_ + 1 : 0;
   if (!seen.known) return;
   shift_ = seen;
-  const bool off = shift_.size_px() > shift_still_px + 4 * shift_.sigma_px;
+  const bool off = shift_.farthest_px > shift_still_px + 4 * shift_.farthest_sigma_px;
   looks_moved_ = off ? looks_moved_ + 1 : 0;
   if (looks_moved_ < 2) moved_for_ = looks_moved_;
 }
@@ -257,7 +266,7 @@ std::shared_ptr<const FilteredPlate> Keyer::shared_filtered() {
 
 KeyReport Keyer::follow(const capture::Image& frame) {
   const PlateSight sight = light_.update(frame, settings_.follows_light);
-  watch(LightRows(frame, channels_of(light_.plate().colour)));
+  watch(LightRows(frame, channels_of(light_.plate().colour)), sight.gain);
   return report(sight, 0);
 }
 
@@ -301,6 +310,8 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   report.shift = shift_;
   report.moved = looks_moved_ > 1;
   report.moved_for = report.moved ? moved_for_ : 0;
+  report.scattered = !report.moved && looks_scattered_ > 1;
+  report.ghost = ghost_;
   report.soft = soft;
   const auto lower = [&](float by, KeyStatus status) {
     if (by < 1 && (report.confidence >= 1 || by < report.confidence)) report.status = status;
@@ -320,9 +331,12 @@ KeyReport Keyer::report(const PlateSight& sight, float soft) const {
   lower(screen_unlike_plate.of(sight.mismatch), KeyStatus::misfit);
   lower(neither_share.of(soft), KeyStatus::misfit);
   if (report.moved) {
-    lower(least_if_moved + more_if_hardly_moved * camera_shift_px.of(shift_.size_px()),
+    lower(least_if_moved + more_if_hardly_moved * camera_shift_px.of(shift_.farthest_px),
           KeyStatus::moved);
   }
+  if (report.scattered) lower(confidence_if_scattered, KeyStatus::misfit);
+  // Where a pushed camera shows the screen beside itself, that is why.
+  lower(screen_in_gaps.of(ghost_), report.moved ? KeyStatus::moved : KeyStatus::ghost);
   lower(gain_above_plate.of(sight.gain) * gain_below_plate.of(-sight.gain), KeyStatus::unlit);
   return report;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "compositing/key_scratch.h"
 #include "compositing/key_texel.h"
 #include "compositing/keyed_frame.h"
+#include "compositing/plate_gaps.h"
 #include "compositing/plate_watch.h"
 #include "compositing/quick_light.h"
 
@@ -61,6 +63,7 @@ enum class KeyStatus : std::uint8_t {
   noisy,     // the screen's share of a pixel is uncertain
   misfit,    // what is in sight is not the plate: moved, stale, or not this screen
   moved,     // the camera is not where it was when the plate was taken
+  ghost,     // the screen is in sight where the plate shows something else: it stays for good
   unlit,     // light has changed beyond what is followed
   no_screen  // the plate shows none
 };
@@ -72,9 +75,21 @@ struct KeyReport {
   PlateSight sight;
   PlateShift shift;    // against the plate, as it was known last: looked for in every fourth frame
   bool moved = false;  // the camera, by more than one look
-  int moved_for = 0;   // frames since the look that saw it first, this one counted
-  float soft = 0;      // share of pixels that are neither screen nor person
+  // Patches of the plate lie elsewhere, each by itself, by more than one look (PlateShift).
+  bool scattered = false;
+  int moved_for = 0;  // frames since the look that saw it first, this one counted
+  // Share of the picture that shows the screen where the plate shows something else, as it was seen
+  // last (PlateGaps): looked for as often.
+  float ghost = 0;
+  float soft = 0;  // share of pixels that are neither screen nor person
 };
+
+// Whether a camera that was moved is seen larger or smaller than its plate, as another lens does
+// and a tripod that is pushed does not.
+inline bool is_of_another_lens(const PlateShift& shift) {
+  constexpr float larger = 0.008F;
+  return std::abs(shift.scale - 1) > larger;
+}
 
 // Whether to look at a key before it is used, by the confidence of a frame or the mean of several:
 // a screen that is at the camera's limit everywhere leaves .5, and a camera that was pushed by 4
@@ -136,18 +151,21 @@ class Keyer {
   }
   bool glances() const;
   template <class Rows>
-  void watch(const Rows& rows);
+  void watch(const Rows& rows, float gain);
   KeyReport report(const PlateSight& sight, float soft) const;
 
   PlateLight light_;
   std::shared_ptr<const FilteredPlate> filtered_;
   std::optional<QuickLight> quick_;   // of quick keying
-  std::vector<std::uint8_t> masked_;  // of quick keying: 8x8 pixels that a mask covers some of
+  std::vector<std::uint8_t> masked_;  // 8x8 pixels that a mask covers some of
   PlateWatch watch_;
   PlateShift shift_;
-  int until_look_ = 0;   // frames
-  int looks_moved_ = 0;  // how many in a row have seen the camera elsewhere
-  int moved_for_ = 0;    // frames since the first of them, it counted
+  std::optional<PlateGaps> gaps_;
+  float ghost_ = 0;
+  int until_look_ = 0;       // frames
+  int looks_scattered_ = 0;  // how many in a row
+  int looks_moved_ = 0;      // how many in a row have seen the camera elsewhere
+  int moved_for_ = 0;        // frames since the first of them, it counted
   KeySettings settings_;
   KeyMasks masks_;
   KeyDials dials_;

@@ -22,8 +22,32 @@ constexpr int beside = 4;                            // cells: as far as patches
 constexpr float most_sigma = 0.1F;                   // of a patch that is worth following, in cells
 constexpr float own_error = 0.004F;                  // of light: what is neither noise nor shift
 constexpr int fewest = 4;                            // patches that must agree
-constexpr float agreed = 0.5F;                       // cells: patches that agree with their middle
+constexpr int fewest_turned = 6;                     // and on more than a shift
+constexpr float agreed = 0.5F;                       // cells: patches that agree
 constexpr float most_of_seen = 0.6F;                 // share that must
+constexpr float most_if_turned = 0.7F;               // and on more than a shift, which fits more
+constexpr float most_turn = 0.26F, most_growth = 0.4F;
+constexpr float told_px = 1;  // at the corners of the picture: what is less is no turn, or no push
+// Patches that tell that they agree on nothing, and how far they are off.
+constexpr int many = 8;
+constexpr float elsewhere_px = 1.5F;
+// Pictures of another lens, and of a camera that has tilted, in which patches are looked for where
+// nothing else is found: all of them in the first looks, then some of them in each.
+constexpr int first_looks = 3, some = 2;
+constexpr std::array<std::array<float, 2>, 14> turns{{{1, -0.05F},
+                                                      {1, 0.05F},
+                                                      {1, -0.1F},
+                                                      {1, 0.1F},
+                                                      {1.06F, 0},
+                                                      {1 / 1.06F, 0},
+                                                      {1.12F, 0},
+                                                      {1 / 1.12F, 0},
+                                                      {1.18F, 0},
+                                                      {1 / 1.18F, 0},
+                                                      {1.25F, 0},
+                                                      {1 / 1.25F, 0},
+                                                      {1.32F, 0},
+                                                      {1 / 1.32F, 0}}};  // scale, roll
 
 }  // namespace
 
@@ -81,8 +105,7 @@ PlateWatch::PlateWatch(const CleanPlate& plate)
   if (!light.empty()) afar_.emplace(rows, columns, light);
   seen_afar_.resize(light.size());
   middle_.reserve(patches_.size());
-  rights_.reserve(patches_.size());
-  downs_.reserve(patches_.size());
+  pairs_.reserve(patches_.size());
 }
 
 // Variance of a cell, of which two rows of pixels are looked at.
@@ -159,37 +182,42 @@ void PlateWatch::sample(const Rows& frame, const Patch& patch) {
   }
 }
 
-// The plate, shifted, with gain and offset, against what is seen: one step of Gauss and Newton.
+// The plate, moved, with gain and offset, against what is seen: one step of Gauss and Newton.
 bool PlateWatch::step(
-    const Patch& patch, int level, float& right, float& down, float* misfit) const {
+    const Motion& about, int level, float x, float y, Found& found, float* misfit) const {
   const Grid& grid = plate_[static_cast<std::size_t>(level)];
   const auto& seen = seen_[static_cast<std::size_t>(level)];
-  const int scale = 1 << level, across = side / scale;
-  // A patch may begin in the middle of a coarse cell.
-  const auto begin = [scale](int fine) {
-    return static_cast<float>(fine) / static_cast<float>(scale);
-  };
-  const float x0 = begin(patch.column) - right, y0 = begin(patch.row) - down;
-  const int column = static_cast<int>(std::floor(x0)), row = static_cast<int>(std::floor(y0));
-  const float u = x0 - static_cast<float>(column), v = y0 - static_cast<float>(row);
-  if (column < 1 || row < 1 || column + across + 2 >= grid.columns || row + across + 2 >= grid.rows)
+  const int across = side >> level;
+  // The middle of a coarse cell is between two fine ones.
+  const float shrink = 1 / static_cast<float>(1 << level), offset = 0.5F * (1 - shrink);
+  const float x0 = x * shrink - offset - found.right, y0 = y * shrink - offset - found.down;
+  // From the frame to the plate.
+  const float square = (1 + about.a) * (1 + about.a) + about.b * about.b;
+  const float along = (1 + about.a) / square, aside = about.b / square;
+  const float half = 0.5F * static_cast<float>(across - 1);
+  const float reach = half * (along + std::abs(aside)) + 2;
+  if (!(x0 >= reach && y0 >= reach && x0 + reach < static_cast<float>(grid.columns - 1) &&
+        y0 + reach < static_cast<float>(grid.rows - 1)))
     return false;
   Eigen::Matrix4f normal = Eigen::Matrix4f::Zero();
   Eigen::Vector4f towards = Eigen::Vector4f::Zero();
   float squares = 0;
-  const auto between = [&](int y, int x) {
-    const float top = grid.at(y, x) + u * (grid.at(y, x + 1) - grid.at(y, x));
-    const float low = grid.at(y + 1, x) + u * (grid.at(y + 1, x + 1) - grid.at(y + 1, x));
-    return top + v * (low - top);
-  };
-  for (int y = 0; y < across; ++y) {
-    for (int x = 0; x < across; ++x) {
-      const int gy = row + y, gx = column + x;
+  for (int row = 0; row < across; ++row) {
+    for (int column = 0; column < across; ++column) {
+      const float right = static_cast<float>(column) - half, down = static_cast<float>(row) - half;
+      const float px = x0 + along * right + aside * down, py = y0 + along * down - aside * right;
+      const int gx = static_cast<int>(px), gy = static_cast<int>(py);
+      const float u = px - static_cast<float>(gx), v = py - static_cast<float>(gy);
+      const auto between = [&](int r, int c) {
+        const float top = grid.at(r, c) + u * (grid.at(r, c + 1) - grid.at(r, c));
+        const float low = grid.at(r + 1, c) + u * (grid.at(r + 1, c + 1) - grid.at(r + 1, c));
+        return top + v * (low - top);
+      };
       // A frame that moved to the right shows what the plate has further left.
       const Eigen::Vector4f a(-0.5F * (between(gy, gx + 1) - between(gy, gx - 1)),
                               -0.5F * (between(gy + 1, gx) - between(gy - 1, gx)), between(gy, gx),
                               1);
-      const float value = seen[static_cast<std::size_t>(y * across + x)];
+      const float value = seen[static_cast<std::size_t>(row * across + column)];
       normal += a * a.transpose();
       towards += value * a;
       squares += value * value;
@@ -198,29 +226,32 @@ bool PlateWatch::step(
   normal += 1e-7F * normal.trace() * Eigen::Matrix4f::Identity();
   const Eigen::LDLT<Eigen::Matrix4f> solver(normal);
   if (solver.info() != Eigen::Success) return false;
-  const Eigen::Vector4f x = solver.solve(towards);
+  const Eigen::Vector4f fit = solver.solve(towards);
   // The gain stands before the shift: gain * (plate + shift * slope) + offset.
-  const float gain = x[2];
+  const float gain = fit[2];
   if (!(gain > 0.2F && gain < 5)) return false;
-  right += x[0] / gain, down += x[1] / gain;
-  const float limit = farthest / static_cast<float>(scale);
-  if (!(std::abs(right) <= limit && std::abs(down) <= limit)) return false;
+  found.right += fit[0] / gain, found.down += fit[1] / gain;
+  const float limit = farthest * shrink;
+  if (!(std::abs(found.right) <= limit && std::abs(found.down) <= limit)) return false;
   if (misfit != nullptr) {
     const auto cells = static_cast<float>(across * across);
-    *misfit = std::sqrt(std::max(0.0F, squares - towards.dot(x)) / cells) / gain;
+    *misfit = std::sqrt(std::max(0.0F, squares - towards.dot(fit)) / cells) / gain;
   }
   return true;
 }
 
-PlateWatch::Found PlateWatch::find(const Patch& patch) const {
+PlateWatch::Found PlateWatch::find(const Patch& patch,
+                                   const Motion& about,
+                                   float x,
+                                   float y) const {
   Found found;
   for (int i = 0; i < 4; ++i) {
-    if (!step(patch, 1, found.right, found.down, nullptr)) return {};
+    if (!step(about, 1, x, y, found, nullptr)) return {};
   }
   found.right *= 2, found.down *= 2;
   float misfit = 0;
   for (int i = 0; i < 4; ++i) {
-    if (!step(patch, 0, found.right, found.down, &misfit)) return {};
+    if (!step(about, 0, x, y, found, &misfit)) return {};
   }
   // By noise, and a part of what there is to see: a plate is smoother than a frame.
   const float mean = plate_[0].at(patch.row + side / 2, patch.column + side / 2);
@@ -228,44 +259,207 @@ PlateWatch::Found PlateWatch::find(const Patch& patch) const {
   return found;
 }
 
-// The shift of all patches that are in sight of the frame, if it is no farther from `about` than
-// each is looked for.
-template <class Rows>
-PlateShift PlateWatch::follow(const Rows& frame, About about) {
-  PlateShift shift;
-  rights_.clear(), downs_.clear();
-  for (const Patch& patch : patches_) {
-    Patch there = patch;
-    there.row += about.down, there.column += about.right;
-    if (there.row < 0 || there.column < 0 || there.row + side > plate_[0].rows ||
-        there.column + side > plate_[0].columns)
-      continue;
-    ++shift.patches;
-    sample(frame, there);
-    const Found found = find(patch);
-    if (!found.fits) continue;
-    rights_.push_back(found.right), downs_.push_back(found.down);
-  }
-  shift.seen = static_cast<int>(rights_.size());
-  if (shift.seen < fewest || 3 * shift.seen < shift.patches) return shift;
-  middle_.assign(rights_.begin(), rights_.end());
-  const float right = capture::median_in_place(middle_);
-  middle_.assign(downs_.begin(), downs_.end());
-  const float down = capture::median_in_place(middle_);
+PlateWatch::Consensus PlateWatch::agree_on_shift() {
+  Consensus shift;
+  const auto middle_of = [&](float Pair::*of) {
+    middle_.clear();
+    for (const Pair& pair : pairs_) middle_.push_back(pair.*of);
+    return capture::median_in_place(middle_);
+  };
+  shift.motion.right = middle_of(&Pair::right);
+  shift.motion.down = middle_of(&Pair::down);
   // Half of what is seen may move by itself; more of it agrees if the camera did.
   middle_.clear();
-  for (std::size_t i = 0; i < rights_.size(); ++i) {
-    const float off = std::max(std::abs(rights_[i] - right), std::abs(downs_[i] - down));
+  for (const Pair& pair : pairs_) {
+    const float off = std::max(std::abs(pair.right - shift.motion.right),
+                               std::abs(pair.down - shift.motion.down));
     if (off <= agreed) middle_.push_back(off);
   }
   shift.agree = static_cast<int>(middle_.size());
-  shift.known = shift.agree >= fewest &&
-                static_cast<float>(shift.agree) >= most_of_seen * static_cast<float>(shift.seen);
+  shift.cost = cost_of(shift.motion, std::numeric_limits<float>::infinity());
+  const float off = shift.agree == 0 ? agreed : 1.48F * capture::median_in_place(middle_);
+  shift.sigma = off / std::sqrt(static_cast<float>(pairs_.size())) + 0.01F;
+  return shift;
+}
+
+// No more than a little above `enough`, if it is above it.
+float PlateWatch::cost_of(const Motion& motion, float enough) const {
+  float cost = 0;
+  for (const Pair& pair : pairs_) {
+    const float right = motion.a * pair.x - motion.b * pair.y + motion.right - pair.right;
+    const float down = motion.b * pair.x + motion.a * pair.y + motion.down - pair.down;
+    cost += std::min(right * right + down * down, agreed * agreed);
+    if (cost > enough) break;
+  }
+  return cost;
+}
+
+// The similarity by two patches that most agree on.
+PlateWatch::Consensus PlateWatch::agree_on_similarity() const {
+  Motion best;
+  float least = std::numeric_limits<float>::infinity();
+  const float span = static_cast<float>(plate_[0].columns) / 6;
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const Pair &p = pairs_[i], &q = pairs_[j];
+      const float x = p.x - q.x, y = p.y - q.y, square = x * x + y * y;
+      if (square < span * span) continue;
+      const float right = p.right - q.right, down = p.down - q.down;
+      Motion motion{(right * x + down * y) / square, (down * x - right * y) / square, 0, 0};
+      if (std::abs(motion.a) > most_growth || std::abs(motion.b) > most_turn) continue;
+      motion.right = p.right - motion.a * p.x + motion.b * p.y;
+      motion.down = p.down - motion.b * p.x - motion.a * p.y;
+      const float cost = cost_of(motion, least);
+      if (cost < least) least = cost, best = motion;
+    }
+  }
+  return refined(best);
+}
+
+// By least squares of those that agree.
+PlateWatch::Consensus PlateWatch::refined(Motion motion) const {
+  Consensus fit;
+  for (int i = 0; i < 4; ++i) {
+    float count = 0, x = 0, y = 0, right = 0, down = 0;
+    const auto each = [&](auto&& visit) {
+      for (const Pair& pair : pairs_) {
+        const float u = motion.a * pair.x - motion.b * pair.y + motion.right - pair.right;
+        const float v = motion.b * pair.x + motion.a * pair.y + motion.down - pair.down;
+        if (u * u + v * v <= agreed * agreed) visit(pair, u * u + v * v);
+      }
+    };
+    float left = 0;
+    each([&](const Pair& pair, float off) {
+      count += 1, x += pair.x, y += pair.y, right += pair.right, down += pair.down, left += off;
+    });
+    if (count < 3) return {};
+    x /= count, y /= count, right /= count, down /= count;
+    float square = 0, a = 0, b = 0;
+    each([&](const Pair& pair, float) {
+      const float px = pair.x - x, py = pair.y - y, u = pair.right - right, v = pair.down - down;
+      square += px * px + py * py, a += px * u + py * v, b += px * v - py * u;
+    });
+    if (!(square > 0)) return {};
+    fit.agree = static_cast<int>(count);
+    fit.sigma = std::sqrt(left / (2 * count - 4 + 1e-3F)) / std::sqrt(count) + 0.01F;
+    fit.spread = std::sqrt(square);
+    motion.a = a / square, motion.b = b / square;
+    motion.right = right - motion.a * x + motion.b * y;
+    motion.down = down - motion.b * x - motion.a * y;
+  }
+  fit.motion = motion;
+  fit.cost = cost_of(motion, std::numeric_limits<float>::infinity());
+  return fit;
+}
+
+float PlateWatch::farthest_of(const Motion& motion) const {
+  float most = 0;
+  for (const float side_x : {-0.5F, 0.5F}) {
+    for (const float side_y : {-0.5F, 0.5F}) {
+      const float x = side_x * static_cast<float>(plate_[0].columns);
+      const float y = side_y * static_cast<float>(plate_[0].rows);
+      most = std::max(most, std::hypot(motion.a * x - motion.b * y + motion.right,
+                                       motion.b * x + motion.a * y + motion.down));
+    }
+  }
+  return most;
+}
+
+// A curtain that waves at one side does not turn the picture: the rest of it stays.
+bool PlateWatch::is_clearly_better(const Consensus& similarity, const Consensus& shift) const {
+  constexpr float as_good = 0.05F;  // cells
+  if (similarity.agree < std::max(fewest_turned, shift.agree)) return false;
+  const auto seen = static_cast<float>(pairs_.size());
+  if (2 * similarity.cost + as_good * as_good * seen > shift.cost) return false;
+  const float corner = farthest_of({similarity.motion.a, similarity.motion.b, 0, 0});
+  const float radius = std::hypot(0.5F * static_cast<float>(plate_[0].columns),
+                                  0.5F * static_cast<float>(plate_[0].rows));
+  const float sigma = similarity.sigma * std::sqrt(static_cast<float>(similarity.agree)) * radius /
+                      similarity.spread;
+  return corner > told_px / static_cast<float>(pixels_) + 4 * sigma;
+}
+
+PlateWatch::Motion PlateWatch::motion_of(const PlateShift& shift) const {
   const auto pixels = static_cast<float>(pixels_);
-  shift.right_px = (static_cast<float>(about.right) + right) * pixels;
-  shift.down_px = (static_cast<float>(about.down) + down) * pixels;
-  const float spread = shift.agree == 0 ? agreed : 1.48F * capture::median_in_place(middle_);
-  shift.sigma_px = (spread / std::sqrt(static_cast<float>(shift.seen)) + 0.01F) * pixels;
+  return {shift.scale * std::cos(shift.roll_rad) - 1, shift.scale * std::sin(shift.roll_rad),
+          shift.right_px / pixels, shift.down_px / pixels};
+}
+
+// What all patches that are in sight of the frame say, each looked for no farther from `about` than
+// it is found. One that turns may be told but not known: where it was looked for elsewhere.
+template <class Rows>
+PlateShift PlateWatch::follow(const Rows& frame, const Motion& about) {
+  PlateShift shift;
+  pairs_.clear();
+  const Grid& grid = plate_[0];
+  const float middle_x = 0.5F * static_cast<float>(grid.columns - 1);
+  const float middle_y = 0.5F * static_cast<float>(grid.rows - 1);
+  const float square = (1 + about.a) * (1 + about.a) + about.b * about.b;
+  const auto pixels = static_cast<float>(pixels_);
+  int elsewhere = 0;
+  for (const Patch& patch : patches_) {
+    const auto centre = [](int first) { return static_cast<float>(first) + 0.5F * (side - 1); };
+    const float px = centre(patch.column) - middle_x, py = centre(patch.row) - middle_y;
+    const auto whole = [](float cells) { return static_cast<int>(std::lround(cells)); };
+    Patch there = patch;
+    there.column += whole(about.a * px - about.b * py + about.right);
+    there.row += whole(about.b * px + about.a * py + about.down);
+    if (there.row < 0 || there.column < 0 || there.row + side > grid.rows ||
+        there.column + side > grid.columns)
+      continue;
+    ++shift.patches;
+    sample(frame, there);
+    const float x = centre(there.column) - middle_x, y = centre(there.row) - middle_y;
+    const float u = x - about.right, v = y - about.down;
+    const float from_x = ((1 + about.a) * u + about.b * v) / square;
+    const float from_y = ((1 + about.a) * v - about.b * u) / square;
+    const Found found = find(patch, about, from_x + middle_x, from_y + middle_y);
+    if (!found.fits) continue;
+    const Pair pair{from_x - found.right, from_y - found.down, x - from_x + found.right,
+                    y - from_y + found.down};
+    pairs_.push_back(pair);
+    elsewhere += std::hypot(pair.right, pair.down) * pixels > elsewhere_px;
+  }
+  shift.seen = static_cast<int>(pairs_.size());
+  if (shift.seen < fewest) return shift;
+  Consensus consensus = agree_on_shift();
+  if (shift.seen >= fewest_turned) {
+    const Consensus similarity = agree_on_similarity();
+    if (is_clearly_better(similarity, consensus)) consensus = similarity;
+  }
+  shift.agree = consensus.agree;
+  const bool enough = 3 * shift.seen >= shift.patches;
+  const bool turned = consensus.motion.a != 0 || consensus.motion.b != 0;
+  shift.known = enough && shift.agree >= fewest &&
+                static_cast<float>(shift.agree) >=
+                    (turned ? most_if_turned : most_of_seen) * static_cast<float>(shift.seen);
+  shift.scattered = enough && !shift.known && shift.seen >= many &&
+                    static_cast<float>(elsewhere) >= most_of_seen * static_cast<float>(shift.seen);
+  const Motion& m = consensus.motion;
+  shift.right_px = m.right * pixels;
+  shift.down_px = m.down * pixels;
+  shift.sigma_px = shift.farthest_sigma_px = consensus.sigma * pixels;
+  shift.farthest_px = farthest_of(m) * pixels;
+  if (!turned) return shift;
+  shift.roll_rad = std::atan2(m.b, 1 + m.a);
+  shift.scale = std::hypot(1 + m.a, m.b);
+  const float radius = std::hypot(middle_x, middle_y);
+  shift.farthest_sigma_px *=
+      1 + radius * std::sqrt(static_cast<float>(consensus.agree)) / consensus.spread;
+  return shift;
+}
+
+// Of a picture that is turned, those in its middle tell where to look for the others.
+template <class Rows>
+PlateShift PlateWatch::follow_closely(const Rows& frame, const Motion& about) {
+  PlateShift shift = follow(frame, about);
+  for (int i = 0; i < 2 && shift.is_turned(); ++i) {
+    const PlateShift again = follow(frame, motion_of(shift));
+    if (!again.known || (shift.known && again.agree < shift.agree)) break;
+    const bool more = again.agree > shift.agree;
+    shift = again;
+    if (!more) break;
+  }
   return shift;
 }
 
@@ -295,39 +489,63 @@ PlateShift PlateWatch::look_afar(const Rows& frame) {
   }
   std::array<CoarseShift::Shift, 6> shifts;
   const std::size_t count = afar_->find(seen_afar_, shifts);
-  const auto look_about = [&](About about) {
-    const PlateShift shift = follow(frame, about);
-    if (!shift.known || shift.agree <= best.agree) return;
-    best = shift, about_ = about;
+  const auto look_about = [&](float right, float down) {
+    const PlateShift shift = follow_closely(frame, {0, 0, right, down});
+    if (shift.known && shift.agree > best.agree) best = shift;
   };
-  for (const CoarseShift::Shift& coarse : std::span(shifts).first(count)) {
-    const auto cells = [](float at) { return static_cast<int>(std::lround(at * cells_afar)); };
-    look_about({cells(coarse.right), cells(coarse.down)});
-  }
+  for (const CoarseShift::Shift& coarse : std::span(shifts).first(count))
+    look_about(coarse.right * cells_afar, coarse.down * cells_afar);
   if (best.known) return best;
   // What is within one coarse cell shows as none, and may be too far from where it was. What is
   // nearer would have been found there.
   for (int down = -beside; down <= beside; down += beside) {
-    for (int right = -beside; right <= beside; right += beside) look_about({right, down});
+    for (int right = -beside; right <= beside; right += beside)
+      look_about(static_cast<float>(right), static_cast<float>(down));
   }
-  if (best.size_px() > farthest / 2 * static_cast<float>(pixels_)) return best;
-  about_ = {};
+  if (best.farthest_px > farthest / 2 * static_cast<float>(pixels_)) return best;
   return {};
 }
 
-// Where it was seen last, where it was at first, and then anywhere.
+template <class Rows>
+PlateShift PlateWatch::look_turned(const Rows& frame) {
+  PlateShift best;
+  const std::size_t count = looks_ <= first_looks ? turns.size() : some;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& [scale, roll] = turns[next_turn_];
+    next_turn_ = (next_turn_ + 1) % turns.size();
+    const Motion about{scale * std::cos(roll) - 1, scale * std::sin(roll), 0, 0};
+    const PlateShift shift = follow_closely(frame, about);
+    if (shift.known && shift.is_turned() && shift.agree > best.agree) best = shift;
+  }
+  return best;
+}
+
+// Where it was at first, where it was seen last, and then anywhere. Folds and panels that repeat
+// themselves fit also where they are not, and so may a few patches of what moves by itself: more
+// fit where the picture is.
 template <class Rows>
 PlateShift PlateWatch::look_at(const Rows& frame) {
-  const PlateShift near = follow(frame, {});
-  if (near.known || static_cast<int>(patches_.size()) < fewest) {
+  looks_ = std::min(looks_ + 1, first_looks + 1);
+  const PlateShift near = follow_closely(frame, {});
+  if (static_cast<int>(patches_.size()) < fewest) return near;
+  if (near.known && near.farthest_px <= told_px) {
     about_ = {};
     return near;
   }
-  if (about_ != About{}) {
-    if (const PlateShift again = follow(frame, about_); again.known) return again;
+  PlateShift best = near;
+  const auto take = [&](const PlateShift& shift) {
+    if (shift.known && shift.agree > best.agree) best = shift;
+  };
+  bool again = false;
+  if (about_ != Motion{}) {
+    const PlateShift there = follow_closely(frame, about_);
+    again = there.known && there.agree >= near.agree;
+    if (again) best = there;
   }
-  const PlateShift afar = look_afar(frame);
-  return afar.known ? afar : near;
+  if (!again) take(look_afar(frame));
+  if (!best.known) take(look_turned(frame));
+  if (best.known) about_ = motion_of(best);
+  return best;
 }
 
 template PlateShift PlateWatch::look_at(const LightRows& frame);

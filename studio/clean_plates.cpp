@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -112,11 +113,38 @@ std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate,
       100 * elsewhere);
 }
 
-std::string words_for_shift(float right_px, float down_px) {
-  const auto tenths = [](float value) { return std::round(10 * value) / 10 + 0.0F; };  // none is -0
+std::string words_for_shift(const compositing::PlateShift& shift) {
+  const auto rounded = [](float value, float steps) {
+    return std::round(steps * value) / steps + 0.0F;  // none is -0
+  };
+  std::string words =
+      fmt::format("the picture is {:.1f} px further right and {:.1f} px further down",
+                  rounded(shift.right_px, 10), rounded(shift.down_px, 10));
+  const float degrees = rounded(shift.roll_rad * 180 / std::numbers::pi_v<float>, 10);
+  if (degrees != 0) {
+    words += fmt::format(", turned by {:.1f} degrees {}", std::abs(degrees),
+                         degrees > 0 ? "clockwise" : "counter-clockwise");
+  }
+  const float percent = rounded(100 * (shift.scale - 1), 10);
+  if (percent != 0)
+    words += fmt::format(", {:.1f} % {}", std::abs(percent), percent > 0 ? "larger" : "smaller");
+  return words + " than its clean plate";
+}
+
+std::string words_for_scattered() {
+  return "much in the picture lies elsewhere than on the clean plate, and not as when a camera is "
+         "moved: "
+         "take the plate anew";
+}
+
+std::string words_for_ghost(float share) {
   return fmt::format(
-      "the picture is {:.1f} px further right and {:.1f} px further down than its clean plate",
-      tenths(right_px), tenths(down_px));
+      "{:.1f} % of the picture is screen where the clean plate shows something else, as of "
+      "somebody "
+      "who stood there: it is taken for the person. Take the plate anew, or cut it away by a "
+      "garbage "
+      "mask",
+      100 * share);
 }
 
 compositing::CleanPlate read_clean_plate(const std::string& path,

@@ -36,8 +36,16 @@ std::optional<std::string> doubts_of_plate(const compositing::CleanPlate& plate,
 // What to do about a live source without a plate.
 std::string needs_plate(const std::string& uri);
 
-// How far a camera's picture has gone from its clean plate.
-std::string words_for_shift(float right_px, float down_px);
+// How far a camera's picture has gone from its clean plate: how it is shifted, and how it is turned
+// and how much larger it is, where that shows.
+std::string words_for_shift(const compositing::PlateShift& shift);
+
+// What it means that a plate's patches are scattered (PlateShift).
+std::string words_for_scattered();
+
+// What it means that so much of a frame (share of the picture) shows the screen where the clean
+// plate shows something else, and what to do.
+std::string words_for_ghost(float share);
 
 // The plate in a file, with the noise that it tells (EXR of `platelight key plate`); with no path,
 // from the source's own frames from first to last, of which some that are spread over them are

@@ -357,8 +357,9 @@ void PersonCameraFeed::key_frame() {
       by_texel_ ? keyer_->follow(image) : keyer_->key(image, texture->frame());
   confidence_ = report.confidence;
   key_ = compositing::name_of(report.status);
-  moved_px_.reset();
-  if (report.moved) moved_px_ = {report.shift.right_px, report.shift.down_px};
+  ghost_ = report.ghost;
+  moved_.reset();
+  if (report.moved) moved_ = report.shift;
   if (by_texel_) {
     texture->take(image);
     picture_ = std::make_shared<compositing::TexelKeyedPicture>(

@@ -84,8 +84,10 @@ class PersonCameraFeed {
   const compositing::Window& window() const { return window_; }
   float confidence() const { return confidence_; }
   std::string_view key() const { return key_; }
-  // How far the picture has gone from its plate, if the camera was moved: right and down, pixels.
-  std::optional<std::array<float, 2>> moved_px() const { return moved_px_; }
+  // How far the picture has gone from its plate, if the camera was moved.
+  const std::optional<compositing::PlateShift>& moved() const { return moved_; }
+  // Share of the picture in which the screen is where the plate shows something else.
+  float ghost() const { return ghost_; }
   const compositing::Feet& feet() const { return feet_; }
   bool sees_nobody() const { return has_matte_ && feet_.status == compositing::FeetStatus::absent; }
   // Edges of the person, and of all that may be its, in pixels: left, top, right, bottom. The whole
@@ -132,7 +134,8 @@ class PersonCameraFeed {
   capture::Pool<compositing::KeyedTexture> textures_;
   float confidence_ = 1;
   std::string_view key_ = "none";
-  std::optional<std::array<float, 2>> moved_px_;
+  std::optional<compositing::PlateShift> moved_;
+  float ghost_ = 0;
   compositing::Feet feet_;
   bool has_matte_ = false;
   std::optional<std::array<float, 4>> outline_;

@@ -253,16 +253,18 @@ void PersonFeed::show(Person& person, std::size_t index) {
   const bool is_told =
       why == compositing::name_of(KeyStatus::moved) || (clipped && camera.told_clipped);
   if (!why.empty() && why != camera.unsure_for && !is_told) {
-    person.notes.push_back(fmt::format("{}: the key is unsure ({})", person.name_of(index), why));
+    const bool ghost = why == compositing::name_of(KeyStatus::ghost);
+    person.notes.push_back(fmt::format("{}: the key is unsure ({}{})", person.name_of(index), why,
+                                       ghost ? ": " + words_for_ghost(camera.feed.ghost()) : ""));
   }
   camera.unsure_for = why;
   camera.told_clipped |= clipped;
-  const auto moved = camera.feed.moved_px();
+  const auto& moved = camera.feed.moved();
   if (moved && !camera.moved) {
     person.notes.push_back(fmt::format(
         "{}: its camera was moved: {}. Take the plate anew (platelight key plate, or plate = "
         "\"take\" and another number of `take`), and its pose",
-        person.name_of(index), words_for_shift((*moved)[0], (*moved)[1])));
+        person.name_of(index), words_for_shift(*moved)));
   }
   camera.moved = moved.has_value();
   if (index == 0) stand(person);

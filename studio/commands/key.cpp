@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -180,14 +181,21 @@ struct KeyedClip {
   double confidence_sum = 0, least_confidence = 1;
   std::string_view why = "good";  // of the least
   // The camera, if it was: the first frame that shows it, and the farthest.
+  std::int64_t first = 0;  // frame that is keyed
   std::optional<std::int64_t> moved_from;
   compositing::PlateShift shift;
+  bool scattered = false;
+  float ghost = 0;    // the largest share of the picture
   double key_ms = 0;  // in all
   Json rows = Json::array();
   double confidence() const { return confidence_sum / static_cast<double>(keyed); }
 };
 
 Json lost_row(std::int64_t frame) { return {{"frame", frame}, {"status", "lost"}}; }
+
+float degrees_of(const compositing::PlateShift& shift) {
+  return shift.roll_rad * 180 / std::numbers::pi_v<float>;
+}
 
 Json row_of(std::int64_t frame, const compositing::KeyReport& report) {
   Json row{{"frame", frame},
@@ -197,8 +205,13 @@ Json row_of(std::int64_t frame, const compositing::KeyReport& report) {
            {"gain", report.sight.gain},
            {"mismatch", report.sight.mismatch},
            {"clipped", report.sight.clipped},
+           {"ghost", report.ghost},
            {"soft", report.soft}};
-  if (report.moved) row["moved_px"] = {report.shift.right_px, report.shift.down_px};
+  if (report.moved) {
+    row["moved_px"] = {report.shift.right_px, report.shift.down_px};
+    row["roll_deg"] = degrees_of(report.shift);
+    row["scale"] = report.shift.scale;
+  }
   return row;
 }
 
@@ -210,8 +223,11 @@ void add(const compositing::KeyReport& report, std::int64_t frame, KeyedClip& cl
   clip.unsure += compositing::is_unsure(report.confidence);
   if (report.moved) {
     if (!clip.moved_from) clip.moved_from = frame - report.moved_for + 1;
-    if (report.shift.size_px() > clip.shift.size_px()) clip.shift = report.shift;
+    if (report.shift.farthest_px > clip.shift.farthest_px) clip.shift = report.shift;
   }
+  clip.scattered |= report.scattered;
+  if (report.status == compositing::KeyStatus::ghost)
+    clip.ghost = std::max(clip.ghost, report.ghost);
   clip.rows.push_back(row_of(frame, report));
 }
 
@@ -256,7 +272,9 @@ Json json_of(const KeyedClip& clip) {
   if (clip.moved_from) {
     moved = {{"frame", *clip.moved_from},
              {"right_px", clip.shift.right_px},
-             {"down_px", clip.shift.down_px}};
+             {"down_px", clip.shift.down_px},
+             {"roll_deg", degrees_of(clip.shift)},
+             {"scale", clip.shift.scale}};
   }
   return {{"frames", clip.frames},
           {"lost", clip.lost},
@@ -293,12 +311,20 @@ void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Co
         fmt::format("the key is unsure ({}) in {} of {} frames: look at it before it is used",
                     clip.why, clip.unsure, clip.keyed));
   }
-  if (clip.moved_from) {
-    console.warn(
-        fmt::format("the camera was moved, from frame {} on or up to 3 before: {}. Key what is "
-                    "before and after by themselves (--frames, --first), each with its own plate",
-                    *clip.moved_from, words_for_shift(clip.shift.right_px, clip.shift.down_px)));
+  if (clip.ghost > 0) console.warn(words_for_ghost(clip.ghost));
+  if (clip.scattered) console.warn(words_for_scattered());
+  if (!clip.moved_from) return;
+  const std::string how = words_for_shift(clip.shift);
+  // Two looks tell, of which the second is at the fifth frame.
+  if (compositing::is_of_another_lens(clip.shift) && *clip.moved_from <= clip.first) {
+    console.warn(fmt::format(
+        "the plate seems to be of another lens: {}. Take it anew with the lens of the clip", how));
+    return;
   }
+  console.warn(
+      fmt::format("the camera was moved, from frame {} on or up to 3 before: {}. Key what is "
+                  "before and after by themselves (--frames, --first), each with its own plate",
+                  *clip.moved_from, how));
 }
 
 void key_clip(const KeyOptions& options, Console& console) {
@@ -313,6 +339,7 @@ void key_clip(const KeyOptions& options, Console& console) {
   if (clip.by_screen && compositing::screen_share(plate.light, plate.colour) > 0)
     clip.colour = compositing::name_of(plate.colour);
   clip.known = plate.known;
+  clip.first = first;
   const auto camera = open_video(source);
   // Before the masks, which are for the video too.
   const auto [width, height] = std::pair(camera->info().width, camera->info().height);
@@ -321,8 +348,11 @@ void key_clip(const KeyOptions& options, Console& console) {
         fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", options.plate,
                     plate.light.width, plate.light.height, source.uri, width, height));
   }
-  compositing::Keyer keyer(std::move(plate), settings,
-                           read_key_masks(options.masks, width, height));
+  compositing::KeyMasks masks = read_key_masks(options.masks, width, height);
+  if (clip.by_screen && !options.plate.empty()) {
+    if (const auto doubts = doubts_of_plate(plate, masks.garbage)) console.warn(*doubts);
+  }
+  compositing::Keyer keyer(std::move(plate), settings, std::move(masks));
   compositing::ExrSequenceSettings take;
   take.dir = options.out;
   take.rate = camera->info().rate.num > 0 ? camera->info().rate : capture::Rational{25, 1};

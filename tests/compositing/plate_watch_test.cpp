@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -31,8 +32,15 @@ std::array<float, 3> room_at(float u, float v) {
   return {box, box, box};
 }
 
+// Of a camera that was pushed, turned clockwise and zoomed, about the middle of its picture.
+struct Pushed {
+  float right = 0, down = 0, roll_deg = 0, scale = 1;
+};
+
 // Through a camera that is pushed so that the picture moves to the right and down.
-Image room(float right, float down, float light = 1) {
+Image room(const Pushed& pushed, float light = 1) {
+  const float roll = pushed.roll_deg * std::numbers::pi_v<float> / 180;
+  const float along = std::cos(roll) / pushed.scale, aside = std::sin(roll) / pushed.scale;
   constexpr int finer = 4;  // samples of a pixel along each side
   Image image;
   image.height = height, image.width = width, image.channels = 3;
@@ -40,7 +48,10 @@ Image room(float right, float down, float light = 1) {
   for (int y = 0; y < finer * height; ++y) {
     for (int x = 0; x < finer * width; ++x) {
       const auto place = [](int at) { return (static_cast<float>(at) + 0.5F) / finer; };
-      const auto colour = room_at(place(x) - right, place(y) - down);
+      const float u = place(x) - 0.5F * width - pushed.right;
+      const float v = place(y) - 0.5F * height - pushed.down;
+      const auto colour =
+          room_at(0.5F * width + along * u + aside * v, 0.5F * height + along * v - aside * u);
       for (int c = 0; c < 3; ++c) {
         image.at(y / finer, x / finer, c) +=
             light / (finer * finer) * colour[static_cast<std::size_t>(c)];
@@ -50,15 +61,22 @@ Image room(float right, float down, float light = 1) {
   return image;
 }
 
+Image room(float right, float down, float light = 1) {
+  return room(Pushed{right, down, 0, 1}, light);
+}
+
 Image filmed(const Image& light, std::uint64_t seed) {
   const MadeSensor sensor{1e-4F, 1e-6F, false};
   return light_of({light.height, light.width, photograph_light(light, sensor, seed)});
 }
 
-CleanPlate plate_of_room() {
-  std::vector<Image> shots;
-  for (std::uint64_t i = 0; i < 4; ++i) shots.push_back(filmed(room(0, 0), i));
-  return average_plate(shots);
+const CleanPlate& plate_of_room() {
+  static const CleanPlate plate = [] {
+    std::vector<Image> shots;
+    for (std::uint64_t i = 0; i < 4; ++i) shots.push_back(filmed(room(0, 0), i));
+    return average_plate(shots);
+  }();
+  return plate;
 }
 
 void put_person(Image& image, float x0) {
@@ -120,6 +138,116 @@ TEST(PlateWatch, MeasuresPushesOfUpToAFifthOfThePicture) {
                              << shift.patches;
     EXPECT_NEAR(shift.right_px, right, 0.3) << down;
     EXPECT_NEAR(shift.down_px, down, 0.3) << right;
+  }
+}
+
+// A tripod's leg that gives way turns the picture too, and a ring that is touched zooms.
+TEST(PlateWatch, MeasuresTurnsAndZoomsToo) {
+  std::uint64_t seed = 1500;
+  for (const Pushed& pushed : std::vector<Pushed>{{8, 3, 0.5F, 1},
+                                                  {3, 0, -1, 1},
+                                                  {0, 0, 2, 1},
+                                                  {0, 0, -4, 1},
+                                                  {20, 10, 3, 1},
+                                                  {0, 0, 0, 1.02F},
+                                                  {0, 0, 0, 0.97F},
+                                                  {4, -3, 1, 1.06F},
+                                                  {0, 0, 0, 1.1F},
+                                                  {0, 0, 0, 0.9F}}) {
+    PlateWatch watch(plate_of_room());
+    Image light = room(pushed, 0.9F);
+    put_person(light, 250);
+    const PlateShift shift = look(watch, filmed(light, ++seed));
+    ASSERT_TRUE(shift.known) << pushed.right << ' ' << pushed.roll_deg << ' ' << pushed.scale
+                             << ": " << shift.agree << ", " << shift.seen << " of "
+                             << shift.patches;
+    EXPECT_NEAR(shift.right_px, pushed.right, 0.4) << pushed.roll_deg << ' ' << pushed.scale;
+    EXPECT_NEAR(shift.down_px, pushed.down, 0.4) << pushed.roll_deg << ' ' << pushed.scale;
+    EXPECT_NEAR(shift.roll_rad * 180 / std::numbers::pi, pushed.roll_deg, 0.1) << pushed.scale;
+    EXPECT_NEAR(shift.scale, pushed.scale, 0.002) << pushed.roll_deg;
+    EXPECT_GT(shift.farthest_px, 2);
+  }
+}
+
+// A camera that has turned by itself shows in the corners.
+TEST(PlateWatch, MakesTheKeySayThatTheCameraWasTurnedOrZoomed) {
+  for (const Pushed& pushed : std::vector<Pushed>{{0, 0, 1, 1}, {0, 0, 0, 1.02F}}) {
+    Keyer keyer(plate_of_room(), {});
+    capture::HalfImage keyed;
+    std::uint64_t seed = 1700;
+    KeyReport report;
+    for (int i = 0; i < 8; ++i) report = keyer.key(filmed(room(0, 0), ++seed), keyed);
+    EXPECT_FALSE(report.moved);
+    const Image there = room(pushed);
+    for (int i = 0; i < 9; ++i) report = keyer.key(filmed(there, ++seed), keyed);
+    EXPECT_EQ(report.status, KeyStatus::moved) << pushed.roll_deg;
+    EXPECT_LT(report.confidence, 0.6) << pushed.roll_deg;
+    EXPECT_EQ(is_of_another_lens(report.shift), pushed.scale != 1);
+  }
+}
+
+// Folds that repeat themselves fit also one fold further.
+TEST(PlateWatch, TakesFoldsThatRepeatForNoNearerPush) {
+  const auto cloth = [](float right) {
+    Image image = room(right, 0);
+    for (int y = 20; y < 255; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const float u = static_cast<float>(x) - right;
+        if (u < 70 || u >= 410) continue;
+        const float fold =
+            1 + 0.05F * std::sin(0.5F * u + 3 * std::sin(0.04F * static_cast<float>(y)));
+        for (int c = 0; c < 3; ++c) image.at(y, x, c) = (c == 1 ? 0.4F : 0.05F) * fold;
+      }
+    }
+    return image;
+  };
+  std::vector<Image> shots;
+  for (std::uint64_t i = 0; i < 4; ++i) shots.push_back(filmed(cloth(0), i));
+  for (const float push : {-30.0F, 13.0F, 25.0F, 30.0F}) {
+    PlateWatch watch(average_plate(shots));
+    const PlateShift shift = look(watch, filmed(cloth(push), 77));
+    ASSERT_TRUE(shift.known) << push;
+    EXPECT_NEAR(shift.right_px, push, 0.3);
+  }
+}
+
+// A room that was set up anew, each part of it by itself.
+TEST(PlateWatch, SaysThatMuchIsElsewhereWhereNoCameraMoved) {
+  Image image = room(0, 0);
+  for (int part = 0; part < 15; ++part) {
+    const auto angle = 2.4F * static_cast<float>(part);
+    const Image moved = room(7 * std::sin(angle), 7 * std::cos(angle));
+    for (int y = part / 5 * 90; y < (part / 5 + 1) * 90; ++y) {
+      for (int x = part % 5 * 96; x < (part % 5 + 1) * 96; ++x) {
+        for (int c = 0; c < 3; ++c) image.at(y, x, c) = moved.at(y, x, c);
+      }
+    }
+  }
+  PlateWatch watch(plate_of_room());
+  const PlateShift shift = look(watch, filmed(image, 5));
+  EXPECT_FALSE(shift.known) << shift.right_px << ' ' << shift.agree << " of " << shift.seen;
+  EXPECT_TRUE(shift.scattered) << shift.seen << " of " << shift.patches;
+  Keyer keyer(plate_of_room(), {});
+  capture::HalfImage keyed;
+  KeyReport report;
+  for (std::uint64_t i = 0; i < 5; ++i) report = keyer.key(filmed(image, i), keyed);
+  EXPECT_TRUE(report.scattered);
+  EXPECT_TRUE(is_unsure(report.confidence));
+}
+
+TEST(PlateWatch, FindsNothingScatteredOrTurnedWhereNothingMoved) {
+  for (const MadeScene& scene : made_scenes()) {
+    if (scene.shift_px != 0) continue;
+    const MadeClip clip(scene, 1, height, width);
+    std::vector<Image> shots;
+    for (int i = 0; i < 2; ++i) shots.push_back(light_of(clip.plate_shot(i)));
+    PlateWatch watch(average_plate(shots));
+    for (const int i : {0, 12, 25}) {
+      const PlateShift shift = look(watch, light_of(clip.frame(i).seen));
+      EXPECT_FALSE(shift.scattered) << scene.name;
+      EXPECT_FALSE(shift.is_turned()) << scene.name;
+      EXPECT_TRUE(!shift.known || shift.farthest_px < 1) << scene.name;
+    }
   }
 }
 

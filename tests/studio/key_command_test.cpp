@@ -203,6 +203,21 @@ TEST_F(KeyCommand, FindsAnyStillBackgroundInFootageAlone) {
   }
 }
 
+TEST_F(KeyCommand, SaysThatSomebodyStandsInThePlateAndWhatToDo) {
+  const Outcome plate =
+      run("key plate " + in("take_%04d.png") + " --colour sRGB -o " + in("plate.exr"));
+  EXPECT_THAT(plate.err, HasSubstr("of the plate is not screen"));
+  const Outcome keyed = run("key " + in("empty_%04d.png") + " --colour sRGB --plate " +
+                            in("plate.exr") + " -o " + in("keyed") + " --json " + in("key.json"));
+  ASSERT_EQ(keyed.status, 0) << keyed.err;
+  EXPECT_THAT(keyed.err, HasSubstr("of the plate is not screen"));
+  EXPECT_THAT(keyed.err, HasSubstr("the key is unsure (ghost) in 4 of 4 frames"));
+  EXPECT_THAT(keyed.err, HasSubstr("is screen where the clean plate shows something else"));
+  EXPECT_THAT(keyed.err, HasSubstr("Take the plate anew, or cut it away by a garbage mask"));
+  const auto figures = nlohmann::json::parse(content_of(in("key.json")));
+  EXPECT_GT(figures["rows"][0]["ghost"], 0.02);
+}
+
 TEST_F(KeyCommand, SaysOnceThatTheCameraWasPushed) {
   constexpr int width = 240, height = 160, frames = 24;
   constexpr std::array panels{89, 115, 135, 152, 167, 180, 192};
