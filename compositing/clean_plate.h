@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -41,9 +42,10 @@ struct CleanPlate {
 
 // The mean of frames of the empty screen, of one size, at least one. Noise is measured if there are
 // two or more. Values that are not finite, or below 0, count as 0. The screen's colour is that of
-// the mean (find_screen_colour); it need not fill the picture. Throws std::invalid_argument if
-// there are no frames, sizes differ, or a frame is not (height, width, 3).
-CleanPlate average_plate(std::span<const capture::Image> frames);
+// the mean (find_screen_colour) if none is given; it need not fill the picture. Throws
+// std::invalid_argument if there are no frames, sizes differ, or a frame is not (height, width, 3).
+CleanPlate average_plate(std::span<const capture::Image> frames,
+                         std::optional<ScreenColour> colour = {});
 
 // Takes the noise out of a screen's light, which is smooth, in place: mean over a box of 5x5
 // pixels, cut at the borders. (height, width, 3).

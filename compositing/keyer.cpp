@@ -134,6 +134,11 @@ constexpr Fall screen_in_gaps{0.001F, 0.01F};
 // before a plate too bright by 1.2, which changes nothing.
 constexpr Fall gain_above_plate{1.7F, 2.3F}, gain_below_plate{-0.45F, -0.2F};
 
+CleanPlate coloured(CleanPlate plate, std::optional<ScreenColour> colour) {
+  plate.colour = colour.value_or(plate.colour);
+  return plate;
+}
+
 }  // namespace
 
 std::string_view name_of(KeyStatus status) {
@@ -144,7 +149,7 @@ std::string_view name_of(KeyStatus status) {
 }
 
 Keyer::Keyer(CleanPlate plate, const KeySettings& settings, KeyMasks masks)
-    : light_(std::move(plate), use_of(settings.method)),
+    : light_(coloured(std::move(plate), settings.screen_colour), use_of(settings.method)),
       watch_(light_.plate()),
       settings_(settings),
       masks_(std::move(masks)) {

@@ -38,10 +38,11 @@ enum class KeyEffort : std::uint8_t {
 // One setting for all clips; the first two are what a difficult one may want.
 struct KeySettings {
   KeyMethod method = KeyMethod::screen;
-  float screen = 0.01F;       // alpha below which the screen is clear
-  float core = 0.99F;         // alpha above which the person is whole
-  float edge = 0;             // -1 thinner .. 1 fuller
-  float despill = 1;          // 0 none .. 1 all of the spill that is likely
+  std::optional<ScreenColour> screen_colour = {};  // none: as the plate has it
+  float screen = 0.01F;                            // alpha below which the screen is clear
+  float core = 0.99F;                              // alpha above which the person is whole
+  float edge = 0;                                  // -1 thinner .. 1 fuller
+  float despill = 1;                               // 0 none .. 1 all of the spill that is likely
   bool learned = true;        // the table; without it the plain ratio, for screens unlike any
   bool follows_light = true;  // the plate's gain is measured in each frame
   float smoothing = 1;        // of alpha over frames, in units of the noise; 0 = none

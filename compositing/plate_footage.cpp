@@ -91,14 +91,15 @@ void PlateShots::add(const Image& frame) {
   ++count_;
 }
 
-CleanPlate PlateShots::average() const {
+CleanPlate PlateShots::average(std::optional<ScreenColour> colour) const {
   if (count_ == 0) throw std::invalid_argument(no_frames);
   CleanPlate plate;
   plate.light = capture::make_image(last_.height, last_.width);
   std::ranges::transform(sum_, plate.light.pixels.begin(), [&](double sum) {
     return static_cast<float>(sum / static_cast<double>(count_));
   });
-  plate.colour = find_screen_colour(spread_pixels(plate.light)).value_or(mean_colour(plate.light));
+  if (!colour) colour = find_screen_colour(spread_pixels(plate.light));
+  plate.colour = colour.value_or(mean_colour(plate.light));
   if (count_ < 2) return plate;
   // Variance of one frame against its neighbour, as a line over light. That is blurred: its own
   // noise would make the line flatter.
@@ -148,14 +149,10 @@ std::vector<Light3> PlateFootage::spread_pixels() const {
   return some;
 }
 
-CleanPlate PlateFootage::screen() const {
+CleanPlate PlateFootage::screen(std::optional<ScreenColour> colour) const {
   const std::vector<Light3> pixels = spread_pixels();
-  const ScreenColour colour = find_screen_colour(pixels).value_or(ScreenColour::green);
-  return screen(colour, find_key(pixels, colour));
-}
-
-CleanPlate PlateFootage::screen(ScreenColour colour) const {
-  return screen(colour, find_key(spread_pixels(), colour));
+  if (!colour) colour = find_screen_colour(pixels).value_or(ScreenColour::green);
+  return screen(*colour, find_key(pixels, *colour));
 }
 
 CleanPlate PlateFootage::screen(ScreenColour colour, const ScreenLight& key) const {
@@ -252,10 +249,10 @@ CleanPlate PlateFootage::background() const {
   return plate;
 }
 
-CleanPlate average_plate(std::span<const Image> frames) {
+CleanPlate average_plate(std::span<const Image> frames, std::optional<ScreenColour> colour) {
   PlateShots shots;
   for (const Image& frame : frames) shots.add(frame);
-  return shots.average();
+  return shots.average(colour);
 }
 
 }  // namespace compositing

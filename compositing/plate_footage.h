@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "capture/image.h"
@@ -20,7 +21,7 @@ class PlateShots {
   // How many there were.
   std::size_t count() const { return count_; }
   // As average_plate(). Throws std::invalid_argument if there was none.
-  CleanPlate average() const;
+  CleanPlate average(std::optional<ScreenColour> colour = {}) const;
 
  private:
   std::size_t count_ = 0;
@@ -46,8 +47,7 @@ class PlateFootage {
   // find_screen_colour()'s if not given. Noise is measured where the screen is in sight (see
   // plate_noise.h), of one picture by its grain, and is never less than what is taken for it
   // untold. Throws std::invalid_argument if there was no frame.
-  CleanPlate screen() const;
-  CleanPlate screen(ScreenColour colour) const;
+  CleanPlate screen(std::optional<ScreenColour> colour = {}) const;
   // The same of any still background: of each pixel the median; one picture tells no noise. `known`
   // tells the share of pixels in which most frames are near it.
   CleanPlate background() const;

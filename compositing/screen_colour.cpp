@@ -1,7 +1,10 @@
 // Names and choice of screen colours.
 #include "compositing/screen_colour.h"
 
+#include <algorithm>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 namespace compositing {
 namespace {
@@ -12,9 +15,15 @@ constexpr std::array all{ScreenColour::red,    ScreenColour::green, ScreenColour
 }  // namespace
 
 std::string_view name_of(ScreenColour colour) {
-  constexpr std::array<std::string_view, all.size()> names{"red",    "green", "blue",
-                                                           "yellow", "cyan",  "magenta"};
-  return names[static_cast<std::size_t>(colour)];
+  return screen_colour_names[static_cast<std::size_t>(colour)];
+}
+
+ScreenColour screen_colour_from_name(std::string_view name) {
+  const auto found = std::ranges::find(screen_colour_names, name);
+  if (found == screen_colour_names.end()) {
+    throw std::invalid_argument("no screen's colour is called \"" + std::string(name) + "\"");
+  }
+  return all[static_cast<std::size_t>(found - screen_colour_names.begin())];
 }
 
 ScreenColour screen_colour_of(const std::array<float, 3>& light) {

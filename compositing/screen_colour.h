@@ -11,8 +11,12 @@ namespace compositing {
 
 // One primary stands out, or two do: a screen of green paint, or one of yellow-green light.
 enum class ScreenColour : std::uint8_t { red, green, blue, yellow, cyan, magenta };
+inline constexpr std::array<std::string_view, 6> screen_colour_names{"red",    "green", "blue",
+                                                                     "yellow", "cyan",  "magenta"};
 
 std::string_view name_of(ScreenColour colour);
+// Throws std::invalid_argument for a name that is none of them.
+ScreenColour screen_colour_from_name(std::string_view name);
 
 // The channels of a colour in the order in which the keyer takes them: the one that stands out
 // first; of two, the one that does not last.

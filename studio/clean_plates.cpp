@@ -44,6 +44,7 @@ compositing::PlateFootage spread_frames(capture::Camera& camera, int first, int 
 
 compositing::CleanPlate read_plate(const std::string& path,
                                    const VideoSource& source,
+                                   std::optional<compositing::ScreenColour> colour,
                                    const ShownPart& shown) {
   if (path.ends_with(".exr")) {
     const std::string told = capture::read_exr_transfer(path), wanted = name_of_light(source);
@@ -65,7 +66,7 @@ compositing::CleanPlate read_plate(const std::string& path,
                     path, source.uri, source.response));
   }
   const capture::Image picture = read_picture(path, source.colour, shown);
-  compositing::CleanPlate plate = compositing::average_plate(std::span(&picture, 1));
+  compositing::CleanPlate plate = compositing::average_plate(std::span(&picture, 1), colour);
   if (!path.ends_with(".exr")) return plate;
   if (const auto noise = capture::read_exr_noise(path)) {
     plate.noise_gain = std::min(noise->gain, most_noise);
@@ -149,10 +150,10 @@ std::string words_for_ghost(float share) {
 
 compositing::CleanPlate read_clean_plate(const std::string& path,
                                          const VideoSource& source,
-                                         compositing::KeyMethod method,
+                                         const compositing::KeySettings& settings,
                                          std::array<int, 2> footage,
                                          const ShownPart& shown) {
-  if (!path.empty()) return read_plate(path, source, shown);
+  if (!path.empty()) return read_plate(path, source, settings.screen_colour, shown);
   VideoSource whole = source;
   whole.first = footage[0];
   whole.loop = false;
@@ -166,7 +167,8 @@ compositing::CleanPlate read_clean_plate(const std::string& path,
     throw std::runtime_error(source.uri + " has no frame " + std::to_string(footage[0]) +
                              " to take the plate from");
   }
-  return method == compositing::KeyMethod::screen ? frames.screen() : frames.background();
+  return settings.method == compositing::KeyMethod::screen ? frames.screen(settings.screen_colour)
+                                                           : frames.background();
 }
 
 }  // namespace studio

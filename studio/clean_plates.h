@@ -51,11 +51,10 @@ std::string words_for_ghost(float share);
 // from the source's own frames from first to last, of which some that are spread over them are
 // looked at, as the method asks. Throws std::runtime_error if it cannot be read, was taken by
 // another transfer curve than the source's (it tells), or the source is live and has no file.
-compositing::CleanPlate read_clean_plate(
-    const std::string& path,
-    const VideoSource& source,
-    compositing::KeyMethod method = compositing::KeyMethod::screen,
-    std::array<int, 2> footage = {0, 479},
-    const ShownPart& shown = {});
+compositing::CleanPlate read_clean_plate(const std::string& path,
+                                         const VideoSource& source,
+                                         const compositing::KeySettings& settings = {},
+                                         std::array<int, 2> footage = {0, 479},
+                                         const ShownPart& shown = {});
 
 }  // namespace studio

@@ -167,7 +167,7 @@ compositing::CleanPlate PersonCameraFeed::read_plate(const VideoSource& source,
   const capture::CameraInfo& info = source_->info();
   if (key.plate.empty() && info.live)
     throw std::invalid_argument(needs_plate(settings_.source) + ", or plate = \"take\"");
-  auto plate = read_clean_plate(key.plate, source, key.settings.method, key.footage, shown);
+  auto plate = read_clean_plate(key.plate, source, key.settings, key.footage, shown);
   if (plate.light.width != info.width || plate.light.height != info.height) {
     throw std::invalid_argument(fmt::format(
         "the clean plate {} is {}x{}, but the video {} is {}x{}", key.plate, plate.light.width,
@@ -237,7 +237,8 @@ void PersonCameraFeed::begin_key(const VideoSource& source, const PersonCameraFe
     check_length();
     if (was && was->takes_plate && before->keyer_) plate_before_ = before->taking_->plate();
     const bool by_screen = key.settings.method == compositing::KeyMethod::screen;
-    taking_ = std::make_shared<PlateTaking>(masks_.garbage, by_screen, !info.live);
+    taking_ = std::make_shared<PlateTaking>(masks_.garbage, by_screen, !info.live,
+                                            key.settings.screen_colour);
     notes_.push_back(fmt::format(
         "takes its plate of the next {} frames: nobody may be in the picture", shots_of_plate));
   }

@@ -40,8 +40,11 @@ std::vector<float> cells_of(const capture::Image& picture) {
 
 }  // namespace
 
-PlateTaking::PlateTaking(std::vector<std::uint8_t> garbage, bool screen, bool waits)
-    : garbage_(std::move(garbage)), screen_(screen), waits_(waits) {}
+PlateTaking::PlateTaking(std::vector<std::uint8_t> garbage,
+                         bool screen,
+                         bool waits,
+                         std::optional<compositing::ScreenColour> colour)
+    : garbage_(std::move(garbage)), screen_(screen), waits_(waits), colour_(colour) {}
 
 PlateTaking::~PlateTaking() {
   if (work_.valid()) work_.wait();
@@ -110,7 +113,7 @@ void PlateTaking::watch(const capture::Image& shot) {
 }
 
 void PlateTaking::finish() {
-  auto plate = std::make_shared<const compositing::CleanPlate>(shots_->average());
+  auto plate = std::make_shared<const compositing::CleanPlate>(shots_->average(colour_));
   shots_.reset();
   if (most_moved_ > few_moved) {
     doubts_ = fmt::format("something moved in {:.0f} % of the picture meanwhile: take it anew",

@@ -23,9 +23,12 @@ inline constexpr std::size_t shots_of_plate = 50;
 class PlateTaking {
  public:
   // `garbage`: (height, width), 255 = not looked at when the plate is doubted, or empty.
-  // `screen`: it is to be a screen. `waits`: each picture counts; else those that come while one is
-  // being added are left out.
-  PlateTaking(std::vector<std::uint8_t> garbage, bool screen, bool waits);
+  // `screen`: it is to be a screen, of that colour if one is given. `waits`: each picture counts;
+  // else those that come while one is being added are left out.
+  PlateTaking(std::vector<std::uint8_t> garbage,
+              bool screen,
+              bool waits,
+              std::optional<compositing::ScreenColour> colour = {});
   ~PlateTaking();
   PlateTaking(const PlateTaking&) = delete;
   PlateTaking& operator=(const PlateTaking&) = delete;
@@ -46,6 +49,7 @@ class PlateTaking {
 
   const std::vector<std::uint8_t> garbage_;
   const bool screen_, waits_;
+  const std::optional<compositing::ScreenColour> colour_;
   std::mutex mutex_;
   std::future<void> work_;
   std::size_t given_ = 0;

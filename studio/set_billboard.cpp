@@ -43,6 +43,12 @@ KeyChoice read_key(Section table, const SetContext& context) {
   compositing::KeySettings& settings = key.settings;
   settings.method =
       method == "screen" ? compositing::KeyMethod::screen : compositing::KeyMethod::difference;
+  if (table.has("screen_colour")) {
+    std::string colour;
+    table.word("screen_colour", colour, {"red", "green", "blue", "yellow", "cyan", "magenta"});
+    if (!colour.empty()) settings.screen_colour = compositing::screen_colour_from_name(colour);
+  }
+  table.of_use_only(method == "screen", "screen_colour", "method = \"screen\"");
   table.number("screen", settings.screen, {0, 0.9});
   table.number("core", settings.core, {0.1, 1});
   if (!(settings.screen < settings.core)) table.fault("core", "must be more than screen");

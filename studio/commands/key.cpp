@@ -39,6 +39,7 @@ constexpr int plate_footage = 480;  // frames that a clip without a plate is jud
 struct KeyOptions {
   std::vector<std::string> what;
   std::string out, plate, response, colour = "Rec.1886", method = "screen", effort = "full";
+  std::string screen_colour = "any";
   bool person = false, plain_ratio = false, steady_light = false;
   std::optional<std::int64_t> frames, first;
   std::optional<double> screen, core, edge, despill, smoothing;
@@ -55,21 +56,30 @@ VideoSource source_of(const KeyOptions& options, const std::string& uri) {
   return source;
 }
 
+// Nothing if any may be it.
+std::optional<compositing::ScreenColour> screen_colour_of(const KeyOptions& options) {
+  if (options.screen_colour == "any") return std::nullopt;
+  return compositing::screen_colour_from_name(options.screen_colour);
+}
+
 // A plate of frames that come one by one, as the options ask.
 class PlateMaker {
  public:
   explicit PlateMaker(const KeyOptions& options)
-      : person_(options.person), by_screen_(options.method == "screen") {}
+      : person_(options.person),
+        by_screen_(options.method == "screen"),
+        colour_(screen_colour_of(options)) {}
 
   void add(const capture::Image& frame) { person_ ? footage_.add(frame) : shots_.add(frame); }
   std::size_t count() const { return person_ ? footage_.count() : shots_.count(); }
   compositing::CleanPlate plate() const {
-    if (!person_) return shots_.average();
-    return by_screen_ ? footage_.screen() : footage_.background();
+    if (!person_) return shots_.average(colour_);
+    return by_screen_ ? footage_.screen(colour_) : footage_.background();
   }
 
  private:
   bool person_, by_screen_;
+  std::optional<compositing::ScreenColour> colour_;
   compositing::PlateShots shots_;
   compositing::PlateFootage footage_;
 };
@@ -145,6 +155,7 @@ void make_plate(const KeyOptions& options, Console& console) {
 compositing::KeySettings settings_of(const KeyOptions& options) {
   compositing::KeySettings settings;
   if (options.method == "difference") settings.method = compositing::KeyMethod::difference;
+  settings.screen_colour = screen_colour_of(options);
   const auto take = [](const std::optional<double>& from, float& to) {
     if (from) to = static_cast<float>(*from);
   };
@@ -333,7 +344,7 @@ void key_clip(const KeyOptions& options, Console& console) {
   const int first = static_cast<int>(source.first);
   const compositing::KeySettings settings = settings_of(options);
   compositing::CleanPlate plate =
-      read_clean_plate(options.plate, source, settings.method, {first, first + plate_footage - 1});
+      read_clean_plate(options.plate, source, settings, {first, first + plate_footage - 1});
   KeyedClip clip;
   clip.by_screen = settings.method == compositing::KeyMethod::screen;
   if (clip.by_screen && compositing::screen_share(plate.light, plate.colour) > 0)
@@ -398,6 +409,9 @@ Command key_command() {
                        "of a plate: somebody is in the picture, but nowhere all the time");
         arguments.choice("--method", o->method, {"screen", "difference"},
                          "by the screen's colour, or by the distance from any still background");
+        arguments.choice("--screen-colour", o->screen_colour,
+                         {"any", "red", "green", "blue", "yellow", "cyan", "magenta"},
+                         "where something else is taken for the screen");
         arguments.option("--colour", o->colour, "the clip's transfer curve, as in a set");
         arguments.option("--response", o->response,
                          "the camera's measured response (.rsp or .toml), in place of --colour");

@@ -95,6 +95,15 @@ TEST(AveragePlate, TakesWhatIsNoNumberForBlack) {
   }
 }
 
+TEST(AveragePlate, HasTheColourThatIsGiven) {
+  const std::vector<Image> shots{even_picture(16, 16, {0.3F, 0.6F, 0.1F})};
+  EXPECT_EQ(average_plate(shots).colour, ScreenColour::green);
+  EXPECT_EQ(average_plate(shots, ScreenColour::yellow).colour, ScreenColour::yellow);
+  for (const auto name : screen_colour_names)
+    EXPECT_EQ(name_of(screen_colour_from_name(name)), name);
+  EXPECT_THROW(screen_colour_from_name("pink"), std::invalid_argument);
+}
+
 TEST(AveragePlate, RefusesShotsOfTwoSizesAndNone) {
   const std::vector<Image> shots{even_picture(16, 16, {0, 1, 0}), even_picture(16, 18, {0, 1, 0})};
   EXPECT_THAT([&] { average_plate(shots); },

@@ -322,6 +322,33 @@ TEST_F(KeyCommand, SaysThatAGreyWallIsNoScreen) {
   EXPECT_EQ(clip["confidence_mean"], 0);
 }
 
+// Half of the picture is as red as the rest is green.
+TEST_F(KeyCommand, TakesTheColourThatItIsTold) {
+  std::vector<std::uint8_t> halves;
+  for (int i = 0; i < 40 * 20; ++i) {
+    halves.insert(halves.end(), {i % 40 < 20 ? std::uint8_t{190} : std::uint8_t{40},
+                                 i % 40 < 20 ? std::uint8_t{40} : std::uint8_t{190}, 40});
+  }
+  capture::write_png(dir_ / "halves.png", 40, 20, 3, halves);
+  for (const std::string colour : {"any", "red", "green"}) {
+    const Outcome plate = run("key plate " + in("halves.png") + " -o " + in("plate.exr") +
+                              " --screen-colour " + colour);
+    EXPECT_THAT(plate.out, HasSubstr(colour == "red" ? "a red screen" : "a green screen"));
+    // Of footage, and of a plate in a file.
+    for (const std::string& with : {std::string(), " --plate " + in("plate.exr")}) {
+      const Outcome keyed = run("key " + in("halves.png") + with + " --screen-colour " + colour +
+                                " -o " + in("keyed_" + colour));
+      EXPECT_EQ(keyed.status, 0) << keyed.err;
+      const capture::Image matte = capture::read_exr(in("keyed_" + colour + "/frame.000000.exr"));
+      const float left = matte.at(10, 5, matte.channels - 1);
+      EXPECT_EQ(left < 0.1F, colour == "red") << colour << with << left;
+    }
+  }
+  const Outcome pink = run("key " + in("halves.png") + " --screen-colour pink -o " + in("keyed"));
+  EXPECT_NE(pink.status, 0);
+  EXPECT_THAT(pink.err, HasSubstr("pink"));
+}
+
 TEST_F(KeyCommand, TakesAPlateOfAScreenWithSomebodyBeforeIt) {
   const Outcome plate =
       run("key plate " + in("take_%04d.png") + " --colour sRGB --person -o " + in("plate.exr"));
