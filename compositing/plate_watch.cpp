@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -490,8 +491,9 @@ PlateShift PlateWatch::look_afar(const Rows& frame) {
   std::array<CoarseShift::Shift, 6> shifts;
   const std::size_t count = afar_->find(seen_afar_, shifts);
   const auto look_about = [&](float right, float down) {
-    const PlateShift shift = follow_closely(frame, {0, 0, right, down});
-    if (shift.known && shift.agree > best.agree) best = shift;
+    const Motion about{0, 0, std::round(right), std::round(down)};
+    const PlateShift shift = follow_closely(frame, about);
+    if (shift.known && shift.agree > best.agree) best = shift, found_about_ = about;
   };
   for (const CoarseShift::Shift& coarse : std::span(shifts).first(count))
     look_about(coarse.right * cells_afar, coarse.down * cells_afar);
@@ -515,7 +517,8 @@ PlateShift PlateWatch::look_turned(const Rows& frame) {
     next_turn_ = (next_turn_ + 1) % turns.size();
     const Motion about{scale * std::cos(roll) - 1, scale * std::sin(roll), 0, 0};
     const PlateShift shift = follow_closely(frame, about);
-    if (shift.known && shift.is_turned() && shift.agree > best.agree) best = shift;
+    if (shift.known && shift.is_turned() && shift.agree > best.agree)
+      best = shift, found_about_ = about;
   }
   return best;
 }
@@ -528,23 +531,32 @@ PlateShift PlateWatch::look_at(const Rows& frame) {
   looks_ = std::min(looks_ + 1, first_looks + 1);
   const PlateShift near = follow_closely(frame, {});
   if (static_cast<int>(patches_.size()) < fewest) return near;
+  const bool was_near = std::exchange(is_near_, false);
   if (near.known && near.farthest_px <= told_px) {
     about_ = {};
     return near;
   }
   PlateShift best = near;
   const auto take = [&](const PlateShift& shift) {
-    if (shift.known && shift.agree > best.agree) best = shift;
+    const bool is_better = shift.known && shift.agree > best.agree;
+    if (is_better) best = shift, about_ = found_about_;
+    return is_better;
   };
-  bool again = false;
   if (about_ != Motion{}) {
     const PlateShift there = follow_closely(frame, about_);
-    again = there.known && there.agree >= near.agree;
-    if (again) best = there;
+    if (there.known && there.agree >= near.agree) {
+      if (there.is_turned()) about_ = motion_of(there);
+      return there;
+    }
   }
-  if (!again) take(look_afar(frame));
-  if (!best.known) take(look_turned(frame));
-  if (best.known) about_ = motion_of(best);
+  is_near_ = near.known;
+  if (is_near_ && was_near) return near;
+  if (take(look_afar(frame)) || (!near.known && take(look_turned(frame)))) is_near_ = false;
+  if (best.known && best.is_turned()) {
+    about_ = motion_of(best);
+  } else if (is_near_) {
+    about_ = {};
+  }
   return best;
 }
 

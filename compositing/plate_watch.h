@@ -133,7 +133,9 @@ class PlateWatch {
   std::vector<Patch> patches_;
   std::optional<CoarseShift> afar_;  // none of pictures that are smaller than its cells
   std::vector<float> seen_afar_;     // light of its cells
-  Motion about_;                     // where it was seen last, if that is elsewhere
+  Motion about_;                     // about which it was found last, if that is elsewhere
+  Motion found_about_;               // the same of what was looked for anywhere
+  bool is_near_ = false;             // nothing fitted better anywhere than near its place
   int looks_ = 0;                    // so far, as far as it matters
   std::size_t next_turn_ = 0;        // that is looked for
   std::array<std::array<float, side * side>, levels> seen_{};  // of the patch at hand

@@ -122,12 +122,13 @@ std::string words_for_shift(const compositing::PlateShift& shift) {
       fmt::format("the picture is {:.1f} px further right and {:.1f} px further down",
                   rounded(shift.right_px, 10), rounded(shift.down_px, 10));
   const float degrees = rounded(shift.roll_rad * 180 / std::numbers::pi_v<float>, 10);
-  if (degrees != 0) {
+  if (std::abs(degrees) > 0.15F) {  // as well as it is known
+
     words += fmt::format(", turned by {:.1f} degrees {}", std::abs(degrees),
                          degrees > 0 ? "clockwise" : "counter-clockwise");
   }
   const float percent = rounded(100 * (shift.scale - 1), 10);
-  if (percent != 0)
+  if (std::abs(percent) > 0.25F)
     words += fmt::format(", {:.1f} % {}", std::abs(percent), percent > 0 ? "larger" : "smaller");
   return words + " than its clean plate";
 }

@@ -257,6 +257,50 @@ TEST_F(KeyCommand, SaysOnceThatTheCameraWasPushed) {
   EXPECT_EQ(figures["unsure"], 8);  // known from the second look on
 }
 
+TEST_F(KeyCommand, SaysThatThePlateSeemsToBeOfAnotherLens) {
+  constexpr int width = 480, height = 320;
+  const auto write_room = [&](const std::string& name, double scale) {
+    std::vector<std::uint8_t> codes;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const double u = (x - 0.5 * width) / scale, v = (y - 0.5 * height) / scale;
+        const bool cloth = std::abs(u) < 120 && v > -100;
+        const double panel = 140 + 50 * std::sin(0.11 * u + 0.5 * std::sin(0.05 * v)) +
+                             45 * std::cos(0.09 * v + 0.7 * std::sin(0.04 * u));
+        for (const int code : {40, 180, 60})
+          codes.push_back(static_cast<std::uint8_t>(cloth ? code : panel));
+      }
+    }
+    capture::write_png(in(name), width, height, 3, codes);
+  };
+  write_room("near.png", 1);
+  ASSERT_EQ(run("key plate " + in("near.png") + " --colour sRGB -o " + in("near.exr")).status, 0);
+  for (const double scale : {1.0, 1.03, 0.95}) {
+    for (int i = 0; i < 6; ++i) write_room(fmt::format("lens_{:04}.png", i), scale);
+    const Outcome keyed = run("key " + in("lens_%04d.png") + " --colour sRGB --plate " +
+                              in("near.exr") + " -o " + in("keyed"));
+    ASSERT_EQ(keyed.status, 0) << keyed.err;
+    if (scale == 1.0) {
+      EXPECT_THAT(keyed.err, Not(HasSubstr("lens")));
+      continue;
+    }
+    EXPECT_THAT(keyed.err, HasSubstr("the plate seems to be of another lens")) << scale;
+    EXPECT_THAT(keyed.err, testing::ContainsRegex(scale > 1 ? "(2.9|3.0|3.1) % larger"
+                                                            : "(4.9|5.0|5.1) % smaller"));
+  }
+}
+
+TEST_F(KeyCommand, SaysOfAShiftWhatShows) {
+  compositing::PlateShift shift;
+  shift.right_px = 8.04F, shift.down_px = -0.02F;
+  EXPECT_EQ(words_for_shift(shift),
+            "the picture is 8.0 px further right and 0.0 px further down than its clean plate");
+  shift.roll_rad = -0.01746F, shift.scale = 1.021F;
+  EXPECT_EQ(words_for_shift(shift),
+            "the picture is 8.0 px further right and 0.0 px further down, turned by 1.0 degrees "
+            "counter-clockwise, 2.1 % larger than its clean plate");
+}
+
 TEST_F(KeyCommand, IsUnsureOfAScreenAtTheCamerasLimit) {
   const compositing::MadeClip clip(compositing::made_scene("over-exposed"), 4, 90, 160);
   for (int i = 0; i < 4; ++i) write_picture("empty", i, clip.plate_shot(i));
