@@ -237,9 +237,8 @@ class QuickPass {
       const auto row = static_cast<std::size_t>(i);
       const F8 alpha = h.alpha[row];
       store_.mark_written(h.block, h.first + row, any_of(alpha > 0.0F));
-      store_.write(
-          foreground_of<false>(h.light[row], h.plate, {alpha, h.matte.spill}, in_.dials.despill),
-          h.count, store_.pixels(h.y + i, h.x));
+      store_.write(foreground_of<false>(h.light[row], h.plate, {alpha, h.matte.spill}, in_.dials),
+                   h.count, store_.pixels(h.y + i, h.x));
     }
   }
 
