@@ -253,7 +253,9 @@ void PersonFeed::show(Person& person, std::size_t index) {
   const bool is_told =
       why == compositing::name_of(KeyStatus::moved) || (clipped && camera.told_clipped);
   if (!why.empty() && why != camera.unsure_for && !is_told) {
-    person.notes.push_back(fmt::format("{}: the key is unsure ({})", person.name_of(index), why));
+    const bool thin = why == compositing::name_of(KeyStatus::thin);
+    person.notes.push_back(fmt::format("{}: the key is unsure ({}){}{}", person.name_of(index), why,
+                                       thin ? ": " : "", thin ? compositing::advice_if_thin : ""));
   }
   camera.unsure_for = why;
   camera.told_clipped |= clipped;
