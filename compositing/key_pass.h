@@ -67,6 +67,8 @@ class KeyPass {
     scratch_.has_previous = true;
     return store_.soft();
   }
+  // Of pixels deep within persons, how many lie in eights of which half or more are so.
+  std::int64_t thin() const { return thin_; }
 
  private:
   static constexpr std::size_t together = 16;  // blocks: they stay in the nearest cache
@@ -304,8 +306,10 @@ class KeyPass {
   void put(int y, const KeyBlock& block) {
     if (!any_of(block.matte.alpha > 0.0F)) return store_.clear_pixels(y, block.x, block.count);
     store_.mark_written(y, block.x);
-    store_.write(formula_.foreground(block.light, block.plate, block.matte), block.count,
-                 store_.pixels(y, block.x));
+    const bool mostly_soft =
+        store_.write(formula_.foreground(block.light, block.plate, block.matte), block.count,
+                     store_.pixels(y, block.x));
+    if (mostly_soft && in_.plate.near.at(y, block.x + key_lanes / 2) <= 0) thin_ += key_lanes;
   }
 
   const Source& source_;
@@ -318,6 +322,7 @@ class KeyPass {
   std::array<std::size_t, 2> waiting_{};  // of blocks, of two rows
   std::array<float*, 3> change_{};
   bool smooths_ = false;
+  std::int64_t thin_ = 0;
 };
 
 }  // namespace compositing

@@ -147,19 +147,22 @@ class KeyStore {
     out_.written[8 * block + row] = written ? 1 : 0;
   }
 
-  void write(const KeyedTexel<F8>& texel, int count, capture::Half* to) {
+  // Returns whether there are eight, of which half or more are neither clear nor whole.
+  bool write(const KeyedTexel<F8>& texel, int count, capture::Half* to) {
     const F8 part = texel.alpha * (1.0F - texel.alpha);
     const I8 soft = part > 0.0475F;  // .05 < alpha < .95
     if (count == key_lanes) {
-      soft_ += count_of(soft);
+      const int softs = count_of(soft);
+      soft_ += softs;
       write_eight(in_order(texel), to);
-      return;
+      return 2 * softs >= key_lanes;
     }
     const auto rgba = in_order(texel);
     for (int i = 0; i < count; ++i) {
       soft_ -= soft[i];
       for (std::size_t c = 0; c < 4; ++c) *to++ = capture::half_from_float(rgba[c][i]);
     }
+    return false;
   }
   // Eight that are whole, in the picture's order.
   static void write_whole(const std::array<F8, 3>& rgb, capture::Half* to) {

@@ -15,7 +15,13 @@ namespace compositing {
 // Where a colour lies in the table: the screen's share k = excess / excess of the plate, then, of
 // what is left without k times the plate, how bright the other two channels are against the plate's
 // excess, and which of them is more. So bare screen is at k = 1 and 0, however pale it is.
-inline constexpr int table_shares = 33, table_lights = 17, table_hues = 17;
+inline constexpr int table_shares = 33, table_lights = 19, table_hues = 17;
+// The share at the first place, and over how much more the places go.
+inline constexpr float least_table_share = -0.25F, table_share_range = 1.5F;
+// Brightness b, the sum of what is left of the two channels, is at b / (b + .3) of this many
+// places: up to 2.65, for cloth that is yellow or pale green is told from a mixture by being
+// brighter than what shines through half could be.
+inline constexpr float table_half_light = 0.3F, table_light_scale = 20;
 
 template <class V>
 struct TablePlace {
@@ -31,11 +37,12 @@ inline F8 lanes_like(F8, float value) { return all_of(value); }
 template <class V>
 [[gnu::always_inline]] inline TablePlace<V> place_in_table(V share, V second, V third) {
   const V zero = lanes_like(share, 0), one = lanes_like(share, 1);
-  const V k = least(most((share + 0.25F) * (1 / 1.5F), zero), one);
+  const V k = least(most((share - least_table_share) * (1 / table_share_range), zero), one);
   const V sum = most(second + third + 0.05F, zero);
-  const V light = least(sum / (sum + 0.3F) * 1.25F, one);
+  const V light = least(sum / (sum + table_half_light) * table_light_scale,
+                        lanes_like(share, table_lights - 1));
   const V hue = least(most((second - third) / (sum + 0.1F), -one), one);
-  return {k * static_cast<float>(table_shares - 1), light * static_cast<float>(table_lights - 1),
+  return {k * static_cast<float>(table_shares - 1), light,
           (hue * 0.5F + 0.5F) * static_cast<float>(table_hues - 1)};
 }
 

@@ -9,6 +9,15 @@
 
 namespace compositing {
 
+// How much of the screen's primary skin has at least, as a share of the mean of its two other
+// channels, and of its red: what is dark skin must not pass for less of that with spill on it. 0
+// bounds nothing.
+struct SkinPrimary {
+  float of_others = 0;
+  float of_red = 0;
+};
+SkinPrimary skin_before(ScreenColour colour);
+
 // How keyed alpha becomes the matte: what the settings come to.
 struct KeyDials {
   const KeyTable* table = nullptr;  // null: the plain ratio
@@ -17,6 +26,7 @@ struct KeyDials {
   float edge = 0;                   // -1 thinner .. 1 fuller
   float despill = 1;                // share of the spill that is taken away
   bool tells_skin = false;          // of a yellow screen
+  SkinPrimary skin{};               // of a screen of one primary
 };
 
 // Skin is much more red than green, but has a third or more of the colour of a yellow wall, and
@@ -140,6 +150,22 @@ template <bool two_primaries, class V>
   return matte_between(share_of<two_primaries>(c, p, over_excess, dials), over_excess, near, dials);
 }
 
+// The most of the plate that can be on a texel if that is skin, dark as it may be, or anything that
+// has more of the primary: what it has over skin. Something is likely, a twentieth of the texel;
+// and what is redder than any skin is bound by nothing. (Made skin, .02 to .4 of green, and its
+// shades: Keyer.DarkSkinKeepsItsColour.)
+template <class V>
+[[gnu::always_inline]] inline V most_on_skin(const std::array<V, 3>& c,
+                                             const std::array<V, 3>& p,
+                                             const SkinPrimary& skin) {
+  constexpr float always = 0.06F, steep = 4;
+  const float half = 0.5F * skin.of_others;
+  const V over_skin = less_times(c[0], lanes_like(c[0], half), c[1] + c[2]);
+  const V redder = steep * (skin.of_red * c[1] - c[0]);
+  const V plate = less_times(p[0], lanes_like(c[0], half), p[1] + p[2]);
+  return most(most(over_skin, always * c[0]), redder) / most(plate, lanes_like(plate, 1e-6F));
+}
+
 // The most that skin is green over blue, as a share of red over green.
 inline constexpr float most_yellow_of_skin = 1.0F;
 
@@ -149,11 +175,14 @@ template <bool two_primaries, class V>
 [[gnu::always_inline]] inline KeyedTexel<V> foreground_of(const std::array<V, 3>& c,
                                                           const std::array<V, 3>& p,
                                                           const TexelMatte<V>& matte,
-                                                          float despill,
-                                                          bool keeps_skin = false) {
+                                                          const KeyDials& dials) {
+  const float despill = dials.despill;
   const V zero = lanes_like(matte.alpha, 0), one = lanes_like(matte.alpha, 1);
-  const V taken =
-      times_plus(lanes_like(zero, despill < 1 ? despill : 1.0F), matte.spill, one - matte.alpha);
+  const V clear = one - matte.alpha;
+  V taken = times_plus(lanes_like(zero, despill < 1 ? despill : 1.0F), matte.spill, clear);
+  if constexpr (!two_primaries) {
+    if (dials.skin.of_others > 0) taken = most(least(taken, most_on_skin(c, p, dials.skin)), clear);
+  }
   V f0 = most(less_times(c[0], taken, p[0]), zero), f1 = most(less_times(c[1], taken, p[1]), zero);
   V f2 = most(less_times(c[2], taken, p[2]), zero);
   if constexpr (!two_primaries) {
@@ -165,7 +194,7 @@ template <bool two_primaries, class V>
     f0 = least(f0, kept > 0 ? limit + kept * f0 : limit);
   }
   if constexpr (two_primaries) {
-    if (keeps_skin) {
+    if (dials.tells_skin) {
       // No more yellow than skin is, nor more green than anything else.
       const float share = despill < 1 ? despill : 1.0F;
       const V yellow = least(f0, f1) - f2 - most_yellow_of_skin * most(f1 - f0, zero);

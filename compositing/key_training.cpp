@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string_view>
 #include <vector>
 
+#include "capture/parallel_loop.h"
 #include "compositing/clean_plate.h"
 #include "compositing/made_clip.h"
 
@@ -24,6 +27,28 @@ constexpr double mixed_pixels = 2;
 // many pixels each of theirs counts.
 constexpr std::uint32_t persons_in_fur = 6;
 constexpr double share_of_fur = 1.5;
+// Persons in clothes with some of the screen's colour teach what lies deep within persons: near the
+// screen the edges of others, brighter against it, look the same. Each before the screen in another
+// light, so that clothes are brighter and darker against it.
+constexpr double share_of_cloth = 0.1;
+constexpr std::array<float, 3> lights_for_cloth{0.6F, 1, 1.5F};
+constexpr std::array<std::string_view, 8> scenes_for_cloth{"plain", "uneven", "shadow", "spill",
+                                                           "blond", "4:2:0",  "noise",  "studio"};
+
+// What would have to be brighter than white before a screen of common light, or than colourful
+// cloth, if so much of the screen shone through, is more of the person than that, and all of it
+// from some brightness on: what pulls where hardly any pixel has been seen. nullopt: the plain
+// ratio.
+std::optional<double> alpha_of_bright(int k, int l, int h) {
+  constexpr double white = 5.7, less_of_hue = 0.5, least = 0.2, whole = 1.3;
+  const double share = least_table_share + double{table_share_range} * k / (table_shares - 1);
+  const double part = l / static_cast<double>(table_light_scale);
+  const double light = table_half_light * part / (1 - part) - 0.05;
+  const double hue = std::abs(2 * h / (table_hues - 1.0) - 1);
+  if (share <= 0.05 || light <= least) return std::nullopt;
+  if (light <= white * (1 - less_of_hue * hue) * std::max(1 - share, 0.02)) return std::nullopt;
+  return std::min(std::max(1 - share, light / whole), 1.0);
+}
 
 class Learner {
  public:
@@ -46,19 +71,41 @@ class Learner {
     }
   }
 
+  void add(const Learner& other) {
+    for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] += other.sums_[i];
+  }
+
+  // Up to so small a share of the screen, what is brighter than this is one place: cloth and fur of
+  // all lights, for finer ones would tell made persons apart.
+  void pool_bright() {
+    constexpr int shares = 9, first = 16;  // a share of .125, a brightness of 1.2
+    for (int h = 0; h < table_hues; ++h) {
+      for (int k = 0; k < shares; ++k) {
+        for (std::size_t of = 0; of < 4; ++of) {
+          double sum = 0;
+          for (int l = first; l < table_lights; ++l) sum += sums_[4 * index(k, l, h) + of];
+          for (int l = first; l < table_lights; ++l) sums_[4 * index(k, l, h) + of] = sum;
+        }
+      }
+    }
+  }
+
   using Values = std::vector<std::array<double, 2>>;  // alpha and plate
 
   // What no pixel has shown is as its neighbours are.
   Values values() const {
     Values values(places);
     std::vector<char> known(places);
-    for (std::size_t i = 0; i < places; ++i) {
-      const double* sum = &sums_[4 * i];
-      if (sum[0] <= 0) continue;
-      const double plain = std::clamp(sum[3] / sum[0], 0.0, 1.0);
-      values[i] = {(sum[1] + prior_pixels * (1 - plain)) / (sum[0] + prior_pixels),
-                   (sum[2] + prior_pixels * plain) / (sum[0] + prior_pixels)};
-      known[i] = 1;
+    for (int i = 0; i < static_cast<int>(places); ++i) {
+      const double* sum = &sums_[4 * static_cast<std::size_t>(i)];
+      const int l = i % table_lights, k = i / table_lights % table_shares;
+      const auto bright = alpha_of_bright(k, l, i / (table_lights * table_shares));
+      if (sum[0] <= 0 && !bright) continue;
+      const double plain = bright ? 1 - *bright : std::clamp(sum[3] / sum[0], 0.0, 1.0);
+      values[static_cast<std::size_t>(i)] = {
+          (sum[1] + prior_pixels * (1 - plain)) / (sum[0] + prior_pixels),
+          (sum[2] + prior_pixels * plain) / (sum[0] + prior_pixels)};
+      known[static_cast<std::size_t>(i)] = 1;
     }
     while (std::count(known.begin(), known.end(), 0) > 0) spread(values, known);
     return values;
@@ -123,7 +170,16 @@ struct Learners {
   Learner all, near, deep;
 };
 
-void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learners& learners) {
+// What the pixels of a clip teach, and for how many each counts.
+struct Lesson {
+  double pixels;
+  bool deep_only = false;
+};
+
+void learn_frame(const MadeFrame& made,
+                 const Lesson& lesson,
+                 PlateLight& light,
+                 Learners& learners) {
   const capture::Image seen = light_of(made.seen);
   light.update(seen, true);
   const LitPlate& lit = light.lit();
@@ -142,40 +198,59 @@ void learn_frame(const MadeFrame& made, double pixels, PlateLight& light, Learne
       const auto rest = [&](std::size_t i) { return (c(i) - share * p[i]) * p[3]; };
       const float alpha = made.truth.at(y, x, 3);
       const bool mixed = alpha > 0.02F && alpha < 0.98F;
-      const double weight = mixed ? mixed_pixels * pixels : pixels;
+      const double weight = mixed ? mixed_pixels * lesson.pixels : lesson.pixels;
       const float near = lit.near.at(y, x);
       const auto learn = [&](Learner& learner, double part) {
         if (part <= 0) return;
         learner.add(place_in_table(share, rest(1), rest(2)), share, alpha,
                     static_cast<float>(dot / square), part * weight);
       };
-      learn(learners.all, 1), learn(learners.near, near), learn(learners.deep, 1 - near);
+      if (!lesson.deep_only) learn(learners.all, 1), learn(learners.near, near);
+      learn(learners.deep, 1 - near);
     }
   }
 }
 
-void learn_clip(const MadeClip& clip, double pixels, Learners& learners) {
+void learn_clip(const MadeClip& clip, const Lesson& lesson, Learners& learners) {
   std::vector<capture::Image> shots;
   for (int i = 0; i < 8; ++i) shots.push_back(light_of(clip.plate_shot(i)));
   PlateLight light(average_plate(shots));
-  for (const int frame : frames_of_a_clip) learn_frame(clip.frame(frame), pixels, light, learners);
+  for (const int frame : frames_of_a_clip) learn_frame(clip.frame(frame), lesson, light, learners);
+}
+
+void learn_seed(std::uint32_t seed, bool any_colours, Learners& learners) {
+  for (MadeScene scene : made_scenes()) {
+    if (has_two_primaries(screen_colour_of(scene.screen))) continue;  // uses what others teach
+    const bool in_fur = scene.actor.fur > 0;
+    scene.actor.any_colours = any_colours && !in_fur;
+    const double pixels = in_fur ? share_of_fur : scene.actor.any_colours ? share_of_any : 1;
+    std::uint32_t person = 0;
+    for (; person < (in_fur ? persons_in_fur : 1); ++person) {
+      learn_clip(MadeClip(scene, seed + 1000 * person), {pixels}, learners);
+    }
+    if (std::ranges::find(scenes_for_cloth, scene.name) == scenes_for_cloth.end()) continue;
+    scene.actor.green_clothes = true;
+    const float lamps = scene.light;
+    for (const float light : lights_for_cloth) {
+      scene.light = light * lamps;
+      learn_clip(MadeClip(scene, seed + 1000 * (9 + person++)), {share_of_cloth, true}, learners);
+    }
+  }
 }
 
 }  // namespace
 
 TableCodes train_key_table(std::span<const std::uint32_t> seeds) {
+  std::vector<Learners> of_seeds(seeds.size());
+  capture::parallel_for(std::size_t{0}, seeds.size(),
+                        [&](std::size_t i) { learn_seed(seeds[i], i % 2 == 1, of_seeds[i]); });
   Learners learners;
-  for (std::size_t i = 0; i < seeds.size(); ++i) {
-    for (MadeScene scene : made_scenes()) {
-      if (has_two_primaries(screen_colour_of(scene.screen))) continue;  // uses what others teach
-      const bool in_fur = scene.actor.fur > 0;
-      scene.actor.any_colours = i % 2 == 1 && !in_fur;
-      const double pixels = in_fur ? share_of_fur : scene.actor.any_colours ? share_of_any : 1;
-      for (std::uint32_t person = 0; person < (in_fur ? persons_in_fur : 1); ++person) {
-        learn_clip(MadeClip(scene, seeds[i] + 1000 * person), pixels, learners);
-      }
-    }
+  for (const Learners& of_seed : of_seeds) {
+    learners.all.add(of_seed.all);
+    learners.near.add(of_seed.near);
+    learners.deep.add(of_seed.deep);
   }
+  for (Learner* learner : {&learners.all, &learners.near, &learners.deep}) learner->pool_bright();
   const Learner::Values of_all = learners.all.values();
   return {learners.near.codes(of_all), learners.deep.codes(of_all)};
 }

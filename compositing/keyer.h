@@ -63,12 +63,18 @@ enum class KeyStatus : std::uint8_t {
   shadowed,  // a shadow on the screen is so deep that it may pass for the person
   noisy,     // the screen's share of a pixel is uncertain
   misfit,    // what is in sight is not the plate: moved, stale, or not this screen
+  thin,      // what is deep within persons is half transparent: veil, glass, or clothes that are
+             // too much like the screen
   moved,     // the camera is not where it was when the plate was taken
   ghost,     // the screen is in sight where the plate shows something else: it stays for good
   unlit,     // light has changed beyond what is followed
   no_screen  // the plate shows none
 };
 std::string_view name_of(KeyStatus status);
+inline constexpr std::string_view advice_if_thin =
+    "a person is half transparent within; if that is no veil or glass, the clothes are too much "
+    "like "
+    "the screen: hold them with a core mask, or wear others";
 
 struct KeyReport {
   float confidence = 1;                // 0..1; falls before the picture breaks
@@ -83,6 +89,7 @@ struct KeyReport {
   // last (PlateGaps): looked for as often.
   float ghost = 0;
   float soft = 0;  // share of pixels that are neither screen nor person
+  float thin = 0;  // the same of what lies deep within persons, by eights of pixels
 };
 
 // Whether a camera that was moved is seen larger or smaller than its plate, as another lens does
@@ -137,15 +144,20 @@ class Keyer {
   Target target(capture::HalfImage& keyed);
   KeyReport key_light(const capture::Image& frame, const Target& target);
   KeyReport key_codes(const CodedFrame& frame, const Target& target);
+  // Shares of pixels that are neither screen nor person, as KeyReport has them.
+  struct Soft {
+    float soft = 0, thin = 0;
+  };
+  static Soft soft_of(std::int64_t soft, std::int64_t thin, std::int64_t deep, std::size_t pixels);
   template <class Source>
-  float key_rows(const Source& source,
-                 std::span<const typename Source::Bounds> bare,
-                 const Target& target);
+  Soft key_rows(const Source& source,
+                std::span<const typename Source::Bounds> bare,
+                const Target& target);
   template <class Source>
-  float key_quickly(const Source& source,
-                    std::span<const typename Source::Bounds> bare,
-                    float sigma,
-                    const Target& target);
+  Soft key_quickly(const Source& source,
+                   std::span<const typename Source::Bounds> bare,
+                   float sigma,
+                   const Target& target);
   // Noise of the screen's share in a frame's light.
   float sigma(const PlateSight& sight) const {
     return light_.sigma_under(settings_.follows_light ? sight.gain : 1);
@@ -153,7 +165,7 @@ class Keyer {
   bool glances() const;
   template <class Rows>
   void watch(const Rows& rows, float gain);
-  KeyReport report(const PlateSight& sight, float soft) const;
+  KeyReport report(const PlateSight& sight, const Soft& soft) const;
 
   PlateLight light_;
   std::shared_ptr<const FilteredPlate> filtered_;

@@ -115,6 +115,17 @@ ActorColour any_colour(std::uint32_t seed) {
   return colour;
 }
 
+// Of cloth with some green in it: yellow, lime and olive, pale and muted greens down to mint, teal.
+// None is as green as a screen.
+ActorColour greenish_colour(std::uint32_t seed) {
+  Draws draws(seed);
+  const float kind = draws.next(), green = 0.06F * std::pow(10.0F, draws.next());
+  const float a = draws.next(), b = draws.next();
+  if (kind < 0.4F) return {green * (0.75F + 0.5F * a), green, green * (0.08F + 0.62F * b)};
+  if (kind < 0.8F) return {green * (0.55F + 0.35F * a), green, green * (0.15F + 0.7F * b)};
+  return {green * (0.3F + 0.4F * a), green, green * (0.9F + 0.3F * b)};
+}
+
 ActorColour hair_colour(const MadeActor& actor, std::uint32_t seed) {
   if (actor.hair == MadeHair::white) {  // yellowish to bluish
     Draws draws(seed * 13 + 2);
@@ -217,11 +228,12 @@ struct Wardrobe {
 };
 
 Wardrobe wardrobe_of(const MadeActor& actor, std::uint32_t seed) {
+  if (actor.green_clothes) {
+    return {greenish_colour(seed * 11 + 6), greenish_colour(seed * 11 + 7),
+            greenish_colour(seed * 11 + 8)};
+  }
   if (actor.any_colours) {
     return {any_colour(seed * 11 + 3), any_colour(seed * 11 + 4), any_colour(seed * 11 + 5)};
-  }
-  if (actor.green_clothes) {
-    return {{0.12F, 0.19F, 0.10F}, {0.10F, 0.28F, 0.30F}, {0.45F, 0.50F, 0.08F}};
   }
   Draws draws(seed * 7 + 3);
   const bool red = draws.next() < 0.5F;

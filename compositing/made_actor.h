@@ -13,7 +13,7 @@ enum class MadeHair : std::uint8_t { brown, blond, black, white };
 
 struct MadeActor {
   MadeHair hair = MadeHair::brown;
-  bool green_clothes = false;  // muted greens and a teal, none as saturated as a screen
+  bool green_clothes = false;  // yellow to teal, drawn; none as saturated as a screen
   bool any_colours = false;    // skin, hair and clothes of random colours, not too near a screen's
   float spill = 0.03F;         // light of the screen on the person, at rims twice that
   float veil = 0;              // opacity of its folds; 0 = none

@@ -1,6 +1,7 @@
 // The light on the screen as quick keying follows it: by blocks, from few pixels.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -37,6 +38,8 @@ class QuickLight {
   void prefetch(std::size_t block) const { __builtin_prefetch(&plates_[block]); }
   // Whether the screen is so near that thin things are to be expected: see ScreenNear.
   bool is_near(std::size_t block) const { return block_near_[block] != 0; }
+  // How many blocks are deep within what stands before it.
+  std::int64_t deep_blocks() const { return std::count(block_near_.begin(), block_near_.end(), 0); }
   // What is screen at a glance, as bound_screen() has it; kept until the gain has changed by more
   // than a hundredth.
   const std::vector<LightBounds>& light_bounds();

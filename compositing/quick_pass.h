@@ -67,6 +67,8 @@ class QuickPass {
     scratch_.has_previous = true;
     return store_.soft();
   }
+  // Of pixels deep within persons, how many lie in eights of which half or more are so.
+  std::int64_t thin() const { return thin_; }
 
  private:
   static constexpr std::size_t together = 8;  // halves: they stay in the nearest cache
@@ -237,9 +239,10 @@ class QuickPass {
       const auto row = static_cast<std::size_t>(i);
       const F8 alpha = h.alpha[row];
       store_.mark_written(h.block, h.first + row, any_of(alpha > 0.0F));
-      store_.write(
-          foreground_of<false>(h.light[row], h.plate, {alpha, h.matte.spill}, in_.dials.despill),
-          h.count, store_.pixels(h.y + i, h.x));
+      const bool mostly_soft = store_.write(
+          foreground_of<false>(h.light[row], h.plate, {alpha, h.matte.spill}, in_.dials), h.count,
+          store_.pixels(h.y + i, h.x));
+      if (mostly_soft && !in_.light.is_near(h.block)) thin_ += key_lanes;
     }
   }
 
@@ -291,6 +294,7 @@ class QuickPass {
   bool smooths_;
   std::array<Half, together> halves_;  // that wait
   std::size_t count_ = 0;
+  std::int64_t thin_ = 0;
 };
 
 }  // namespace compositing

@@ -253,9 +253,13 @@ void PersonFeed::show(Person& person, std::size_t index) {
   const bool is_told =
       why == compositing::name_of(KeyStatus::moved) || (clipped && camera.told_clipped);
   if (!why.empty() && why != camera.unsure_for && !is_told) {
-    const bool ghost = why == compositing::name_of(KeyStatus::ghost);
-    person.notes.push_back(fmt::format("{}: the key is unsure ({}{})", person.name_of(index), why,
-                                       ghost ? ": " + words_for_ghost(camera.feed.ghost()) : ""));
+    const std::string more = why == compositing::name_of(KeyStatus::ghost)
+                                 ? ": " + words_for_ghost(camera.feed.ghost())
+                             : why == compositing::name_of(KeyStatus::thin)
+                                 ? ": " + std::string(compositing::advice_if_thin)
+                                 : std::string();
+    person.notes.push_back(
+        fmt::format("{}: the key is unsure ({}{})", person.name_of(index), why, more));
   }
   camera.unsure_for = why;
   camera.told_clipped |= clipped;

@@ -321,6 +321,8 @@ void tell(const KeyedClip& clip, const std::string& out, std::int64_t before, Co
     console.warn(
         fmt::format("the key is unsure ({}) in {} of {} frames: look at it before it is used",
                     clip.why, clip.unsure, clip.keyed));
+    if (clip.why == compositing::name_of(compositing::KeyStatus::thin))
+      console.warn(std::string(compositing::advice_if_thin));
   }
   if (clip.ghost > 0) console.warn(words_for_ghost(clip.ghost));
   if (clip.scattered) console.warn(words_for_scattered());

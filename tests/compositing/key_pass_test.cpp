@@ -150,13 +150,14 @@ TEST(KeyPass, IsTheFormulaOfEachPixelByItself) {
           const float near = keyer.lit().near.at(y, x);
           KeyedTexel<float> one{};
           if (settings.method == KeyMethod::difference) {
-            one = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials), 0);
+            one = foreground_of<true>(c, p, difference_matte(c, p, cell[3], dials),
+                                      KeyDials{.despill = 0});
           } else if (has_two_primaries(plate.colour)) {
             const auto matte = matte_of<true>(c, p, cell[3], near, dials);
-            one = foreground_of<true>(c, p, matte, dials.despill, dials.tells_skin);
+            one = foreground_of<true>(c, p, matte, dials);
           } else {
             const auto matte = matte_of<false>(c, p, cell[3], near, dials);
-            one = foreground_of<false>(c, p, matte, dials.despill);
+            one = foreground_of<false>(c, p, matte, dials);
           }
           // Four roundings of the plate, and one to half.
           const auto at = [&](int channel) {

@@ -129,6 +129,46 @@ TEST(KeyTexel, TellsSkinFromAYellowWall) {
   EXPECT_EQ(key(wall, 1)[3], 0);
 }
 
+// Before green and blue: what is likely to be spill on dark skin is a share of it.
+TEST(KeyTexel, LeavesDarkSkinItsColour) {
+  constexpr std::array<float, 3> skins[] = {{0.04F, 0.022F, 0.015F},
+                                            {0.08F, 0.045F, 0.03F},
+                                            {0.15F, 0.085F, 0.055F},
+                                            {0.25F, 0.15F, 0.1F}};
+  constexpr std::array<float, 3> screens[] = {green, {0.05F, 0.3F, 0.07F}, {0.03F, 0.08F, 0.4F}};
+  for (const auto& screen : screens) {
+    const Keyer keyer(even_plate(8, 16, screen), {});
+    for (const auto& skin : skins) {
+      for (const float shade : {1.0F, 0.6F}) {
+        const std::array<float, 3> seen{shade * skin[0], shade * skin[1], shade * skin[2]};
+        const auto keyed = key_texel(keyer.lit(), keyer.dials(), 2, 4, seen);
+        for (std::size_t c = 0; c < 3; ++c) {
+          EXPECT_GE(keyed[c], 0.9F * seen[c]) << "skin " << skin[0] << " channel " << c;
+        }
+      }
+    }
+  }
+}
+
+// What has more of the screen's light than skin loses it, and so does what is redder.
+TEST(KeyTexel, TakesSpillFromHairAndRedCloth) {
+  const LitPlate plate = lit_plate(green);
+  for (const std::array<float, 3>& own : {std::array{0.012F, 0.010F, 0.009F},
+                                          {0.10F, 0.056F, 0.03F},
+                                          {0.22F, 0.03F, 0.03F},
+                                          {0.05F, 0.06F, 0.09F},
+                                          {0.75F, 0.75F, 0.73F}}) {
+    for (const float spill : {0.02F, 0.05F}) {
+      std::array<float, 3> seen{};
+      for (std::size_t c = 0; c < 3; ++c) seen[c] = own[c] + spill * green[c];
+      KeyedTexel<float> bounded =
+          foreground_of<false, float>({seen[1], seen[0], seen[2]}, {green[1], green[0], green[2]},
+                                      {1, spill}, {.skin = skin_before(ScreenColour::green)});
+      EXPECT_NEAR(bounded.first, own[1], 0.15F * own[1] + 0.1F * spill * green[1]) << own[0];
+    }
+  }
+}
+
 TEST(KeyTexel, FilteredFirstOrLastIsTheSameAwayFromClamps) {
   const LitPlate plate = lit_plate(green);
   for (std::uint64_t i = 0; i < 300; ++i) {
@@ -162,7 +202,7 @@ TEST(KeyTexel, OfEightAtATimeIsTheOneOfEach) {
       }
     }
     const auto matte = matte_of<false>(c, p, all_of(plate.cell(0, 0)[3]), all_of(1), keyer.dials());
-    const auto eight = foreground_of<false>(c, p, matte, 1.0F);
+    const auto eight = foreground_of<false>(c, p, matte, keyer.dials());
     for (int lane = 0; lane < key_lanes; ++lane) {
       const auto one = key_texel(plate, keyer.dials(), 0, 0, {c[1][lane], c[0][lane], c[2][lane]});
       ASSERT_NEAR(eight.alpha[lane], one[3], 1e-6F);
