@@ -29,9 +29,11 @@ constexpr float most_of_seen = 0.6F;                 // share that must
 constexpr float most_if_turned = 0.7F;               // and on more than a shift, which fits more
 constexpr float most_turn = 0.26F, most_growth = 0.4F;
 constexpr float told_px = 1;  // at the corners of the picture: what is less is no turn, or no push
-// Patches that tell that they agree on nothing, and how far they are off.
+// Patches that tell that they agree on nothing, and how far they are off: such that show more than
+// fits by chance, for where a plate was put together of frames there are faint steps.
 constexpr int many = 8;
 constexpr float elsewhere_px = 1.5F;
+constexpr float clear_contrast = 12;  // over the noise
 // Pictures of another lens, and of a camera that has tilted, in which patches are looked for where
 // nothing else is found: all of them in the first looks, then some of them in each.
 constexpr int first_looks = 3, some = 2;
@@ -255,8 +257,7 @@ PlateWatch::Found PlateWatch::find(const Patch& patch,
     if (!step(about, 0, x, y, found, &misfit)) return {};
   }
   // By noise, and a part of what there is to see: a plate is smoother than a frame.
-  const float mean = plate_[0].at(patch.row + side / 2, patch.column + side / 2);
-  found.fits = misfit <= 3 * std::sqrt(noise_of(mean)) + 0.25F * patch.contrast;
+  found.fits = misfit <= 3 * std::sqrt(noise_of(mean_of(patch))) + 0.25F * patch.contrast;
   return found;
 }
 
@@ -397,7 +398,7 @@ PlateShift PlateWatch::follow(const Rows& frame, const Motion& about) {
   const float middle_y = 0.5F * static_cast<float>(grid.rows - 1);
   const float square = (1 + about.a) * (1 + about.a) + about.b * about.b;
   const auto pixels = static_cast<float>(pixels_);
-  int elsewhere = 0;
+  int clear = 0, elsewhere = 0;
   for (const Patch& patch : patches_) {
     const auto centre = [](int first) { return static_cast<float>(first) + 0.5F * (side - 1); };
     const float px = centre(patch.column) - middle_x, py = centre(patch.row) - middle_y;
@@ -419,6 +420,8 @@ PlateShift PlateWatch::follow(const Rows& frame, const Motion& about) {
     const Pair pair{from_x - found.right, from_y - found.down, x - from_x + found.right,
                     y - from_y + found.down};
     pairs_.push_back(pair);
+    if (!(patch.contrast > clear_contrast * std::sqrt(noise_of(mean_of(patch))))) continue;
+    ++clear;
     elsewhere += std::hypot(pair.right, pair.down) * pixels > elsewhere_px;
   }
   shift.seen = static_cast<int>(pairs_.size());
@@ -434,8 +437,8 @@ PlateShift PlateWatch::follow(const Rows& frame, const Motion& about) {
   shift.known = enough && shift.agree >= fewest &&
                 static_cast<float>(shift.agree) >=
                     (turned ? most_if_turned : most_of_seen) * static_cast<float>(shift.seen);
-  shift.scattered = enough && !shift.known && shift.seen >= many &&
-                    static_cast<float>(elsewhere) >= most_of_seen * static_cast<float>(shift.seen);
+  shift.scattered = enough && !shift.known && clear >= many &&
+                    static_cast<float>(elsewhere) >= most_of_seen * static_cast<float>(clear);
   const Motion& m = consensus.motion;
   shift.right_px = m.right * pixels;
   shift.down_px = m.down * pixels;

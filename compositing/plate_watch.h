@@ -124,6 +124,10 @@ class PlateWatch {
   // One step of it on a level; false where it cannot be told.
   bool step(const Motion& about, int level, float x, float y, Found& found, float* misfit) const;
   float noise_of(float light) const;
+  // Of the plate, about, where the patch is.
+  float mean_of(const Patch& patch) const {
+    return plate_[0].at(patch.row + side / 2, patch.column + side / 2);
+  }
   void choose_patches();
 
   int height_, width_;
