@@ -17,9 +17,9 @@ unsigned mask_of(const Instance& instance) {
          (instance.occludes ? mask_occluder : 0U) | (instance.mirrored ? mask_mirrored : 0U);
 }
 
-// Where an instance's tree stands, for Embree, which asks for a way back: what is flat is made a
-// hundred thousandth as thick as it is large. Hits are read by the matrix itself. False if it is
-// less than flat, so that nobody can see it.
+// Where an instance's tree stands, for Embree, which asks for a way back: what is flat is made
+// three millionths as thick as it is large: less than rays start off it (offset_origin). Hits are
+// read by the matrix itself. False if it is less than flat, so that nobody can see it.
 bool stand_tree(const std::array<float, 12>& set_from_object, std::array<float, 12>& placed) {
   placed = set_from_object;
   const auto column = [&](std::size_t i) {
@@ -39,7 +39,7 @@ bool stand_tree(const std::array<float, 12>& set_from_object, std::array<float, 
   };
   const float size = std::max({length(column(0)), length(column(1)), length(column(2))});
   const Vec3f out = across(column), in = across(row);
-  constexpr float least = 1e-30F, thin = 1e-5F;
+  constexpr float least = 1e-30F, thin = 3e-6F;
   if (!(length(out) > least) || !(length(out) > 1e-7F * size * size)) return false;
   if (std::abs(determinant(set_from_object)) > 0.1F * thin * size * length(out)) return true;
   const Vec3f to = normalize(out) * (thin * size), from = normalize(in);

@@ -191,8 +191,8 @@ struct KeyedClip {
   std::int64_t frames = 0, lost = 0, keyed = 0, unsure = 0;
   double confidence_sum = 0, least_confidence = 1;
   std::string_view why = "good";  // of the least
-  // The camera, if it was: the first frame that shows it, and the farthest.
-  std::int64_t first = 0;  // frame that is keyed
+  std::int64_t first = 0;         // frame that is keyed
+  // The camera, if it was moved: the first frame that shows it, and the farthest.
   std::optional<std::int64_t> moved_from;
   compositing::PlateShift shift;
   bool scattered = false;
