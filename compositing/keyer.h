@@ -72,8 +72,7 @@ enum class KeyStatus : std::uint8_t {
 };
 std::string_view name_of(KeyStatus status);
 inline constexpr std::string_view advice_if_thin =
-    "a person is half transparent within; if that is no veil or glass, the clothes are too much "
-    "like "
+    "a person is half transparent within; if that is no veil or glass, the clothes are too like "
     "the screen: hold them with a core mask, or wear others";
 
 struct KeyReport {

@@ -19,20 +19,6 @@ constexpr float same_colour = 0.08F, least_light = 0.5F, most_light = 2;
 
 int cells_along(int side, int step) { return (side + step - 1) / step; }
 
-// How far a colour is from the screen's, as a share of its primary.
-float off_screen(const ScreenLight& light, const ScreenLight& screen) {
-  if (!(light.first > 0)) return 1;
-  return (std::abs(light.second * screen.first - screen.second * light.first) +
-          std::abs(light.third * screen.first - screen.third * light.first)) /
-         (screen.first * light.first);
-}
-
-ScreenLight ordered(const std::array<float, 3>& c, ScreenColour colour) {
-  return {c[0], c[1], c[2],
-          has_two_primaries(colour) ? screen_excess<true>(c[0], c[1], c[2])
-                                    : screen_excess<false>(c[0], c[1], c[2])};
-}
-
 // The plate's light over 8x8 pixels each, row by row.
 std::vector<ScreenLight> means_of(const LitPlate& plate, int rows, int columns, int of) {
   std::vector<ScreenLight> means;
@@ -47,7 +33,7 @@ std::vector<ScreenLight> means_of(const LitPlate& plate, int rows, int columns, 
         }
       }
       for (float& value : sum) value /= count;
-      means.push_back(ordered(sum, plate.colour));
+      means.push_back(ordered_light(sum, plate.colour));
     }
   }
   return means;
@@ -106,10 +92,10 @@ PlateGaps::PlateGaps(const LitPlate& bare, std::span<const std::uint8_t> masked)
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
       const float* const light = around.value(row, column);
-      screen.push_back(ordered({light[0], light[1], light[2]}, colour_));
+      screen.push_back(ordered_light({light[0], light[1], light[2]}, colour_));
       const ScreenLight& own = plate[at(row, column)];
       const bool none = own.excess < hardly_any * screen.back().excess ||
-                        off_screen(own, screen.back()) > another_colour;
+                        chroma_off(own, screen.back()) > another_colour;
       elsewhere.push_back(none ? 1 : 0);
     }
   }
@@ -139,10 +125,10 @@ float PlateGaps::look(const Rows& frame, float gain) const {
     }
     const float over = 0.5F / (static_cast<float>(count) * gain);
     for (float& value : sum) value *= over;
-    const ScreenLight seen = ordered(sum, colour_);
+    const ScreenLight seen = ordered_light(sum, colour_);
     const bool lit = seen.excess >= least_light * gap.screen.excess &&
                      seen.excess <= most_light * gap.screen.excess;
-    if (lit && off_screen(seen, gap.screen) < same_colour) shown += 1;
+    if (lit && chroma_off(seen, gap.screen) < same_colour) shown += 1;
   }
   return counted_ > 0 ? shown / counted_ : 0;
 }

@@ -2,7 +2,6 @@
 #include "compositing/screen_key.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -78,37 +77,13 @@ float brightest_of(const Light3& light) { return std::max({light[0], light[1], l
 float dark_of(std::span<const Light3> pixels) {
   std::vector<float> bright(pixels.size());
   std::ranges::transform(pixels, bright.begin(), brightest_of);
-  const auto high = bright.begin() + static_cast<std::ptrdiff_t>(bright.size() / 20);
+  const auto high =
+      bright.begin() + static_cast<std::ptrdiff_t>(bright.size() / most_saturated_part);
   std::ranges::nth_element(bright, high, std::greater());
   return std::max(darkest, darkest_share * *high);
 }
 
-// How much speaks for a screen of that colour: the share of the picture that has the key's
-// chromaticity, by how saturated that is, in squares. Light does not count: a face in a bright
-// light has more of its colour than a screen in a dim one.
-float evidence(std::span<const Light3> pixels, ScreenColour colour) {
-  const ScreenLight key = find_key(pixels, colour);
-  if (!(key.excess > 0) || saturation(key) < least_saturation) return 0;
-  const auto alike = static_cast<std::size_t>(std::ranges::count_if(
-      pixels, [&](const Light3& light) { return is_screen(screen_light(light, colour), key); }));
-  if (alike * least_part < pixels.size()) return 0;
-  return static_cast<float>(alike) * saturation(key) * saturation(key) *
-         (is_warm(colour) ? warm_share : 1);
-}
-
-}  // namespace
-
-std::vector<Light3> spread_pixels(const capture::Image& image) {
-  const std::size_t pixels = image.pixels.size() / 3;
-  std::vector<Light3> some;
-  for (std::size_t i = 0; i < pixels; i += spread_step(pixels)) {
-    some.push_back(clean_light(&image.pixels[3 * i]));
-  }
-  return some;
-}
-
-ScreenLight find_key(std::span<const Light3> pixels, ScreenColour colour) {
-  const float dark = dark_of(pixels);
+ScreenLight find_key(std::span<const Light3> pixels, float dark, ScreenColour colour) {
   std::vector<ScreenLight> coloured;
   ChromaGrid grid;
   for (const Light3& light : pixels) {
@@ -130,12 +105,41 @@ ScreenLight find_key(std::span<const Light3> pixels, ScreenColour colour) {
   return coloured[static_cast<std::size_t>(low - coloured.begin()) / 2];
 }
 
+// How much speaks for a screen of that colour: the share of the picture that has the key's
+// chromaticity, by how saturated that is, in squares. Light does not count: a face in a bright
+// light has more of its colour than a screen in a dim one.
+float evidence(std::span<const Light3> pixels, float dark, ScreenColour colour) {
+  const ScreenLight key = find_key(pixels, dark, colour);
+  if (!(key.excess > 0) || saturation(key) < least_saturation) return 0;
+  const auto alike = static_cast<std::size_t>(std::ranges::count_if(
+      pixels, [&](const Light3& light) { return is_screen(screen_light(light, colour), key); }));
+  if (alike * least_part < pixels.size()) return 0;
+  return static_cast<float>(alike) * saturation(key) * saturation(key) *
+         (is_warm(colour) ? warm_share : 1);
+}
+
+}  // namespace
+
+std::vector<Light3> spread_pixels(const capture::Image& image) {
+  const std::size_t pixels = image.pixels.size() / 3;
+  std::vector<Light3> some;
+  for (std::size_t i = 0; i < pixels; i += spread_step(pixels)) {
+    some.push_back(clean_light(&image.pixels[3 * i]));
+  }
+  return some;
+}
+
+ScreenLight find_key(std::span<const Light3> pixels, ScreenColour colour) {
+  return find_key(pixels, dark_of(pixels), colour);
+}
+
 std::optional<ScreenColour> find_screen_colour(std::span<const Light3> pixels) {
+  const float dark = dark_of(pixels);
   std::optional<ScreenColour> best;
   float most = 0;
   for (int i = 0; i <= static_cast<int>(ScreenColour::magenta); ++i) {
     const auto colour = static_cast<ScreenColour>(i);
-    const float of_this = evidence(pixels, colour);
+    const float of_this = evidence(pixels, dark, colour);
     if (of_this > most) most = of_this, best = colour;
   }
   return best;

@@ -33,13 +33,17 @@ struct ScreenLight {
   float first, second, third, excess;
 };
 
+// Of channels in that order.
+inline ScreenLight ordered_light(const std::array<float, 3>& c, ScreenColour colour) {
+  return {c[0], c[1], c[2],
+          has_two_primaries(colour) ? screen_excess<true>(c[0], c[1], c[2])
+                                    : screen_excess<false>(c[0], c[1], c[2])};
+}
 // Of light that is clean.
 inline ScreenLight screen_light(const Light3& light, ScreenColour colour) {
   const auto order = channels_of(colour);
   const auto at = [&](std::size_t i) { return light[static_cast<std::size_t>(order[i])]; };
-  const float a = at(0), b = at(1), c = at(2);
-  return {a, b, c,
-          has_two_primaries(colour) ? screen_excess<true>(a, b, c) : screen_excess<false>(a, b, c)};
+  return ordered_light({at(0), at(1), at(2)}, colour);
 }
 
 // Of the chromaticity of which most is saturated most, whatever its light: the median of what has

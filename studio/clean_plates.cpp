@@ -123,7 +123,6 @@ std::string words_for_shift(const compositing::PlateShift& shift) {
                   rounded(shift.right_px, 10), rounded(shift.down_px, 10));
   const float degrees = rounded(shift.roll_rad * 180 / std::numbers::pi_v<float>, 10);
   if (std::abs(degrees) > 0.15F) {  // as well as it is known
-
     words += fmt::format(", turned by {:.1f} degrees {}", std::abs(degrees),
                          degrees > 0 ? "clockwise" : "counter-clockwise");
   }
@@ -134,18 +133,15 @@ std::string words_for_shift(const compositing::PlateShift& shift) {
 }
 
 std::string words_for_scattered() {
-  return "much in the picture lies elsewhere than on the clean plate, and not as when a camera is "
-         "moved: "
-         "take the plate anew";
+  return "much in the picture lies elsewhere than on the clean plate, and not as when a camera "
+         "is moved: take the plate anew";
 }
 
 std::string words_for_ghost(float share) {
   return fmt::format(
       "{:.1f} % of the picture is screen where the clean plate shows something else, as of "
-      "somebody "
-      "who stood there: it is taken for the person. Take the plate anew, or cut it away by a "
-      "garbage "
-      "mask",
+      "somebody who stood there: it is taken for the person. Take the plate anew, or cut it "
+      "away by a garbage mask",
       100 * share);
 }
 

@@ -167,7 +167,7 @@ bool Section::text(std::string_view key, std::string& target) {
 
 bool Section::word(std::string_view key,
                    std::string& target,
-                   std::initializer_list<std::string_view> words) {
+                   std::span<const std::string_view> words) {
   std::string given;
   if (!text(key, given)) return false;
   if (std::ranges::find(words, given) == words.end()) {

@@ -81,9 +81,12 @@ class Section {
   bool number(std::string_view key, float& target, Range range = {});
   bool text(std::string_view key, std::string& target);
   // One of a few words.
+  bool word(std::string_view key, std::string& target, std::span<const std::string_view> words);
   bool word(std::string_view key,
             std::string& target,
-            std::initializer_list<std::string_view> words);
+            std::initializer_list<std::string_view> words) {
+    return word(key, target, std::span(words.begin(), words.size()));
+  }
   bool words(std::string_view key,
              std::vector<std::string>& target,
              std::initializer_list<std::string_view> words);

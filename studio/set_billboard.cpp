@@ -45,7 +45,7 @@ KeyChoice read_key(Section table, const SetContext& context) {
       method == "screen" ? compositing::KeyMethod::screen : compositing::KeyMethod::difference;
   if (table.has("screen_colour")) {
     std::string colour;
-    table.word("screen_colour", colour, {"red", "green", "blue", "yellow", "cyan", "magenta"});
+    table.word("screen_colour", colour, compositing::screen_colour_names);
     if (!colour.empty()) settings.screen_colour = compositing::screen_colour_from_name(colour);
   }
   table.of_use_only(method == "screen", "screen_colour", "method = \"screen\"");

@@ -131,9 +131,10 @@ std::string name_of(const StandInSettings& stand_in, std::size_t number) {
   return stand_in.name.empty() ? fmt::format("stand-in {}", number) : stand_in.name;
 }
 
-// How far below its face a stand-in lies: more than rays are moved off a surface anywhere on it
-// where it is near, and a millimetre at most. So glass that stands on a floor ends before the floor
-// begins, for every ray. Where both were one plane, rays would meet the one or the other by chance.
+// How far below its face a stand-in lies: more than rays are moved off a surface anywhere on
+// it, up to 500 m from the origin, and a millimetre at most. So glass that stands on a floor ends
+// before the floor begins, for every ray. Where both were one plane, rays would meet the one or the
+// other by chance.
 double gap_m(const StandInSettings& stand_in) {
   constexpr double most_m = 1e-3, of_coordinates = 2.5e-5;  // see render::offset_origin
   const calibrate::Vec3 at = stand_in.pose.position;

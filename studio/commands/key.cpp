@@ -411,8 +411,9 @@ Command key_command() {
                        "of a plate: somebody is in the picture, but nowhere all the time");
         arguments.choice("--method", o->method, {"screen", "difference"},
                          "by the screen's colour, or by the distance from any still background");
-        arguments.choice("--screen-colour", o->screen_colour,
-                         {"any", "red", "green", "blue", "yellow", "cyan", "magenta"},
+        std::vector<std::string> colours{"any"};
+        for (const auto name : compositing::screen_colour_names) colours.emplace_back(name);
+        arguments.choice("--screen-colour", o->screen_colour, colours,
                          "where something else is taken for the screen");
         arguments.option("--colour", o->colour, "the clip's transfer curve, as in a set");
         arguments.option("--response", o->response,
