@@ -100,6 +100,12 @@ Imf::Compression library_compression(ExrCompression compression) {
   throw std::invalid_argument("no such EXR compression");
 }
 
+bool is_lens_text(std::string_view text) {
+  return text.size() <= most_lens_text && std::ranges::all_of(text, [](char c) {
+           return (c >= ' ' && c <= '~') || c == '\t' || c == '\n';
+         });
+}
+
 Imf::Header make_header(int width, int height, const ExrOptions& options) {
   Imf::Header header(width, height);
   header.pixelAspectRatio() = static_cast<float>(options.pixel_aspect.value());
@@ -128,6 +134,13 @@ Imf::Header make_header(int width, int height, const ExrOptions& options) {
   }
   if (!options.transfer.empty()) {
     header.insert(wire::transfer_attribute, Imf::StringAttribute(options.transfer));
+  }
+  if (!options.lens.empty()) {
+    if (!is_lens_text(options.lens)) {
+      throw std::invalid_argument("the text of a lens in an EXR file is of at most " +
+                                  std::to_string(most_lens_text) + " printable characters");
+    }
+    header.insert(wire::lens_attribute, Imf::StringAttribute(options.lens));
   }
   return header;
 }
@@ -217,11 +230,19 @@ std::uint32_t expect(SandboxedChild& child, wire::Kind kind) {
   return prefix.bytes;
 }
 
-wire::Header receive_header(SandboxedChild& child) {
+// `lens`: where its text goes, if there is one.
+wire::Header receive_header(SandboxedChild& child, std::string* lens = nullptr) {
   wire::Header header;
   if (expect(child, wire::Kind::header) != sizeof header || !read_value(child, header)) {
     throw std::runtime_error("its decoder went wrong");
   }
+  if (header.lens != wire::LensNote::text) return header;
+  const std::uint32_t bytes = expect(child, wire::Kind::lens);
+  std::string text(std::min<std::size_t>(bytes, most_lens_text), ' ');
+  if (text.size() != bytes || !child.read(std::as_writable_bytes(std::span(text)))) {
+    throw std::runtime_error("its decoder went wrong");
+  }
+  if (lens != nullptr) *lens = std::move(text);
   return header;
 }
 
@@ -392,6 +413,21 @@ std::string read_exr_transfer(const std::string& path, const ExrLimits& limits) 
     } catch (const std::invalid_argument&) {
       return "";
     }
+  });
+}
+
+std::string read_exr_lens(const std::string& path, const ExrLimits& limits) {
+  return decode(path, limits, [](SandboxedChild& child) {
+    std::string text;
+    const wire::LensNote note = receive_header(child, &text).lens;
+    if (note == wire::LensNote::too_long) {
+      throw std::runtime_error("what it notes of its lens is longer than " +
+                               std::to_string(most_lens_text) + " characters");
+    }
+    if (note == wire::LensNote::no_text || !is_lens_text(text)) {
+      throw std::runtime_error("what it notes of its lens is no text");
+    }
+    return text;
   });
 }
 

@@ -52,7 +52,12 @@ struct ExrOptions {
   std::optional<LightNoise> noise{};
   // By what their codes became light: attribute "frameTransfer", a curve's name or by_response.
   std::string transfer{};
+  // Of the lens that filmed the picture, in words that whoever reads it understands: attribute
+  // "frameLens", a string of at most most_lens_text printable ASCII characters, tabs and new lines.
+  std::string lens{};
 };
+
+inline constexpr std::size_t most_lens_text = std::size_t{256} << 10;
 
 // An image's channels under these names, in its order.
 struct ExrPlanes {
@@ -63,8 +68,8 @@ struct ExrPlanes {
 // Writes one scan-line file with the channels of all images, bits as they are, and Rec.709
 // chromaticities. It is written beside `path` first and takes its name once complete, so that no
 // reader ever sees half a file. Throws std::invalid_argument if there are no images, sizes differ,
-// names do not match channels or come twice, or the time code is out of range; std::runtime_error
-// with path and reason if it cannot be written.
+// names do not match channels or come twice, the time code is out of range, or the lens is no such
+// text; std::runtime_error with path and reason if it cannot be written.
 void write_exr(const std::string& path,
                std::span<const ExrPlanes> planes,
                const ExrOptions& options = {});
@@ -107,5 +112,10 @@ std::optional<LightNoise> read_exr_noise(const std::string& path, const ExrLimit
 
 // The same of ExrOptions::transfer; "" if it is none of ours.
 std::string read_exr_transfer(const std::string& path, const ExrLimits& limits = {});
+
+// The same of ExrOptions::lens; "" if the file has none. What it has must be such a text, else this
+// throws std::runtime_error with path and reason: a note that cannot be read is not passed over,
+// for its reader would take what it contradicts. Pictures are read whatever is noted.
+std::string read_exr_lens(const std::string& path, const ExrLimits& limits = {});
 
 }  // namespace capture

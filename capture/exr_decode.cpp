@@ -24,6 +24,7 @@
 #include <OpenEXR/ImfTestFile.h>
 #include <OpenEXR/ImfVecAttribute.h>
 
+#include "capture/exr.h"
 #include "capture/exr_wire.h"
 #include "capture/helper_io.h"
 #include "capture/sandbox.h"
@@ -166,6 +167,16 @@ void send_rows(const Window& data, const Window& display, std::size_t channels, 
   tell(wire::Kind::end, {});
 }
 
+// The text of a lens, if there is any to be sent, and what there is.
+wire::LensNote find_lens(const Imf::Header& header, std::string& text) {
+  if (header.find(wire::lens_attribute) == header.end()) return wire::LensNote::none;
+  const auto* told = header.findTypedAttribute<Imf::StringAttribute>(wire::lens_attribute);
+  if (told == nullptr) return wire::LensNote::no_text;
+  if (told->value().size() > capture::most_lens_text) return wire::LensNote::too_long;
+  text = told->value();
+  return text.empty() ? wire::LensNote::none : wire::LensNote::text;
+}
+
 void send_header(const Imf::Header& header, const Window& display, std::size_t channels) {
   wire::Header out{static_cast<std::int32_t>(display.width),
                    static_cast<std::int32_t>(display.height),
@@ -190,7 +201,10 @@ void send_header(const Imf::Header& header, const Window& display, std::size_t c
     std::copy_n(told->value().begin(), std::min(told->value().size(), out.transfer.size()),
                 out.transfer.begin());
   }
+  std::string lens;
+  out.lens = find_lens(header, lens);
   tell(wire::Kind::header, std::as_bytes(std::span(&out, 1)));
+  if (!lens.empty()) tell(wire::Kind::lens, std::as_bytes(std::span(lens)));
 }
 
 void send_plain(StandardInput& input) {

@@ -182,6 +182,74 @@ TEST(WriteExr, KeepsWhatIsKnownOfNoise) {
   }
 }
 
+// A file of one row of pixels with one more attribute, as another program may have written it.
+void write_with_attribute(const std::string& path,
+                          const std::string& name,
+                          const std::string& type,
+                          const std::string& value) {
+  write_exr(path, make_image(1, 4));
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  file.close();
+  std::string more = name + '\0' + type + '\0';
+  for (int i = 0; i < 4; ++i) more += static_cast<char>(value.size() >> (8 * i) & 255);
+  more += value;
+  const std::size_t row = bytes.size() - 4 * 3 * sizeof(float) - 8;  // its number and its size
+  std::uint64_t offset = 0;
+  std::memcpy(&offset, &bytes[row - sizeof offset], sizeof offset);
+  ASSERT_EQ(offset, row);
+  offset += more.size();
+  std::memcpy(&bytes[row - sizeof offset], &offset, sizeof offset);
+  bytes.insert(8, more);
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+TEST(WriteExr, KeepsTheTextOfALens) {
+  const std::string path = made::make_temporary_directory() / "a.exr";
+  const Image image = make_image(3, 4);
+  write_exr(path, image);
+  EXPECT_EQ(read_exr_lens(path), "");
+  for (const std::string& text : {std::string("model = \"pinhole\"\nfx = 812.25\t# pixels\n"),
+                                  std::string(most_lens_text, 'x')}) {
+    write_exr(path, image, {.noise = LightNoise{2e-4F, 3e-6F}, .lens = text});
+    EXPECT_EQ(read_exr_lens(path), text);
+    EXPECT_EQ(read_exr(path).pixels, image.pixels);
+    EXPECT_EQ(read_exr_noise(path), (LightNoise{2e-4F, 3e-6F}));
+    EXPECT_EQ(read_exr_transfer(path), "");
+  }
+  for (const std::string& bad : {std::string(most_lens_text + 1, 'x'), std::string("\x1b[2J"),
+                                 std::string("a\0b", 3), std::string("\xc3\xa4")}) {
+    EXPECT_THROW(write_exr(path, image, {.lens = bad}), std::invalid_argument);
+  }
+}
+
+TEST(ReadExr, RefusesWhatIsNoTextOfALensButReadsThePicture) {
+  const std::string path = made::make_temporary_directory() / "a.exr";
+  write_with_attribute(path, "frameLens", "string", "fx = 1\n");
+  EXPECT_EQ(read_exr_lens(path), "fx = 1\n");
+  write_with_attribute(path, "frameLens", "string", "");
+  EXPECT_EQ(read_exr_lens(path), "");
+  using namespace std::string_literals;
+  for (const auto& [type, value, why] :
+       {std::array{"string"s, std::string(most_lens_text + 1, 'x'), "longer than 262144"s},
+        std::array{"string"s, std::string(std::size_t{8} << 20, 'x'), "longer than 262144"s},
+        std::array{"string"s, "fx = 1\0\x1b[2J"s, "is no text"s},
+        std::array{"string"s, "\xff\xfe"s, "is no text"s},
+        std::array{"float"s, "\0\0\x80\x3f"s, "is no text"s},
+        std::array{"lensOfAnother"s, "fx = 1"s, "is no text"s}}) {
+    write_with_attribute(path, "frameLens", type, value);
+    try {
+      read_exr_lens(path);
+      ADD_FAILURE() << type << " " << value.size();
+    } catch (const std::runtime_error& error) {
+      EXPECT_EQ(std::string(error.what()).find(path + ": what it notes of its lens"), 0U);
+      EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
+    }
+    EXPECT_EQ(read_exr(path).width, 4);
+    EXPECT_EQ(read_exr_noise(path), std::nullopt);
+  }
+}
+
 TEST(WriteExr, LeavesNoFileWhenTheDiskIsFull) {
   const auto directory = made::make_temporary_directory();
   const std::string path = directory / "a.exr";
