@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "calibrate/vec.h"
@@ -58,6 +59,11 @@ Lens resized(const Lens& lens, int width, int height);
 // the file's ending. Throws std::runtime_error with path, line where known, and reason.
 Lens read_lens(const std::string& path);
 void write_lens(const std::string& path, const Lens& lens);
+
+// The same as a text, that of a .toml, which takes any lens. `name` stands for it in what is
+// thrown, in place of a path. Both throw as the others do.
+std::string text_of_lens(const Lens& lens);
+Lens lens_from_text(std::string_view text, const std::string& name);
 
 // Unit directions in the camera's frame for every pixel, with a border of one pixel:
 // entry (y, x), -1 <= y <= height, -1 <= x <= width, is at index (y + 1) * (width + 2) + x + 1.

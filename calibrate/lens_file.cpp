@@ -25,6 +25,9 @@ using capture::in_quotes;
 class LensTable : private capture::TomlReader {
  public:
   explicit LensTable(const std::string& path) : TomlReader(path, "lens"), table_(parse()) {}
+  // Of a text that `name` stands for.
+  LensTable(std::string_view text, const std::string& name)
+      : TomlReader(name, "lens"), table_(parse_text(text)) {}
 
   bool has(std::string_view key) const { return table_.contains(key); }
 
@@ -122,8 +125,7 @@ ParameterNames names_of(AxialLens::Kind kind) {
   return {{"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"}, 4};
 }
 
-Lens read_toml_lens(const std::string& path) {
-  LensTable table(path);
+Lens read_toml_lens(LensTable table) {
   Lens lens;
   lens.model = table.string("model");
   lens.width = table.whole_number("width");
@@ -161,7 +163,7 @@ Lens read_toml_lens(const std::string& path) {
   return lens;
 }
 
-void write_toml_lens(const std::string& path, const Lens& lens) {
+std::string toml_of(const Lens& lens) {
   check(lens);
   std::string text = "model = \"" + lens.model + "\"\nwidth = " + std::to_string(lens.width) +
                      "\nheight = " + std::to_string(lens.height) + "\n";
@@ -179,7 +181,7 @@ void write_toml_lens(const std::string& path, const Lens& lens) {
     for (const double p : lens.parameters) text += to_text(p) + ", ";
     text += "]\n";
   }
-  write_text_file(path, text);
+  return text;
 }
 
 bool is_opencv_name(const std::string& path) {
@@ -193,7 +195,7 @@ constexpr const char* known_endings =
 
 Lens read_lens(const std::string& path) {
   if (path.ends_with(".cameramodel")) return read_camera_model(path).lens;
-  if (path.ends_with(".toml")) return read_toml_lens(path);
+  if (path.ends_with(".toml")) return read_toml_lens(LensTable(path));
   if (is_opencv_name(path)) return read_opencv_lens(path);
   throw std::runtime_error(path + known_endings);
 }
@@ -202,12 +204,18 @@ void write_lens(const std::string& path, const Lens& lens) {
   if (path.ends_with(".cameramodel")) {
     write_camera_model(path, {lens, std::nullopt});
   } else if (path.ends_with(".toml")) {
-    write_toml_lens(path, lens);
+    write_text_file(path, toml_of(lens));
   } else if (is_opencv_name(path)) {
     write_opencv_lens(path, lens);
   } else {
     throw std::runtime_error(path + known_endings);
   }
+}
+
+std::string text_of_lens(const Lens& lens) { return toml_of(lens); }
+
+Lens lens_from_text(std::string_view text, const std::string& name) {
+  return read_toml_lens(LensTable(text, name));
 }
 
 }  // namespace calibrate

@@ -31,9 +31,13 @@ class TomlReader {
   // Of a file that is no larger.
   toml::table parse(std::size_t most_bytes = std::size_t{64} << 20) const {
     const std::vector<std::byte> bytes = read_file(path_, most_bytes);
+    return parse_text({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  }
+
+  // Of a text that path() stands for in complaints.
+  toml::table parse_text(std::string_view text) const {
     try {
-      return toml::parse(
-          std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+      return toml::parse(text);
     } catch (const toml::parse_error& error) {
       fail(error.source(), std::string(error.description()));
     }

@@ -38,6 +38,26 @@ TEST(WriteLens, WritesAPinholeThatAlsoMrcalReads) {
   EXPECT_EQ(read.parameters, lens.parameters);
 }
 
+TEST(LensFromText, IsTheLensThatTheTextIsOf) {
+  for (const Lens& lens :
+       {Lens{"pinhole", 640, 480, {500, 501, 319.5, 239.5}, Lens{}.max_angle_rad, 0.25},
+        Lens{"kannala_brandt", 1280, 720, {700, 700, 639.5, 359.5, -0.02, 0.004}, 1.5},
+        Lens{"LENSMODEL_OPENCV4", 1280, 720, {1e3, 1e3, 639.5, 359.5, -0.1, 1e-3, 0, 1.0 / 3}}}) {
+    Lens read = lens_from_text(text_of_lens(lens), "the note");
+    EXPECT_NEAR(read.max_angle_rad, lens.max_angle_rad, 1e-14);
+    read.max_angle_rad = lens.max_angle_rad;
+    EXPECT_EQ(read, lens);
+  }
+  EXPECT_THROW(text_of_lens({"pinhole", 640, 480, {0, 501, 319.5, 239.5}}), std::invalid_argument);
+  try {
+    lens_from_text("model = \"pinhole\"\nwidth = 0\n", "the note");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(std::string(error.what()).find("the note:2:9: \"width\" must be"), 0U)
+        << error.what();
+  }
+}
+
 TEST(ReadLens, TakesAnglesInDegreesUpToHalfTheSphere) {
   const std::string path = made::make_temporary_directory() / "lens.toml";
   std::ofstream(path) << "model = \"equisolid\"\nwidth = 640\nheight = 480\nf = 100\ncx = 320\n"
