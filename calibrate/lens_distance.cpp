@@ -1,6 +1,7 @@
 // How far two lenses are from each other.
 #include "calibrate/lens_distance.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -30,11 +31,14 @@ std::optional<LensDistance> distance_between(const Lens& a,
     if (!seen[i]) continue;
     const double angle = std::atan2(length(cross(v_a[i], v_b[i])), dot(v_a[i], v_b[i]));
     sum.angle_rad += angle * angle;
-    sum.axis_px += squared(Vec2{seen[i]->x - q[i].x, seen[i]->y - q[i].y}) / 2;
+    const double off = squared(Vec2{seen[i]->x - q[i].x, seen[i]->y - q[i].y});
+    sum.axis_px += off / 2;
+    sum.greatest_px = std::max(sum.greatest_px, std::sqrt(off));
     ++count;
   }
   if (count < 3) return std::nullopt;
-  return LensDistance{std::sqrt(sum.angle_rad / count), std::sqrt(sum.axis_px / count)};
+  return LensDistance{std::sqrt(sum.angle_rad / count), std::sqrt(sum.axis_px / count),
+                      sum.greatest_px};
 }
 
 }  // namespace calibrate

@@ -8,11 +8,12 @@
 
 namespace calibrate {
 
-// RMS over some pixels, once the turn is taken out that brings their directions together best: a
-// pose takes that back.
+// Over some pixels, RMS but for the greatest, once the turn is taken out that brings their
+// directions together best: a pose takes that back.
 struct LensDistance {
   double angle_rad = 0;
-  double axis_px = 0;  // in the first one's picture, along each axis
+  double axis_px = 0;      // in the first one's picture, along each axis
+  double greatest_px = 0;  // there, of any of the pixels, whichever way
 };
 
 // Of pixels that either has no direction for, or the first one no pixel, nothing is said. Nothing
