@@ -91,11 +91,14 @@ struct KeyReport {
   float thin = 0;  // the same of what lies deep within persons, by eights of pixels
 };
 
+// Two lenses' pictures of one place differ by more than that in scale: calibrations of one lens do
+// not, and a focus that breathes does.
+inline constexpr float scale_of_another_lens = 0.008F;
+
 // Whether a camera that was moved is seen larger or smaller than its plate, as another lens does
 // and a tripod that is pushed does not.
 inline bool is_of_another_lens(const PlateShift& shift) {
-  constexpr float larger = 0.008F;
-  return std::abs(shift.scale - 1) > larger;
+  return std::abs(shift.scale - 1) > scale_of_another_lens;
 }
 
 // Whether to look at a key before it is used, by the confidence of a frame or the mean of several:

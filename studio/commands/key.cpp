@@ -16,6 +16,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "calibrate/lens.h"
 #include "capture/camera.h"
 #include "capture/exr.h"
 #include "compositing/exr_sequence.h"
@@ -26,6 +27,7 @@
 #include "studio/commands/interruptible.h"
 #include "studio/json_text.h"
 #include "studio/key_masks.h"
+#include "studio/plate_lens.h"
 #include "studio/set_files.h"
 
 namespace studio {
@@ -38,7 +40,7 @@ constexpr int plate_footage = 480;  // frames that a clip without a plate is jud
 
 struct KeyOptions {
   std::vector<std::string> what;
-  std::string out, plate, response, colour = "Rec.1886", method = "screen", effort = "full";
+  std::string out, plate, lens, response, colour = "Rec.1886", method = "screen", effort = "full";
   std::string screen_colour = "any";
   bool person = false, plain_ratio = false, steady_light = false;
   std::optional<std::int64_t> frames, first;
@@ -60,6 +62,20 @@ VideoSource source_of(const KeyOptions& options, const std::string& uri) {
 std::optional<compositing::ScreenColour> screen_colour_of(const KeyOptions& options) {
   if (options.screen_colour == "any") return std::nullopt;
   return compositing::screen_colour_from_name(options.screen_colour);
+}
+
+// The lens of the options, which must be of the video's size; nothing if there is none.
+std::optional<calibrate::Lens> lens_of(const KeyOptions& options,
+                                       const std::string& uri,
+                                       const capture::CameraInfo& info) {
+  if (options.lens.empty()) return std::nullopt;
+  calibrate::Lens lens = calibrate::read_lens(options.lens);
+  if (lens.width != info.width || lens.height != info.height) {
+    throw std::invalid_argument(
+        fmt::format("the picture of {} is {}x{}, but the lens {} is for {}x{}", uri, info.width,
+                    info.height, options.lens, lens.width, lens.height));
+  }
+  return lens;
 }
 
 // A plate of frames that come one by one, as the options ask.
@@ -94,6 +110,17 @@ Json json_of_colour(bool by_screen, std::string_view colour) {
   return by_screen ? Json(colour) : Json();
 }
 
+// Of a plate that is written anew, to note its lens: what its file tells goes along.
+void keep_notes(std::string_view uri, capture::ExrOptions& tags) {
+  constexpr std::string_view file = "file:";
+  const std::string path(uri.starts_with(file) ? uri.substr(file.size()) : uri);
+  if (!path.ends_with(".exr") || !std::filesystem::is_regular_file(path)) return;
+  if (!tags.noise) tags.noise = capture::read_exr_noise(path);
+  if (const std::string told = capture::read_exr_transfer(path); !told.empty())
+    tags.transfer = told;
+  if (tags.lens.empty()) tags.lens = capture::read_exr_lens(path);
+}
+
 void make_plate(const KeyOptions& options, Console& console) {
   if (!options.out.ends_with(".exr")) {
     throw std::invalid_argument(options.out + ": plates are OpenEXR files, name it *.exr");
@@ -101,9 +128,11 @@ void make_plate(const KeyOptions& options, Console& console) {
   const VideoSource source = source_of(options, options.what.back());
   std::vector<ReadFile> files = files_of(source.uri, "the plate's own footage");
   if (!options.response.empty()) files.push_back({"the camera's response", options.response});
+  if (!options.lens.empty()) files.push_back({"the camera's lens", options.lens});
   spare_files(files, options.out);
   spare_files(files, console.figures_file());
   const auto camera = open_video(source);
+  const auto lens = lens_of(options, source.uri, camera->info());
   PlateMaker maker(options);
   const std::int64_t wanted = options.frames.value_or(plate_frames);
   std::int64_t passed = 0;
@@ -125,6 +154,8 @@ void make_plate(const KeyOptions& options, Console& console) {
   capture::ExrOptions tags;
   if (plate.knows_noise) tags.noise = {plate.noise_gain, plate.noise_floor};
   tags.transfer = name_of_light(source);
+  if (lens) tags.lens = calibrate::text_of_lens(*lens);
+  if (frames == 1) keep_notes(source.uri, tags);
   capture::write_exr(options.out, plate.light, tags);
   const bool by_screen = options.method == "screen";
   const bool screen = by_screen && compositing::screen_share(plate.light, plate.colour) > 0;
@@ -139,17 +170,19 @@ void make_plate(const KeyOptions& options, Console& console) {
                {"height", plate.light.height},
                {"colour", json_of_colour(by_screen, colour)},
                {"noise_gain", nullptr},
-               {"noise_floor", nullptr}};
+               {"noise_floor", nullptr},
+               {"lens", lens ? Json(options.lens) : Json()}};
   std::string noise = "noise not measured";
   if (tags.noise) {
-    figures["noise_gain"] = plate.noise_gain;
-    figures["noise_floor"] = plate.noise_floor;
-    noise = fmt::format("noise in black {:.4f}", std::sqrt(plate.noise_floor));
+    figures["noise_gain"] = tags.noise->gain;
+    figures["noise_floor"] = tags.noise->floor;
+    noise = fmt::format("noise in black {:.4f}", std::sqrt(tags.noise->floor));
   }
   console.figures(json_text(figures));
-  console.say(fmt::format("{}: {}x{}, {} of {} frames, {} screen, {}", options.out,
+  console.say(fmt::format("{}: {}x{}, {} of {} frames, {} screen, {}{}", options.out,
                           plate.light.width, plate.light.height, options.person ? "middle" : "mean",
-                          frames, screen ? fmt::format("a {}", colour) : "no", noise));
+                          frames, screen ? fmt::format("a {}", colour) : "no", noise,
+                          lens ? ", with " + words_for_lens(*lens) : ""));
 }
 
 compositing::KeySettings settings_of(const KeyOptions& options) {
@@ -174,7 +207,7 @@ compositing::KeySettings settings_of(const KeyOptions& options) {
 void spare_what_is_read(const KeyOptions& options, const VideoSource& source, Console& console) {
   std::vector<ReadFile> files = files_of(source.uri, "the clip");
   for (const std::string& path :
-       {options.plate, options.response, options.masks.garbage, options.masks.core}) {
+       {options.plate, options.lens, options.response, options.masks.garbage, options.masks.core}) {
     if (path.empty()) continue;
     files.push_back({"what the clip is keyed by", path});
   }
@@ -361,6 +394,9 @@ void key_clip(const KeyOptions& options, Console& console) {
         fmt::format("the clean plate {} is {}x{}, but the video {} is {}x{}", options.plate,
                     plate.light.width, plate.light.height, source.uri, width, height));
   }
+  if (const auto lens = lens_of(options, source.uri, camera->info());
+      lens && !options.plate.empty())
+    require_plate_of_lens(options.plate, *lens, options.lens, shown_part(camera->info(), source));
   compositing::KeyMasks masks = read_key_masks(options.masks, width, height);
   if (clip.by_screen && !options.plate.empty()) {
     if (const auto doubts = doubts_of_plate(plate, masks.garbage)) console.warn(*doubts);
@@ -418,6 +454,9 @@ Command key_command() {
         arguments.option("--colour", o->colour, "the clip's transfer curve, as in a set");
         arguments.option("--response", o->response,
                          "the camera's measured response (.rsp or .toml), in place of --colour");
+        arguments.option("--lens", o->lens,
+                         "the camera's lens (.cameramodel or .toml): a plate notes it, and a clip "
+                         "is keyed by no plate that notes another");
         arguments.option("--first", o->first, 0, 1'000'000'000, "begin at this frame");
         arguments.option(
             "--frames", o->frames, 1, 1'000'000'000,
