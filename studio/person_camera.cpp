@@ -14,6 +14,7 @@
 #include "compositing/person_box.h"
 #include "studio/clean_plates.h"
 #include "studio/key_masks.h"
+#include "studio/plate_lens.h"
 #include "studio/section.h"
 
 namespace studio {
@@ -106,6 +107,27 @@ FileTimes times_of(const PersonCamera& camera) {
   return file_times({camera.response, key.plate, key.masks.garbage, key.masks.core});
 }
 
+// As apart_px() of plate_lens.h, of a plate that was taken on air; nothing where a lens is unknown.
+std::optional<double> apart_px(const PlateTaking& taking,
+                               const PersonCamera& camera,
+                               const ShownPart& shown) {
+  if (!taking.lens() || !camera.lens) return std::nullopt;
+  return studio::apart_px(*taking.lens(), *camera.lens, shown);
+}
+
+void require_taken_through_lens(const PlateTaking& taking,
+                                const PersonCamera& camera,
+                                const ShownPart& shown) {
+  const auto apart = apart_px(taking, camera, shown);
+  if (!apart) return;
+  throw std::runtime_error(fmt::format(
+      "the plate was taken on air through a lens with {}, but the set's, {}, has {}: the same "
+      "things lie up to {:.4g} px apart in the picture's middle. Give `take` another number, to "
+      "take it anew while nobody is there",
+      words_for_lens(*taking.lens()), camera.lens_file.empty() ? "written there" : camera.lens_file,
+      words_for_lens(*camera.lens), *apart));
+}
+
 // But for where in their files they are written.
 bool same(PersonCamera a, PersonCamera b) {
   a.place = b.place;
@@ -173,6 +195,8 @@ compositing::CleanPlate PersonCameraFeed::read_plate(const VideoSource& source,
         "the clean plate {} is {}x{}, but the video {} is {}x{}", key.plate, plate.light.width,
         plate.light.height, settings_.source, info.width, info.height));
   }
+  if (settings_.lens && !key.plate.empty())
+    require_plate_of_lens(key.plate, *settings_.lens, settings_.lens_file, shown);
   return plate;
 }
 
@@ -228,6 +252,7 @@ void PersonCameraFeed::begin_key(const VideoSource& source, const PersonCameraFe
   keep_garbage(masks_);
   const KeyChoice* const was = before && before->settings_.key ? &*before->settings_.key : nullptr;
   if (was && was->takes_plate && was->take == key.take) {
+    require_taken_through_lens(*before->taking_, settings_, shown);
     taking_ = before->taking_;
     if (const auto plate = taking_->plate()) {
       make_keyer(*plate, std::move(masks_));
@@ -235,10 +260,11 @@ void PersonCameraFeed::begin_key(const VideoSource& source, const PersonCameraFe
     }
   } else {
     check_length();
-    if (was && was->takes_plate && before->keyer_) plate_before_ = before->taking_->plate();
+    if (was && was->takes_plate && before->keyer_ && !apart_px(*before->taking_, settings_, shown))
+      plate_before_ = before->taking_->plate();
     const bool by_screen = key.settings.method == compositing::KeyMethod::screen;
     taking_ = std::make_shared<PlateTaking>(masks_.garbage, by_screen, !info.live,
-                                            key.settings.screen_colour);
+                                            key.settings.screen_colour, settings_.lens);
     notes_.push_back(fmt::format(
         "takes its plate of the next {} frames: nobody may be in the picture", shots_of_plate));
   }

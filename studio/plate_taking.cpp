@@ -43,8 +43,13 @@ std::vector<float> cells_of(const capture::Image& picture) {
 PlateTaking::PlateTaking(std::vector<std::uint8_t> garbage,
                          bool screen,
                          bool waits,
-                         std::optional<compositing::ScreenColour> colour)
-    : garbage_(std::move(garbage)), screen_(screen), waits_(waits), colour_(colour) {}
+                         std::optional<compositing::ScreenColour> colour,
+                         std::optional<calibrate::Lens> lens)
+    : garbage_(std::move(garbage)),
+      screen_(screen),
+      waits_(waits),
+      colour_(colour),
+      lens_(std::move(lens)) {}
 
 PlateTaking::~PlateTaking() {
   if (work_.valid()) work_.wait();

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "calibrate/lens.h"
 #include "capture/image.h"
 #include "compositing/clean_plate.h"
 #include "compositing/plate_footage.h"
@@ -24,17 +25,20 @@ class PlateTaking {
  public:
   // `garbage`: (height, width), 255 = not looked at when the plate is doubted, or empty.
   // `screen`: it is to be a screen, of that colour if one is given. `waits`: each picture counts;
-  // else those that come while one is being added are left out.
+  // else those that come while one is being added are left out. `lens`: that it is taken through,
+  // where that is known.
   PlateTaking(std::vector<std::uint8_t> garbage,
               bool screen,
               bool waits,
-              std::optional<compositing::ScreenColour> colour = {});
+              std::optional<compositing::ScreenColour> colour = {},
+              std::optional<calibrate::Lens> lens = {});
   ~PlateTaking();
   PlateTaking(const PlateTaking&) = delete;
   PlateTaking& operator=(const PlateTaking&) = delete;
 
   // One more picture, (height, width, 3), of the size of those before, if the plate is not there.
   void add(std::shared_ptr<const capture::Image> shot);
+  const std::optional<calibrate::Lens>& lens() const { return lens_; }
   // Pictures that it has.
   std::size_t given();
   // Null until it is there. Throws what went wrong while it was made.
@@ -50,6 +54,7 @@ class PlateTaking {
   const std::vector<std::uint8_t> garbage_;
   const bool screen_, waits_;
   const std::optional<compositing::ScreenColour> colour_;
+  const std::optional<calibrate::Lens> lens_;
   std::mutex mutex_;
   std::future<void> work_;
   std::size_t given_ = 0;

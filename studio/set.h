@@ -212,6 +212,7 @@ struct PersonCamera {
   double offset_s = 0;                     // how much later than the plate its frames are stamped
   std::optional<KeyChoice> key;            // nothing = the source has alpha, or shows all
   std::optional<calibrate::Lens> lens;     // with its pose; further cameras always have both
+  std::string lens_file;                   // "" = written in the set
   calibrate::Pose cam_from_set;
   friend bool operator==(const PersonCamera&, const PersonCamera&) = default;
 };

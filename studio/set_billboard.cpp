@@ -81,8 +81,9 @@ void read_camera(Section& section, const SetContext& context, PersonCamera& came
   std::optional<RigCamera> of_rig;
   if (section.has("rig_camera")) {
     of_rig = read_rig_camera(section, context, camera.lens, camera.cam_from_set, camera.response);
+    if (of_rig) camera.lens_file = of_rig->lens_file;
   } else {
-    if (auto lens = read_lens_key(section, {0, 0}, context.base)) camera.lens = *lens;
+    camera.lens = read_lens_key(section, {0, 0}, context.base, &camera.lens_file);
     if (auto table = section.table("pose")) camera.cam_from_set = read_fixed_pose(*table);
     read_response_key(section, context.base, camera.response);
   }

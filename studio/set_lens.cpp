@@ -102,7 +102,8 @@ void refuse_lens_keys(Section& section, const std::string& why) {
 
 std::optional<calibrate::Lens> read_lens_key(Section& section,
                                              std::array<int, 2> size,
-                                             const std::filesystem::path& base) {
+                                             const std::filesystem::path& base,
+                                             std::string* file) {
   if (!section.has("lens") && section.has("model")) return read_lens_keys(section, size);
   refuse_lens_keys(section, section.has("lens") ? "is of another lens: leave out either it or lens"
                                                 : "is of use only with model");
@@ -116,6 +117,7 @@ std::optional<calibrate::Lens> read_lens_key(Section& section,
   }
   std::string path;
   if (!section.file("lens", base, path)) return std::nullopt;
+  if (file != nullptr) *file = path;
   try {
     return calibrate::read_lens(path);
   } catch (const std::runtime_error& error) {

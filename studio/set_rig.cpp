@@ -85,6 +85,7 @@ std::optional<RigCamera> read_rig_camera(Section& section, const SetContext& con
   }
   try {
     camera.lens = calibrate::read_lens(member->lens);
+    camera.lens_file = member->lens;
   } catch (const std::runtime_error& error) {
     section.fault("rig_camera", fmt::format("has a lens in the rig's file that cannot be used: {}",
                                             error.what()));

@@ -22,6 +22,7 @@ struct RigContext {
 // What a camera's name in the rig stands for.
 struct RigCamera {
   std::optional<calibrate::Lens> lens;  // nothing = a fault was added
+  std::string lens_file;
   calibrate::Pose cam_from_set;
   std::string response;      // file; "" = none
   double time_offset_s = 0;  // how much later than the rig's clock its frames are stamped
@@ -65,10 +66,12 @@ PlacementSettings read_placement(Section table, PlacementSettings placement = {}
 
 // The lens of a section: `lens` as a file's name or a table, or `model` and its values beside the
 // section's other keys. `size` is that of the whole source picture, {0, 0} if unknown. Nothing if
-// there is none, or it is bad and a fault was added.
+// there is none, or it is bad and a fault was added. `file`: where its file's path goes, if it has
+// one.
 std::optional<calibrate::Lens> read_lens_key(Section& section,
                                              std::array<int, 2> size,
-                                             const std::filesystem::path& base);
+                                             const std::filesystem::path& base,
+                                             std::string* file = nullptr);
 
 // Faults for the keys of a lens that stand beside the section's others, where its lens is not one
 // of them.

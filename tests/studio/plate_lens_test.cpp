@@ -1,4 +1,4 @@
-// Clean plates that know the lens that filmed them: on the command line.
+// Clean plates that know the lens that filmed them: on the command line, in sets and on air.
 #include "studio/plate_lens.h"
 
 #include <gmock/gmock.h>
@@ -14,11 +14,14 @@
 #include <nlohmann/json.hpp>
 
 #include "calibrate/camera_model.h"
+#include "capture/crop.h"
 #include "capture/exr.h"
 #include "capture/png.h"
 #include "compositing/made_clip.h"
+#include "studio/person_feed.h"
 #include "tests/made_files.h"
 #include "tests/studio/command_line.h"
+#include "tests/studio/made_show.h"
 
 namespace studio::plate_lens_test {
 namespace {
@@ -253,6 +256,142 @@ TEST_F(KeyWithLens, RefusesANoteThatIsNoLensIfTheClipsIsKnown) {
     EXPECT_THAT(keyed.err, Not(HasSubstr("\x1b")));
     EXPECT_EQ(key("").err, "") << text.substr(0, 99);
   }
+}
+
+// Persons before a green screen of 64x48, which nobody leaves or enters.
+class PlateLensInSet : public MadeShowTest {
+ protected:
+  static void SetUpTestSuite() {
+    MadeShowTest::SetUpTestSuite();
+    capture::register_camera("green", [](std::string_view, const capture::CameraOptions& options) {
+      return std::make_unique<Green>(options.crop);
+    });
+  }
+
+  class Green final : public capture::Camera {
+   public:
+    explicit Green(const std::optional<std::array<int, 4>>& crop)
+        : crop_(capture::crop_within(crop, 64, 48)) {
+      info_.width = crop_.width, info_.height = crop_.height;
+      info_.whole_width = 64, info_.whole_height = 48;
+      info_.rate = {25, 1};
+    }
+    const capture::CameraInfo& info() const override { return info_; }
+    capture::CameraStatistics statistics() const override { return {}; }
+    std::optional<capture::Frame> next() override {
+      auto image = std::make_shared<capture::Image>(picture());
+      capture::cut(*image, crop_);
+      capture::Frame frame;
+      frame.image = std::move(image);
+      frame.number = number_;
+      frame.time = capture::time_of_frame(number_++, info_.rate);
+      return frame;
+    }
+
+   private:
+    capture::CameraInfo info_;
+    capture::Crop crop_;
+    std::int64_t number_ = 0;
+  };
+  static capture::Image picture() {
+    capture::Image image = capture::make_image(48, 64);
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      image.pixels[i] = std::array{0.05F, 0.4F, 0.08F}[i % 3];
+    return image;
+  }
+
+  void write_plate(const std::string& name, double focal_px) const {
+    capture::ExrOptions options;
+    if (focal_px > 0) options.lens = calibrate::text_of_lens(pinhole(64, 48, focal_px));
+    capture::write_exr(dir_ / name, picture(), options);
+  }
+  Set set_with(const std::string& lens,
+               const std::string& key,
+               const std::string& more = "") const {
+    return made_set("grey:500,25,0",
+                    "[[billboard]]\nname = \"she\"\nposition = [0, -1, 0]\nsource = \"green:\"\n" +
+                        lens + "pose = { position = [0, -6, 1.5], look_at = [0, 0, 1] }\n" + more +
+                        "key = { " + key + " }\n");
+  }
+  static std::string lens_of(double focal_px) {
+    return "lens = { model = \"pinhole\", size = [64, 48], focal_px = " + std::to_string(focal_px) +
+           " }\n";
+  }
+  static std::string faults_of(const Set& set, const PersonFeed* before = nullptr) {
+    try {
+      const PersonFeed feed(set, std::nullopt, false, before);
+      return "";
+    } catch (const SetError& error) {
+      return error.what();
+    }
+  }
+};
+
+TEST_F(PlateLensInSet, RefusesAPlateOfAnotherLensAndNamesBoth) {
+  write_plate("plate.exr", 80);
+  calibrate::write_lens(dir_ / "studio.cameramodel", pinhole(64, 48, 100));
+  const std::string file = "lens = \"studio.cameramodel\"\n";
+  const std::string faults = faults_of(set_with(file, "plate = \"plate.exr\""));
+  EXPECT_THAT(faults, HasSubstr("made.toml:"));
+  EXPECT_THAT(faults, HasSubstr((dir_ / "plate.exr").string() + " was filmed through a lens with a "
+                                                                "focal length of 80 px (pinhole)"));
+  EXPECT_THAT(faults,
+              HasSubstr((dir_ / "studio.cameramodel").string() + ", has a focal length of 100 px"));
+  EXPECT_THAT(faults, testing::ContainsRegex("up to [0-9]+\\.[0-9]+ px apart"));
+  EXPECT_THAT(faults_of(set_with(lens_of(100), "plate = \"plate.exr\"")),
+              HasSubstr("but the clip's, as the set has it, has a focal length of 100 px"));
+}
+
+TEST_F(PlateLensInSet, AcceptsTheSameLensAndOneThatIsNotKnown) {
+  for (const double noted : {0.0, 100.0, 100.2}) {
+    write_plate("plate.exr", noted);
+    EXPECT_EQ(faults_of(set_with(lens_of(100), "plate = \"plate.exr\"")), "") << noted;
+  }
+  write_plate("plate.exr", 80);
+  EXPECT_EQ(
+      faults_of(made_set("grey:500,25,0",
+                         "[[billboard]]\nposition = [0, -1, 0]\nsource = \"green:\"\nheight = "
+                         "2\nkey = { plate = \"plate.exr\" }\n")),
+      "");
+}
+
+TEST_F(PlateLensInSet, ComparesTheLensesOfThePartThatIsShown) {
+  const std::string crop = "crop = [30, 10, 32, 36]\n";
+  write_plate("plate.exr", 100);
+  EXPECT_EQ(faults_of(set_with(lens_of(100), "plate = \"plate.exr\"", crop)), "");
+  write_plate("plate.exr", 80);
+  EXPECT_THAT(faults_of(set_with(lens_of(100), "plate = \"plate.exr\"", crop)),
+              HasSubstr("was filmed through a lens"));
+}
+
+TEST_F(PlateLensInSet, NamesTheLensOfARig) {
+  write_plate("plate.exr", 80);
+  calibrate::write_lens(dir_ / "left.cameramodel", pinhole(64, 48, 100));
+  std::ofstream(dir_ / "rig.toml") << "[[camera]]\nname = \"left\"\nlens = \"left.cameramodel\"\n"
+                                      "position = [0, 0, 0]\n"
+                                      "rotation = [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+  const Set set = made_set(
+      "grey:500,25,0",
+      "[rig]\nfile = \"rig.toml\"\npose = { position = [0, -6, 1.5], look_at = [0, 0, 1] }\n"
+      "[[billboard]]\nposition = [0, -1, 0]\nsource = \"green:\"\nrig_camera = \"left\"\n"
+      "key = { plate = \"plate.exr\" }\n");
+  EXPECT_THAT(faults_of(set), HasSubstr((dir_ / "left.cameramodel").string()));
+}
+
+// On air, a plate is of the lens that the set had.
+TEST_F(PlateLensInSet, KeepsAPlateThatWasTakenOnAirForItsOwnLensAlone) {
+  const std::string take = "plate = \"take\"";
+  const Set set = set_with(lens_of(100), take);
+  PersonFeed feed(set, std::nullopt, false);
+  for (int i = 0; i < 60; ++i)
+    feed.at(capture::time_of_frame(i, {25, 1}), set.camera.pose.cam_from_set);
+  EXPECT_EQ(faults_of(set_with(lens_of(100.2), take), &feed), "");
+  const std::string faults = faults_of(set_with(lens_of(80), take), &feed);
+  EXPECT_THAT(faults, HasSubstr("the plate was taken on air through a lens with a focal length of "
+                                "100 px (pinhole), but the set's, written there, has a focal "
+                                "length of 80 px"));
+  EXPECT_THAT(faults, HasSubstr("Give `take` another number"));
+  EXPECT_EQ(faults_of(set_with(lens_of(80), take + ", take = 1"), &feed), "");
 }
 
 }  // namespace
