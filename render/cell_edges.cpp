@@ -489,7 +489,9 @@ CellMask CellBaker::uncertain(int n) const {
         ++pixels;
       }
     }
-    if (n < least_samples_[own] || std::max(variances[own], around / pixels) > most) {
+    // Whatever neighbours' brightness: beside what is white this one may be dark.
+    const float variance = std::max(variances[own], around / pixels);
+    if (n < least_samples_[own] || variance * further_samples_.share_shown(own) > most) {
       mask[own / 64] |= std::uint64_t{1} << (own % 64);
     }
   }
@@ -503,7 +505,7 @@ void CellBaker::count_errors() {
     // What was blended is as sure as one of it.
     const float variance =
         edge_[k] == Edge::blend ? further_samples_.spread(k) : further_samples_.variance(k);
-    counting_[k].error = std::sqrt(variance / n);
+    counting_[k].error = std::sqrt(variance * further_samples_.share_shown(k) / n);
   }
 }
 

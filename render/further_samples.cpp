@@ -12,12 +12,6 @@ Vec3f counted(Vec3f v) {
   return {std::min(v.x, sample_limit), std::min(v.y, sample_limit), std::min(v.z, sample_limit)};
 }
 
-// How much a variance counts of light of that mean.
-float share_shown(float mean) {
-  const float over = std::max(mean / display_limit, 1.0F), tolerance = over * over;
-  return 1 / (tolerance * tolerance);
-}
-
 }  // namespace
 
 void FurtherSamples::begin(std::size_t pixel) {
@@ -55,10 +49,20 @@ void FurtherSamples::end_batch() {
 // Not less than rounding leaves.
 float FurtherSamples::spread(std::size_t pixel, Vec3f squares) const {
   const Vec3f shown = of_pixel_[pixel].shown, behind = of_pixel_[pixel].behind;
-  const float each = 1 / static_cast<float>(counts_[pixel]);
-  const Vec3f of_mean = (shown * shown + behind * behind) * each, mean = shown * each;
-  const Vec3f shares{share_shown(mean.x), share_shown(mean.y), share_shown(mean.z)};
-  return std::max(largest((squares - of_mean) * shares), 0.0F);
+  const Vec3f of_mean =
+      (shown * shown + behind * behind) * (1 / static_cast<float>(counts_[pixel]));
+  return std::max(largest(squares - of_mean), 0.0F);
+}
+
+float FurtherSamples::share_shown(std::size_t pixel) const {
+  const Sums& sums = of_pixel_[pixel];
+  const auto n = static_cast<float>(counts_[pixel]);
+  if (!(n > 1)) return 1;
+  // A few samples that met a glint have a bright mean, of what may well be dark.
+  const float twice_error = 2 * std::sqrt(spread(pixel)) / n;
+  const float mean = std::min({sums.shown.x, sums.shown.y, sums.shown.z}) / n;
+  const float over = std::max((mean - twice_error) / display_limit, 1.0F);
+  return 1 / (over * over * over * over);
 }
 
 // Batches that agree may all be off alike: each has a sample in every quarter of the pixel. But

@@ -54,10 +54,12 @@ class FurtherSamples {
   void count_as_batch(std::size_t pixel) { ++of_pixel_[pixel].batches; }
 
   int count(std::size_t pixel) const { return counts_[pixel]; }
-  // The squares of what samples differ from their mean by, added up. Light of a mean above
-  // display_limit counts the less, by the fourth power: a display shows white there, and a tone
-  // curve, steps the smaller the brighter it is.
+  // The squares of what samples differ from their mean by, added up.
   float spread(std::size_t pixel) const { return spread(pixel, of_pixel_[pixel].squares); }
+  // How much of a variance shows: of a mean that is above display_limit for sure the less, by the
+  // fourth power. A display shows white there, and a tone curve, steps the smaller the brighter it
+  // is.
+  float share_shown(std::size_t pixel) const;
   // The variance that independent samples would have whose mean is as far off as theirs.
   float variance(std::size_t pixel) const;
 

@@ -80,20 +80,26 @@ TEST(FurtherSamples, CountNothingBeyondTheLimit) {
 }
 
 // Noise of light that is white on any display may be as much as its square is above that.
-TEST(FurtherSamples, AreSurerOfLightThatIsBrighterThanDisplaysShow) {
-  const auto variance = [](float mean, float off) {
-    return samples_of(16, [=](int i) { return mean + (i % 2 == 0 ? off : -off); }).variance(pixel);
+TEST(FurtherSamples, ShowLessOfLightThatIsBrighterThanDisplaysShow) {
+  const auto share = [](float mean, float off) {
+    return samples_of(16, [=](int i) { return mean + (i % 2 == 0 ? off : -off); })
+        .share_shown(pixel);
   };
-  const float dim = variance(1, 0.5F);
-  EXPECT_GT(dim, 0.01F);
-  EXPECT_NEAR(variance(3.9F, 0.5F), dim, 1e-3F * dim);
-  EXPECT_NEAR(variance(8, 0.5F), dim / 16, 1e-3F * dim);
-  EXPECT_NEAR(variance(16, 0.5F), dim / 256, 1e-3F * dim);
-  // Little of something bright counts as it did: the pixel may show all of it.
-  const auto glint = [](float light) {
-    return samples_of(16, [=](int i) { return i == 5 ? light : 0.1F; }).variance(pixel);
-  };
-  EXPECT_NEAR(glint(60) / glint(30), 4, 0.1);
+  EXPECT_EQ(share(1, 0.5F), 1);
+  EXPECT_EQ(share(3.9F, 0.5F), 1);
+  EXPECT_NEAR(share(8, 0.01F), 1 / 16.0, 1e-3);
+  EXPECT_NEAR(share(16, 0.01F), 1 / 256.0, 1e-4);
+  EXPECT_EQ(FurtherSamples{}.share_shown(pixel), 1);
+}
+
+// A few samples of something bright tell of a mean that is above white, of what may be dark: it is
+// not sure enough to show less.
+TEST(FurtherSamples, ShowAllOfAGlint) {
+  for (const float light : {10.0F, 30.0F, 60.0F, 1e9F}) {
+    const FurtherSamples glint =
+        samples_of(16, [=](int i) { return i == 5 || i == 10 ? light : 0.1F; });
+    EXPECT_EQ(glint.share_shown(pixel), 1) << light;
+  }
 }
 
 TEST(FurtherSamples, BeginAnew) {
