@@ -78,7 +78,7 @@ bool CellBaker::find(int stage, bool past_pictures) {
   gather_.pictures = past_pictures ? LivePictures::passed_apart : LivePictures::met;
   // Rays that caustics let through differ from others in more than where they go.
   // Cells that are about to go on are not worth the time.
-  const bool stays = stage <= one_ray_stage || stage == finished_stage;
+  const bool stays = stage <= one_ray_stage || stage >= finished_stage;
   transport.shadow_answers.begin(grid_ != nullptr && !frame.caustics && stays);
   gather_.notes.begin_cell(grid_ != nullptr ? &transport.shadow_answers : nullptr,
                            frame.inputs.scene->places().bounds);
@@ -91,7 +91,7 @@ bool CellBaker::find(int stage, bool past_pictures) {
   counting_ = frame.inputs.count_rays ? transport.counts.data() : nullptr;
   smooths_ = stage == smoothed_stage;
   blend_contrast_ = blend_contrast_of_stage(frame.job->effort, stage);
-  cuts_glass_later_ = effort_.aa_samples > 1 && stage == finished_stage;
+  cuts_glass_later_ = effort_.aa_samples > 1 && stage >= finished_stage;
   compares_centres_ = effort_.aa_samples > 1;
   compares_further_ = effort_.aa_tolerance > 0 || counting_ != nullptr;
   samples_.fill({});

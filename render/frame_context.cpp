@@ -397,8 +397,8 @@ void check_stages(const FrameContext& context) {
     throw std::invalid_argument("a frame of " + std::to_string(cells) + " cells has stages for " +
                                 std::to_string(stages.size()));
   }
-  if (std::ranges::any_of(stages, [](std::uint8_t s) { return s > finished_stage; })) {
-    throw std::invalid_argument("a cell's stage must be 0 to " + std::to_string(finished_stage));
+  if (std::ranges::any_of(stages, [](std::uint8_t s) { return s >= refinement_stages; })) {
+    throw std::invalid_argument("a cell's stage must be 0 to " + std::to_string(finer_stage));
   }
 }
 

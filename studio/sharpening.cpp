@@ -26,11 +26,14 @@ constexpr double least_gain = 0.25;  // of what is wanted: looks that are less a
 // Cells that show persons go on no more from that share of a frame's time on, others do.
 constexpr double share_for_persons = 0.75;
 constexpr double share_at_least = 0.2;  // for cells, however long the rest takes
-constexpr double followed = 0.3;        // of what was measured last, in running means
+// What a frame may take that finds no cell anew, where cells go beyond the effort: they make it
+// more.
+constexpr double share_for_finer = 0.5;
+constexpr double followed = 0.3;  // of what was measured last, in running means
 // What a cell takes at each stage, of the coarsest one's, as long as nothing better is known: as in
 // the papers' scenes (`platelight bench drag`), where a few rays at edges are little more than one
 // everywhere.
-constexpr std::array<double, render::refinement_stages> expected_cost{1, 2, 6, 14, 15, 18, 60};
+constexpr std::array<double, render::refinement_stages> expected_cost{1, 2, 6, 14, 15, 18, 60, 130};
 // Of the cells, as many are found in a frame with a ray a pixel however long they take.
 constexpr double least = 0.01;
 // A stage that takes less than this times the one before takes its place.
@@ -45,6 +48,11 @@ constexpr double small_part = 0.0625, seconds_to_go_straight = 1.5;
 constexpr double most_frames_of_cell = 3, part_that_waits = 0.9, forgotten_in_frame = 1.01;
 // While something moves, for so many: others wait until it stands.
 constexpr double most_frames_in_motion = 0.25;
+
+// As the effort asks is all that is asked for.
+std::size_t sharp(std::uint8_t stage) { return std::min<std::size_t>(stage, finished_stage); }
+
+constexpr double room_for_finer = 0.5;  // of the memory for what is kept
 
 // The step through all cells in which they take their turns, spread over the picture: by the golden
 // section (Knuth, "The Art of Computer Programming" 3, 6.4).
@@ -112,7 +120,9 @@ std::string Sharpening::why_coarse() const {
         "and stays at a sharpness of {:.2f}; a lower [effort] can be finished",
         share());
   }
-  if (slow_cells_ == 0 || waiting_cells_ > 0 || !plan_.ahead.empty()) return "";
+  const bool goes_on = std::ranges::any_of(
+      plan_.ahead, [](const render::Refinement& one) { return one.stage <= finished_stage; });
+  if (slow_cells_ == 0 || waiting_cells_ > 0 || goes_on) return "";
   const double part = static_cast<double>(slow_cells_) / static_cast<double>(plan_.stages.size());
   return fmt::format(
       "{:.1f} % of the picture would hold a frame up by more than {:.0f} frames to be found finer: "
@@ -161,23 +171,23 @@ std::size_t Sharpening::after(std::size_t stage, std::size_t coarse) const {
 
 // Lists the cells that go on, the coarsest first: in a live show all of them, for it is seen how
 // far the time goes; otherwise as many as `left` is the cost of.
-void Sharpening::go_on(double left, std::span<const float> looks_ms) {
+void Sharpening::go_on(double left, std::span<const float> looks_ms, int last) {
   const bool persons_wait = live_ && looks_matter() && relight_ms() > share_for_persons * frame_ms_;
   const std::vector<std::uint8_t>& stages = plan_.stages;
   const auto coarse = static_cast<std::size_t>(
       std::ranges::count_if(stages, [](std::uint8_t stage) { return stage < anti_aliased; }));
   const std::size_t stride = stride_of(stages.size());
-  for (std::size_t stage = 0; stage < finished_stage; ++stage) {
+  for (std::size_t stage = 0; stage < static_cast<std::size_t>(last); ++stage) {
     const std::size_t to = after(stage, coarse);
     for (std::size_t turn = 0; turn < stages.size() && left > 0; ++turn) {
       const std::size_t i = turn * stride % stages.size();
       if (stages[i] != stage || (persons_wait && looks_much(looks_ms[i]))) continue;
       std::size_t there = to;
       while (live_ && there > stage && takes_too_long(i, there)) --there;
-      slow_cells_ += there < to;
+      slow_cells_ += there < to && stage < finished_stage;
       if (there == stage) continue;
       if (live_ && may_take_too_long(i, there)) {
-        ++waiting_cells_;
+        waiting_cells_ += stage < finished_stage;
         continue;
       }
       plan_.ahead.push_back({i, static_cast<std::uint8_t>(there)});
@@ -224,7 +234,9 @@ std::vector<std::size_t> Sharpening::too_costly(std::span<const float> looks_ms)
   return order;
 }
 
-SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const float> looks_ms) {
+SharpeningPlan& Sharpening::next(std::span<const int> kept,
+                                 std::span<const float> looks_ms,
+                                 int last) {
   looks_ms_ = std::accumulate(looks_ms.begin(), looks_ms.end(), 0.0);
   if (!(looks_ms_ > 0)) shed_ = {};
   const bool told = told_.has_value();
@@ -255,9 +267,10 @@ SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const floa
     left = static_cast<double>(kept.size()) * rest / std::max(frames_a_second_ - 1, 1.0);
   }
   left -= static_cast<double>(lost) * cost_[first];
+  if (!live_ || moves_ || relight_ms() > share_for_finer * frame_ms_) last = finished_stage;
   // Lost cells have their turn in the frames after.
   std::ranges::transform(kept, plan_.stages.begin(), [](int stage) {
-    return static_cast<std::uint8_t>(stage == none ? finished_stage : stage);
+    return static_cast<std::uint8_t>(stage == none ? render::finer_stage : stage);
   });
   if (shed_.foreseen_ms > 0 && told) {
     const bool helped = shed_.before_ms - looks_ms_ > part_that_helps * shed_.foreseen_ms;
@@ -269,19 +282,17 @@ SharpeningPlan& Sharpening::next(std::span<const int> kept, std::span<const floa
   shed_.now = !shed.empty();
   for (const std::size_t i : shed) plan_.stages[i] = coarser(plan_.stages[i]);
   if (!full_) stopped_ = false;
-  if (!stopped_ && !shed_.now) go_on(left, looks_ms);
+  if (!stopped_ && !shed_.now) go_on(left, looks_ms, last);
   for (std::size_t i = 0; i < kept.size(); ++i) {
     if (kept[i] == none) plan_.stages[i] = static_cast<std::uint8_t>(first);
   }
-  reached_ = std::accumulate(plan_.stages.begin(), plan_.stages.end(), std::size_t{0});
   went_on_ = !live_ && !plan_.ahead.empty();
   if (!live_) {
-    for (const render::Refinement& one : plan_.ahead) {
-      reached_ += one.stage - std::size_t{plan_.stages[one.cell]};
-      plan_.stages[one.cell] = one.stage;
-    }
+    for (const render::Refinement& one : plan_.ahead) plan_.stages[one.cell] = one.stage;
     plan_.ahead.clear();
   }
+  reached_ = 0;
+  for (const std::uint8_t stage : plan_.stages) reached_ += sharp(stage);
   plan_.ahead_ms = std::max(left, 0.0);
   return plan_;
 }
@@ -294,7 +305,7 @@ void Sharpening::found_ahead(std::span<const std::uint8_t> stages, double ms) {
     if (one.given_up) in_vain_ms += one.took_ms;
     if (stages[one.cell] != one.stage) continue;
     ++found[one.stage];
-    reached_ += one.stage - std::size_t{plan_.stages[one.cell]};
+    reached_ += sharp(one.stage) - sharp(plan_.stages[one.cell]);
   }
   went_on_ = !plan_.ahead.empty();
   if (moves_ && in_vain_ms > 0) return;  // the others are the quick ones
@@ -372,7 +383,13 @@ void render_sharpening(Sharpening& sharpening,
   using Milliseconds = std::chrono::duration<double, std::milli>;
   const Clock::time_point start = Clock::now();
   const auto frame = render::prepare_frame(inputs, job, plate);
-  SharpeningPlan& plan = sharpening.next(inputs.kept->stages(), inputs.kept->looks_ms());
+  // What is kept of finer cells takes more room: what goes beyond the effort leaves enough for what
+  // does not.
+  const bool finer = render::can_be_finer(job.effort) &&
+                     static_cast<double>(inputs.kept->bytes()) <
+                         room_for_finer * static_cast<double>(inputs.kept->room());
+  SharpeningPlan& plan = sharpening.next(inputs.kept->stages(), inputs.kept->looks_ms(),
+                                         finer ? render::finer_stage : finished_stage);
   job.stages = plan.stages;
   render::RenderStatistics ahead;
   const Clock::time_point begun = Clock::now();

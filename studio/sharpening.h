@@ -40,7 +40,11 @@ class Sharpening {
   // Looking takes the longer the finer cells are, in every frame: where that leaves a live show no
   // time, cells stay as they are; where it makes frames late, those that take most of it are found
   // anew, coarser, as long as that helps.
-  SharpeningPlan& next(std::span<const int> kept, std::span<const float> looks_ms = {});
+  // `last`: the stage at which cells are left, the finished one or the finer one; the latter only
+  // in a live show, and only as long as nothing moves and frames have half of their time left.
+  SharpeningPlan& next(std::span<const int> kept,
+                       std::span<const float> looks_ms = {},
+                       int last = render::finished_stage);
   // The frame's stages with what was found ahead, and what that took.
   void found_ahead(std::span<const std::uint8_t> stages, double ms);
   // What a cell may take ahead of a frame.
@@ -48,7 +52,7 @@ class Sharpening {
   // What rendering the frame took then, what of that finding cells did, and whether what it found
   // could not all be kept.
   void took(double render_ms, double finding_ms, bool full);
-  // Of the last frame: 0 = coarse, 1 = as the effort asks.
+  // Of the last frame: 0 = coarse, 1 = as the effort asks, or finer.
   double share() const;
   // Why the last frame is not as sharp as the effort asks, and stays so until something moves, in
   // words; "" where it is, or gets there: the memory for kept cells is used up, or cells take so
@@ -69,7 +73,7 @@ class Sharpening {
   double mean_ms() const { return all_but_looks_ms_ + looks_ms_; }
   std::size_t after(std::size_t stage, std::size_t coarse) const;
   std::size_t stage_of_lost(std::size_t lost) const;
-  void go_on(double left, std::span<const float> looks_ms);
+  void go_on(double left, std::span<const float> looks_ms, int last);
   bool takes_too_long(std::size_t cell, std::size_t to) const;
   bool may_take_too_long(std::size_t cell, std::size_t to) const;
   void follow_cells();
@@ -113,7 +117,7 @@ class Sharpening {
   SharpeningPlan plan_;
   ByStage<std::size_t> lost_{};  // cells of the last frame that were lost, by where they began
   bool went_on_ = false;         // whether any other was found anew
-  std::size_t reached_ = 0;      // sum of all cells' stages
+  std::size_t reached_ = 0;      // sum of all cells' stages, up to the finished one
 };
 
 // Renders a frame so: render_frame() with the stages that sharpening plans, which it tells what was

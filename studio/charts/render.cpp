@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "render/refinement.h"
 #include "studio/charts/error_map.h"
 #include "studio/charts/render_stressors.h"
 #include "studio/effort_points.h"
@@ -33,6 +34,8 @@ std::vector<EffortSetting> settings_to_measure(std::string_view scene, bool quic
   }
   std::ranges::copy_if(dial, std::back_inserter(all),
                        [&](const EffortSetting& s) { return s.effort != base; });
+  all.push_back({"all together, beyond the default", "finer",
+                 render::effort_of_stage(base, render::finer_stage)});
   Effort papers = base;  // while anything moved
   papers.aa_samples = 1;
   papers.accuracy = 0.95F;

@@ -92,8 +92,7 @@ TEST(Refinement, IsTheSameColdAndWarm) {
     shot.job.lights.lights[3].irradiance *= 0.9F;
     for (capture::Half& value : shot.plate.pixels) value ^= static_cast<capture::Half>(pick(1));
     Stages stages(cells);
-    for (std::uint8_t& stage : stages)
-      stage = static_cast<std::uint8_t>(pick(render::finished_stage));
+    for (std::uint8_t& stage : stages) stage = static_cast<std::uint8_t>(pick(render::finer_stage));
     const FrameResult warm = render_at(shot, stages, &kept);
     const FrameResult cold = render_at(shot, stages);
     EXPECT_EQ(warm.rgba.pixels, cold.rgba.pixels) << frame;
@@ -117,6 +116,36 @@ TEST(Refinement, BringsThePictureNearerToTheFinishedOneInEveryStage) {
     EXPECT_GT(sum, 0) << stage;
     before = sum;
   }
+}
+
+// Beyond what the effort asks, pixels are nearer to those that take all the rays that they may.
+TEST(Refinement, GoesBeyondTheEffort) {
+  MadeShot shot = made_shot(192, 128, shot_scene());
+  const auto shown_at = [&](int stage) {
+    return capture::to_float(render_at(shot, all_at(stage, 4 * cells)).rgba);
+  };
+  const capture::Image finished = shown_at(render::finished_stage);
+  const capture::Image finer = shown_at(render::finer_stage);
+  shot.job.effort.aa_tolerance = 0.002F;
+  shot.job.effort.accuracy = 0.9999F;
+  shot.job.effort.adaptive_visibility = false;
+  const capture::Image best = shown_at(render::finished_stage);
+  double of_finished = 0, of_finer = 0;
+  for (std::size_t i = 0; i < best.pixels.size(); ++i) {
+    of_finished += std::pow(finished.pixels[i] - best.pixels[i], 2);
+    of_finer += std::pow(finer.pixels[i] - best.pixels[i], 2);
+  }
+  EXPECT_LT(of_finer, of_finished / 2);
+}
+
+// Where no pixel is uncertain, there is nothing beyond.
+TEST(Refinement, EndsWithAnEffortThatAsksForNoMoreRays) {
+  MadeShot shot = made_shot(96, 64, shot_scene());
+  EXPECT_TRUE(render::can_be_finer(shot.job.effort));
+  shot.job.effort.aa_tolerance = 0;
+  EXPECT_FALSE(render::can_be_finer(shot.job.effort));
+  EXPECT_EQ(render_at(shot, all_at(render::finer_stage)).rgba.pixels,
+            render_at(shot, all_at(render::finished_stage)).rgba.pixels);
 }
 
 // The middle of what is covered, in pixels, and how much that is.
@@ -230,7 +259,7 @@ TEST(Refinement, SmoothsWithinWhatNeighboursShow) {
 TEST(Refinement, RefusesStagesThatAreNotThere) {
   const MadeShot shot = made_shot(96, 64, shot_scene());
   EXPECT_THROW(render_at(shot, all_at(0, cells - 1)), std::invalid_argument);
-  EXPECT_THROW(render_at(shot, all_at(render::finished_stage + 1)), std::invalid_argument);
+  EXPECT_THROW(render_at(shot, all_at(render::refinement_stages)), std::invalid_argument);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ std::vector<int> as_kept(const std::vector<std::uint8_t>& stages) {
 
 // Of what a cell takes with one ray a pixel: at each stage.
 constexpr std::array<double, render::refinement_stages> made_cost{1.0 / 64, 0.0625, 0.25, 1,
-                                                                  1.1,      4,      16};
+                                                                  1.1,      4,      16,   40};
 
 // A machine on which every cell with one ray a pixel takes `cell_ms`, and the rest of a frame
 // `rest_ms`.
@@ -37,12 +37,13 @@ struct MadeMachine {
   std::size_t person_begin = 0, person_end = 0;  // cells that show one
   double look_elsewhere_ms = 0;
   double look_ms = 0;  // for each of these, finished; in proportion to `look_cost`
-  std::array<double, render::refinement_stages> look_cost{0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1};
+  std::array<double, render::refinement_stages> look_cost{0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1, 1.2};
   std::size_t moving = 0;  // so many cells, the first ones, are lost in every frame
   // Every so many cells one takes so many times as long, finished; 0 = none does.
   std::size_t slow_every = 0;
   double slow = 1;
   int given_up = 0;
+  int last = render::finished_stage;
 
   double ms_at(std::size_t stage) const { return cell_ms * made_cost[stage]; }
   std::vector<float> looks_ms() const {
@@ -62,7 +63,7 @@ struct MadeMachine {
   // Shows a frame; returns what it takes.
   double show(Sharpening& sharpening) {
     std::fill_n(kept.begin(), moving, none);
-    SharpeningPlan& plan = sharpening.next(kept, looks_ms());
+    SharpeningPlan& plan = sharpening.next(kept, looks_ms(), last);
     double ms = 0;
     std::size_t found = 0;
     std::vector<std::uint8_t> stages = plan.stages, ahead(cells);
@@ -348,6 +349,56 @@ TEST(Sharpening, LeavesSlowCellsUntilNothingMoves) {
   EXPECT_EQ(sharpening.why_coarse(), "");
   machine.moving = 0;
   machine.late_of(200, sharpening);
+  EXPECT_EQ(machine.kept, std::vector<int>(cells, render::finished_stage));
+}
+
+// What stands still is found beyond the effort, as long as frames have time left by far; as sharp
+// as asked it is all the while.
+TEST(Sharpening, GoesBeyondTheEffortWhereThereIsTime) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine{0.1};
+  machine.last = render::finer_stage;
+  EXPECT_LT(machine.late_of(1000, sharpening), 5);
+  EXPECT_EQ(machine.kept, std::vector<int>(cells, render::finer_stage));
+  EXPECT_EQ(sharpening.share(), 1);
+  EXPECT_EQ(sharpening.why_coarse(), "");
+  // What moves begins again, and nothing else goes beyond meanwhile.
+  std::fill_n(machine.kept.begin(), 600, int{render::finished_stage});
+  machine.moving = 40;
+  machine.late_of(100, sharpening);
+  EXPECT_EQ(std::ranges::count(machine.kept, int{render::finer_stage}), 600);
+}
+
+TEST(Sharpening, StaysAtTheEffortWhereFramesAreBusy) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine{0.1};
+  machine.last = render::finer_stage;
+  machine.rest_ms = 24;
+  machine.late_of(1000, sharpening);
+  EXPECT_EQ(machine.kept, std::vector<int>(cells, render::finished_stage));
+}
+
+// Cells that would take seconds to be finished are told, whatever the others do beyond that.
+TEST(Sharpening, TellsOfSlowCellsWhileOthersGoBeyond) {
+  Sharpening sharpening({25, 1}, true);
+  MadeMachine machine{0.1};
+  machine.last = render::finer_stage;
+  machine.slow_every = 20, machine.slow = 2000;
+  std::string why;
+  for (int i = 0; i < 1500 && why.empty(); ++i) {
+    machine.show(sharpening);
+    why = sharpening.why_coarse();
+  }
+  EXPECT_THAT(why, testing::HasSubstr("5.0 % of the picture"));
+  EXPECT_LT(std::ranges::count(machine.kept, int{render::finer_stage}), 1140);
+}
+
+// Pictures that do not depend on time stay at what the effort asks.
+TEST(Sharpening, StaysAtTheEffortWhereNothingIsLive) {
+  Sharpening sharpening({25, 1}, false);
+  MadeMachine machine{0.1};
+  machine.last = render::finer_stage;
+  for (int i = 0; i < 60; ++i) machine.show(sharpening);
   EXPECT_EQ(machine.kept, std::vector<int>(cells, render::finished_stage));
 }
 
