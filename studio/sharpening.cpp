@@ -46,8 +46,9 @@ constexpr double small_part = 0.0625, seconds_to_go_straight = 1.5;
 // A cell may hold a live frame up for so many frames. Those that took such a part, or more, of what
 // one took before that was given up then, wait: in each frame for what is more by so much.
 constexpr double most_frames_of_cell = 3, part_that_waits = 0.9, forgotten_in_frame = 1.01;
-// While something moves, for so many: others wait until it stands.
-constexpr double most_frames_in_motion = 0.25;
+// While something moves, for so many: others wait until it stands. So beyond the effort: others
+// stay.
+constexpr double most_frames_of_quick = 0.25;
 
 // As the effort asks is all that is asked for.
 std::size_t sharp(std::uint8_t stage) { return std::min<std::size_t>(stage, finished_stage); }
@@ -80,7 +81,7 @@ Sharpening::Sharpening(capture::Rational rate, bool live)
 
 double Sharpening::most_of_cell_ms() const {
   if (!live_) return HUGE_VAL;
-  return (moves_ ? most_frames_in_motion : most_frames_of_cell) * frame_ms_;
+  return (moves_ || beyond_ ? most_frames_of_quick : most_frames_of_cell) * frame_ms_;
 }
 
 bool Sharpening::takes_too_long(std::size_t cell, std::size_t to) const {
@@ -178,6 +179,10 @@ void Sharpening::go_on(double left, std::span<const float> looks_ms, int last) {
       std::ranges::count_if(stages, [](std::uint8_t stage) { return stage < anti_aliased; }));
   const std::size_t stride = stride_of(stages.size());
   for (std::size_t stage = 0; stage < static_cast<std::size_t>(last); ++stage) {
+    if (stage == finished_stage) {
+      if (!plan_.ahead.empty()) break;  // these may take longer
+      beyond_ = true;
+    }
     const std::size_t to = after(stage, coarse);
     for (std::size_t turn = 0; turn < stages.size() && left > 0; ++turn) {
       const std::size_t i = turn * stride % stages.size();
@@ -250,6 +255,7 @@ SharpeningPlan& Sharpening::next(std::span<const int> kept,
   slow_cells_ = waiting_cells_ = 0;
   plan_.stages.resize(kept.size());
   plan_.ahead.clear();
+  beyond_ = false;
   const auto lost = static_cast<std::size_t>(std::ranges::count(kept, none));
   moves_ = live_ && lost > 0;
   const std::size_t first = stage_of_lost(lost);

@@ -96,6 +96,7 @@ class Sharpening {
   Shed shed_;
   bool full_ = false, stopped_ = false;  // there is no memory for more
   bool moves_ = false;                   // in the last plan, live cells were lost
+  bool beyond_ = false;                  // ... and those that go on do so beyond the effort
   // Of a cell that is kept: the last stage that was found ahead and what that took, and the stage
   // that took too long.
   struct CellTime {
